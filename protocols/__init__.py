@@ -1,0 +1,1 @@
+"""The language everybody speaks: station file, messages, keys, registers, recordings, links."""

@@ -1,0 +1,23 @@
+"""Zenoh key expressions: `wetwell/{station}/...`, one function a kind of message."""
+
+ROOT = "wetwell"
+
+
+def sample_key(station: str) -> str:
+    """Key of the samples of a station, one message a second."""
+    return f"{ROOT}/{station}/sample"
+
+
+def verdict_key(station: str, pump: int | str = "*") -> str:
+    """Key of the verdicts on one pump (from 1), or of all pumps of the station."""
+    return f"{ROOT}/{station}/verdict/{pump}"
+
+
+def status_key(station: str, service: str) -> str:
+    """Key of the health figures of one service of a station."""
+    return f"{ROOT}/{station}/status/{service}"
+
+
+def alive_key(station: str, service: str) -> str:
+    """Key of the liveliness token of one service of a station."""
+    return f"{ROOT}/{station}/alive/{service}"

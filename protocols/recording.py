@@ -1,0 +1,241 @@
+"""Recordings: one station's samples as columns, in CSV, CSV.gz or Parquet, the same columns everywhere.
+
+Columns: `time` (ISO 8601, UTC), `level_m`, optional `inflow_m3h`, and for each pump i from 1
+`pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
+Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
+"""
+
+import gzip
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.messages import PumpReading, Sample
+from wetwell.protocols.stamps import from_iso, to_iso_array
+
+Floats = npt.NDArray[np.float64]
+
+STATION_COLUMNS = ("level_m", "inflow_m3h")
+PUMP_QUANTITIES = ("frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
+TRUTH_PREFIX = "truth_"
+SUFFIXES = (".csv", ".csv.gz", ".parquet")
+_PUMP_COLUMN = re.compile(rf"pump([1-9]\d*)_({'|'.join(PUMP_QUANTITIES)})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Samples of one station, in the order of their rows.
+
+    Attributes
+    ----------
+    time_ns : (n,) int64
+        Nanoseconds since 1970, UTC; may repeat, jump or go back.
+    columns : mapping of column name to (n,) float64
+        Measured values; NaN is "no value". A column that is absent was never measured.
+    truth : mapping of column name to (n,) array
+        Columns that start with `truth_`: numbers or texts. No diagnosis may read them.
+    ignored : tuple of str
+        Columns of the file that are none of these.
+    """
+
+    time_ns: npt.NDArray[np.int64]
+    columns: Mapping[str, Floats]
+    truth: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    @property
+    def pumps(self) -> int:
+        """Number of pumps that the columns speak of."""
+        return max((int(m[1]) for m in map(_PUMP_COLUMN.fullmatch, self.columns) if m), default=0)
+
+    def column(self, name: str) -> Floats:
+        """(n,) values of a column, NaN throughout where it is absent."""
+        if name in self.columns:
+            return self.columns[name]
+        return np.full(len(self), np.nan)
+
+    def samples(self, station: str) -> Iterator[Sample]:
+        """Yield the rows as messages, `seq` counting from 0."""
+        station_values = [self.column(name).tolist() for name in STATION_COLUMNS]
+        pump_values = [
+            [self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES]
+            for i in range(1, self.pumps + 1)
+        ]
+        for row, stamp_ns in enumerate(self.time_ns.tolist()):
+            level_m, inflow_m3h = (_value(values[row]) for values in station_values)
+            yield Sample(
+                station=station,
+                seq=row,
+                time=stamp_ns,
+                level_m=level_m,
+                inflow_m3h=inflow_m3h,
+                pumps=tuple(_reading(pump, row) for pump in pump_values),
+            )
+
+
+def _value(number: float) -> float | None:
+    return number if number == number else None  # noqa: PLR0124 - the quickest test for NaN
+
+
+def _reading(columns: list[list[float]], row: int) -> PumpReading:
+    frequency_hz, flow_m3h, head_m, power_kw, running = (_value(values[row]) for values in columns)
+    return PumpReading(
+        frequency_hz=frequency_hz,
+        flow_m3h=flow_m3h,
+        head_m=head_m,
+        power_kw=power_kw,
+        running=None if running is None else running > 0,
+    )
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a recording.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read, its ending is not one of `SUFFIXES`, a needed column is missing or a value is
+        not of its column's kind; one line with file, column and rule.
+    """
+    table = _read_table(path)
+    if "time" not in table.column_names:
+        raise RecordingError(f"{path}: column 'time' is missing")
+    columns: dict[str, Floats] = {}
+    truth: dict[str, npt.NDArray[Any]] = {}
+    ignored: list[str] = []
+    for name in table.column_names:
+        if name == "time":
+            continue
+        if name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name):
+            columns[name] = _numbers(table[name], name, path)
+        elif name.startswith(TRUTH_PREFIX):
+            truth[name] = table[name].to_numpy()
+        else:
+            ignored.append(name)
+    recording = Recording(
+        time_ns=_stamps(table["time"], path), columns=columns, truth=truth, ignored=tuple(ignored)
+    )
+    if recording.pumps == 0:
+        raise RecordingError(f"{path}: no pump column such as 'pump1_flow_m3h' found")
+    return recording
+
+
+def _suffix(path: Path) -> str:
+    for suffix in SUFFIXES:
+        if path.name.endswith(suffix):
+            return suffix
+    raise RecordingError(f"{path}: a recording ends in one of {', '.join(SUFFIXES)}")
+
+
+def _read_table(path: Path) -> pa.Table:
+    suffix = _suffix(path)
+    try:
+        if suffix == ".parquet":
+            return pa.parquet.read_table(path)
+        header = _csv_header(path)
+        types = {name: pa.string() if name == "time" else pa.float64() for name in header}
+        types = {name: kind for name, kind in types.items() if not name.startswith(TRUTH_PREFIX)}
+        return pa.csv.read_csv(
+            path,
+            read_options=pa.csv.ReadOptions(use_threads=False),
+            convert_options=pa.csv.ConvertOptions(
+                column_types={
+                    name: kind
+                    for name, kind in types.items()
+                    if name == "time" or name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name)
+                },
+                strings_can_be_null=False,
+            ),
+        )
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (pa.ArrowInvalid, UnicodeDecodeError, EOFError) as error:
+        raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
+
+
+def _csv_header(path: Path) -> list[str]:
+    opener = gzip.open if path.name.endswith(".gz") else open
+    with opener(path, "rt", encoding="utf-8") as file:
+        header = [name.strip('"') for name in str(file.readline()).rstrip("\r\n").split(",")]
+    repeated = sorted({name for name in header if header.count(name) > 1})
+    if repeated:
+        raise RecordingError(f"{path}: column '{repeated[0]}' stands twice")
+    return header
+
+
+def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
+    try:
+        values: Floats = column.cast(pa.float64()).to_numpy()
+    except pa.ArrowInvalid as error:
+        raise RecordingError(f"{path}: column '{name}' must hold numbers: {error}") from error
+    return values
+
+
+def _stamps(column: pa.ChunkedArray, path: Path) -> npt.NDArray[np.int64]:
+    if pa.types.is_timestamp(column.type):
+        stamps: npt.NDArray[np.int64] = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
+        return stamps
+    texts = column.to_numpy()
+    try:
+        return np.array([from_iso(text) for text in texts], dtype=np.int64)
+    except (TypeError, ValueError):
+        row = next(row for row, text in enumerate(texts, start=1) if not _is_stamp(text))
+        raise RecordingError(
+            f"{path}: column 'time', row {row}: got {texts[row - 1]!r}, must be ISO 8601 such as 2025-01-31T06:00:00Z"
+        ) from None
+
+
+def _is_stamp(text: object) -> bool:
+    try:
+        from_iso(str(text))
+    except ValueError:
+        return False
+    return True
+
+
+def write_recording(recording: Recording, path: Path) -> None:
+    """Write a recording; the file appears whole or not at all, the same bytes for the same recording.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be written or its ending is not one of `SUFFIXES`.
+    """
+    suffix = _suffix(path)
+    time: Any = recording.time_ns
+    time = pa.array(time, pa.timestamp("ns", tz="UTC")) if suffix == ".parquet" else to_iso_array(time)
+    table = pa.table({"time": time, **recording.columns, **recording.truth})
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        with partial.open("wb") as file:
+            _write_table(table, file, suffix)
+        os.replace(partial, path)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _write_table(table: pa.Table, file: Any, suffix: str) -> None:
+    if suffix == ".parquet":
+        pa.parquet.write_table(table, file, compression="zstd")
+        return
+    options = pa.csv.WriteOptions(quoting_style="none")
+    if suffix == ".csv":
+        pa.csv.write_csv(table, file, options)
+        return
+    with gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0) as packed:
+        pa.csv.write_csv(table, packed, options)

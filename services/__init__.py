@@ -1,0 +1,1 @@
+"""The edges: daemons, settings and the command line."""

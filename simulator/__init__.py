@@ -1,0 +1,1 @@
+"""The plant: hydraulics, wet well, control, drive, sensors, inflow and faults at one-second steps."""
