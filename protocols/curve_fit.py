@@ -49,7 +49,7 @@ def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float,
 
 
 def fit_error_m(points: Sequence[tuple[float, float]], coefficients: tuple[float, float, float]) -> float:
-    """Root mean square distance in head between datasheet points and a curve. [m]
+    """Root mean square distance in head between datasheet points and a curve, in m.
 
     Examples
     --------

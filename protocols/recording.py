@@ -6,7 +6,6 @@ Empty or NaN is "no value". Columns that start with `truth_` hold what only a si
 """
 
 import gzip
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -125,9 +124,7 @@ def read_recording(path: Path) -> Recording:
             truth[name] = table[name].to_numpy()
         else:
             ignored.append(name)
-    recording = Recording(
-        time_ns=_stamps(table["time"], path), columns=columns, truth=truth, ignored=tuple(ignored)
-    )
+    recording = Recording(time_ns=_stamps(table["time"], path), columns=columns, truth=truth, ignored=tuple(ignored))
     if recording.pumps == 0:
         raise RecordingError(f"{path}: no pump column such as 'pump1_flow_m3h' found")
     return recording
@@ -222,7 +219,7 @@ def write_recording(recording: Recording, path: Path) -> None:
     try:
         with partial.open("wb") as file:
             _write_table(table, file, suffix)
-        os.replace(partial, path)
+        partial.replace(path)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:

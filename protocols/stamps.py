@@ -1,6 +1,7 @@
 """Time stamps: nanoseconds since 1970 in UTC inside, ISO 8601 with a Z outside."""
 
 from datetime import UTC, datetime
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ def to_iso(stamp_ns: int) -> str:
     >>> to_iso(1_500_000_000)
     '1970-01-01T00:00:01.500Z'
     """
-    unit = "s" if stamp_ns % NS_PER_S == 0 else "ms" if stamp_ns % 1_000_000 == 0 else "ns"
+    unit: Literal["s", "ms", "ns"] = "s" if stamp_ns % NS_PER_S == 0 else "ms" if stamp_ns % 1_000_000 == 0 else "ns"
     return f"{np.datetime_as_string(np.datetime64(stamp_ns, 'ns'), unit=unit)}Z"
 
 
@@ -44,5 +45,8 @@ def from_iso(text: str) -> int:
 
 def to_iso_array(stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.str_]:
     """ISO 8601 texts of (n,) stamps, all with the same number of decimals."""
-    unit = "s" if not np.any(stamps_ns % NS_PER_S) else "ms" if not np.any(stamps_ns % 1_000_000) else "ns"
-    return np.char.add(np.datetime_as_string(stamps_ns.astype("datetime64[ns]"), unit=unit), "Z")
+    unit: Literal["s", "ms", "ns"] = (
+        "s" if not np.any(stamps_ns % NS_PER_S) else "ms" if not np.any(stamps_ns % 1_000_000) else "ns"
+    )
+    texts = np.datetime_as_string(stamps_ns.astype("datetime64[ns]"), unit=unit)
+    return np.char.add(texts, "Z")
