@@ -62,5 +62,9 @@ def _one_line(fault: Mapping[str, Any]) -> str:
 def _path(location: Sequence[int | str]) -> str:
     path = ""
     for part in location:
-        path += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if path else part
+        if isinstance(part, int):
+            path += f"[{part + 1}]"
+        else:
+            name = part if part.isprintable() else repr(part)
+            path += f".{name}" if path else name
     return path

@@ -1,12 +1,12 @@
 """Messages on the bus: sample, verdict, status. JSON with `schema`, times in ISO 8601 UTC."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
 
 from wetwell.protocols.errors import WetwellError, first_fault
-from wetwell.protocols.stamps import from_iso, to_iso
+from wetwell.protocols.stamps import MAX_STAMP_NS, from_iso, to_iso
 
 JSON_ENCODING = "application/json"
 
@@ -33,11 +33,16 @@ def _stamp(value: object) -> object:
     if isinstance(value, str):
         return from_iso(value)
     if isinstance(value, datetime):
-        return from_iso(value.astimezone(UTC).isoformat())
+        return from_iso(value.isoformat())
     return value
 
 
-Stamp = Annotated[int, BeforeValidator(_stamp), PlainSerializer(to_iso, return_type=str)]
+Stamp = Annotated[
+    int,
+    BeforeValidator(_stamp),
+    Field(ge=-MAX_STAMP_NS, le=MAX_STAMP_NS),
+    PlainSerializer(to_iso, return_type=str),
+]
 """Nanoseconds since 1970 in code, ISO 8601 text in JSON."""
 
 Number = float | None

@@ -5,8 +5,11 @@ Columns: `time` (ISO 8601, UTC), `level_m`, optional `inflow_m3h`, and for each 
 Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
 """
 
+import contextlib
 import gzip
+import io
 import re
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -66,8 +69,8 @@ class Recording:
             return self.columns[name]
         return np.full(len(self), np.nan)
 
-    def samples(self, station: str) -> Iterator[Sample]:
-        """Yield the rows as messages, `seq` counting from 0."""
+    def samples(self, station: str, first_seq: int = 0) -> Iterator[Sample]:
+        """Yield the rows as messages, `seq` counting from `first_seq`."""
         station_values = [self.column(name).tolist() for name in STATION_COLUMNS]
         pump_values = [
             [self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES]
@@ -77,7 +80,7 @@ class Recording:
             level_m, inflow_m3h = (_value(values[row]) for values in station_values)
             yield Sample(
                 station=station,
-                seq=row,
+                seq=first_seq + row,
                 time=stamp_ns,
                 level_m=level_m,
                 inflow_m3h=inflow_m3h,
@@ -159,7 +162,7 @@ def _read_table(path: Path) -> pa.Table:
         )
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (pa.ArrowInvalid, UnicodeDecodeError, EOFError) as error:
+    except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error) as error:
         raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
 
 
@@ -176,14 +179,20 @@ def _csv_header(path: Path) -> list[str]:
 def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
     try:
         values: Floats = column.cast(pa.float64()).to_numpy()
-    except pa.ArrowInvalid as error:
+    except pa.ArrowException as error:
         raise RecordingError(f"{path}: column '{name}' must hold numbers: {error}") from error
     return values
 
 
 def _stamps(column: pa.ChunkedArray, path: Path) -> npt.NDArray[np.int64]:
     if pa.types.is_timestamp(column.type):
-        stamps: npt.NDArray[np.int64] = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
+        if column.null_count:
+            row = int(np.argmax(column.is_null().to_numpy())) + 1
+            raise RecordingError(f"{path}: column 'time', row {row}: is empty")
+        try:
+            stamps: npt.NDArray[np.int64] = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
+        except pa.ArrowInvalid as error:
+            raise RecordingError(f"{path}: column 'time': {error}") from error
         return stamps
     texts = column.to_numpy()
     try:
@@ -195,10 +204,10 @@ def _stamps(column: pa.ChunkedArray, path: Path) -> npt.NDArray[np.int64]:
         ) from None
 
 
-def _is_stamp(text: object) -> bool:
+def _is_stamp(text: Any) -> bool:
     try:
-        from_iso(str(text))
-    except ValueError:
+        from_iso(text)
+    except (TypeError, ValueError):
         return False
     return True
 
@@ -222,17 +231,23 @@ def write_recording(recording: Recording, path: Path) -> None:
         partial.replace(path)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
+    except pa.ArrowException as error:
+        raise RecordingError(f"{path}: cannot be written: {error}") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink()
 
 
-def _write_table(table: pa.Table, file: Any, suffix: str) -> None:
+def _write_table(table: pa.Table, file: io.BufferedIOBase, suffix: str) -> None:
     if suffix == ".parquet":
         pa.parquet.write_table(table, file, compression="zstd")
-        return
-    options = pa.csv.WriteOptions(quoting_style="none")
-    if suffix == ".csv":
-        pa.csv.write_csv(table, file, options)
-        return
-    with gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0) as packed:
-        pa.csv.write_csv(table, packed, options)
+    elif suffix == ".csv":
+        _write_csv(table, file)
+    else:
+        with gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0) as packed:
+            _write_csv(table, packed)
+
+
+def _write_csv(table: pa.Table, file: io.BufferedIOBase) -> None:
+    file.write(",".join(table.column_names).encode() + b"\n")
+    pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))

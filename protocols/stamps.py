@@ -1,12 +1,19 @@
 """Time stamps: nanoseconds since 1970 in UTC inside, ISO 8601 with a Z outside."""
 
-from datetime import UTC, datetime
+import re
+from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 NS_PER_S = 1_000_000_000
+MAX_STAMP_NS = 2**63 - 1
+"""In the year 2262; the first stamp is as far before 1970."""
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
+_BELOW_MICROSECOND = re.compile(r"[.,]\d{6}(\d{1,3})")
 
 
 def to_iso(stamp_ns: int) -> str:
@@ -29,18 +36,25 @@ def from_iso(text: str) -> int:
     Raises
     ------
     ValueError
-        If the text is not ISO 8601.
+        If the text is not ISO 8601, or lies outside of the years 1678 to 2262.
 
     Examples
     --------
     >>> from_iso("2025-01-01T01:00:00+01:00") == from_iso("2025-01-01T00:00:00Z")
     True
+    >>> from_iso("1970-01-01T00:00:00.000000001Z")
+    1
     """
     moment = datetime.fromisoformat(text)
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=UTC)
-    whole_s = moment.astimezone(UTC).replace(microsecond=0)
-    return int(whole_s.timestamp()) * NS_PER_S + moment.microsecond * 1000
+    stamp_ns = (moment - _EPOCH) // _MICROSECOND * 1000
+    digits = _BELOW_MICROSECOND.search(text)
+    if digits:
+        stamp_ns += int(digits[1].ljust(3, "0"))
+    if abs(stamp_ns) > MAX_STAMP_NS:
+        raise ValueError(f"time must lie in the years 1678 to 2262, got {text!r}")
+    return stamp_ns
 
 
 def to_iso_array(stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.str_]:

@@ -1,5 +1,6 @@
 """Station file: what the owner of a pump station knows of it, in TOML, checked to the last key."""
 
+import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -23,13 +24,16 @@ def check_levels(start_levels_m: tuple[float, ...], stop_levels_m: tuple[float, 
     Raises
     ------
     ValueError
-        If the numbers of levels differ, a stop level is not under its start level, or levels fall with n.
+        If the numbers of levels differ, a level is not finite, a stop level is not under its start level, or levels
+        fall with n.
     """
     if len(start_levels_m) != len(stop_levels_m):
         raise ValueError(
             f"as many stop_levels_m as start_levels_m are needed, got {len(stop_levels_m)} and {len(start_levels_m)}"
         )
     for n, (start_m, stop_m) in enumerate(zip(start_levels_m, stop_levels_m, strict=True), start=1):
+        if not (math.isfinite(start_m) and math.isfinite(stop_m)):
+            raise ValueError(f"start and stop level {n} must be finite, got {start_m:g} and {stop_m:g}")
         if stop_m >= start_m:
             raise ValueError(f"stop_levels_m[{n}] = {stop_m:g} must lie under start_levels_m[{n}] = {start_m:g}")
     if sorted(start_levels_m) != list(start_levels_m) or sorted(stop_levels_m) != list(stop_levels_m):

@@ -1,0 +1,55 @@
+# Both commands of the README set up all that they need, from a bare Debian with python3 (3.11 or later), venv and make.
+.DEFAULT_GOAL := help
+VENV := .venv
+BIN := $(VENV)/bin
+UV := VIRTUAL_ENV=$(VENV) $(BIN)/uv
+SCENARIO ?= demo
+
+.PHONY: help up test lint types imports format requirements clean
+
+help:  ## Show the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
+
+up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C stops
+	@exec $(BIN)/wetwell up --scenario $(SCENARIO)
+
+test: lint types imports  ## Lint, types, import contract, all tests
+	@find simulator -name '*.nb[ci]' -delete  # kernels know changes of their own file only
+	$(BIN)/pytest -q --durations=5
+
+lint: $(VENV)/.dev  ## ruff
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.dev  ## mypy
+	$(BIN)/mypy
+
+imports: $(VENV)/.dev  ## import contract
+	$(BIN)/lint-imports
+
+format: $(VENV)/.dev  ## Bring all files into form
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+requirements: $(VENV)/.uv  ## Pin the newest versions anew
+	cd requirements && for name in runtime build dev; do \
+	  ../$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+	    --no-header --upgrade $$name.in --output-file $$name.txt || exit 1; done
+
+clean:  ## Remove what the targets made
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +
+
+$(VENV)/.uv:
+	python3 -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	@touch $@
+
+$(VENV)/.runtime: $(VENV)/.uv requirements/runtime.txt requirements/build.txt pyproject.toml
+	$(UV) pip install --quiet --require-hashes -r requirements/runtime.txt -r requirements/build.txt
+	$(UV) pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.runtime requirements/dev.txt
+	$(UV) pip install --quiet --require-hashes -r requirements/dev.txt
+	@touch $@

@@ -1,0 +1,194 @@
+"""Pump runs: from start to stop, the steady part cut into segments."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.gate import Frame
+from wetwell.detector.nominal import Nominal
+from wetwell.detector.residuals import level_residuals
+from wetwell.protocols.stamps import NS_PER_S
+
+Floats = npt.NDArray[np.float64]
+
+SEGMENT_SAMPLES = 25
+WARM_UP_S = 30.0
+NEAR_NOMINAL = 0.02
+MAX_RUN_S = 1800.0
+BREAK_S = 60.0
+RUNNING_SHARE = 0.05
+"""Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
+
+SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """The steady samples of one run of one pump, or of a part of a long one.
+
+    Attributes
+    ----------
+    pump : int
+        From 0.
+    window_ns : (first, last) stamp of the run
+    time_s, flow_m3h, head_m, speed_ratio, total_flow_m3h : (n,) arrays
+        Steady samples that have flow, head and frequency; time since the first of them.
+    segments : (m, 2) array
+        Means of the level residuals (r_p, r_s) over 25 samples each. [m]
+    missing : frozenset of str
+        Signals that no sample of the run had.
+    """
+
+    pump: int
+    window_ns: tuple[int, int]
+    time_s: Floats
+    flow_m3h: Floats
+    head_m: Floats
+    speed_ratio: Floats
+    total_flow_m3h: Floats
+    segments: Floats
+    missing: frozenset[str]
+
+
+@dataclass(slots=True)
+class _Open:
+    """A run that goes on."""
+
+    start_ns: int
+    part_ns: int
+    last_ns: int
+    steady_from_ns: int
+    rows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+    seen: set[str] = field(default_factory=set)
+    is_steady: bool = False
+
+
+class RunTracker:
+    """Cuts the frames of a station into pump runs.
+
+    A sample is steady when its pump runs near nominal frequency, `WARM_UP_S` after its start and after any other
+    pump has started or stopped. A run ends when the pump stops, when the stream breaks for more than `BREAK_S`, or in
+    parts of `MAX_RUN_S`, so that a pump that never stops is judged too.
+
+    Memory: at most `MAX_RUN_S` samples a pump.
+    """
+
+    def __init__(self, nominal: Nominal) -> None:
+        self._nominal = nominal
+        self._open: list[_Open | None] = [None] * nominal.pumps
+        self._running: tuple[bool, ...] = (False,) * nominal.pumps
+        self._last_ns = 0
+
+    def update(self, frame: Frame) -> list[Run]:
+        """Runs that this frame ends."""
+        ended = [run for pump in range(self._nominal.pumps) if (run := self._break(pump, frame.gap_s)) is not None]
+        running = tuple(self._is_running(frame, pump) for pump in range(self._nominal.pumps))
+        if running != self._running:
+            self._running = running
+            steady_from_ns = frame.time_ns + int(WARM_UP_S * NS_PER_S)
+            for going_on in self._open:
+                if going_on is not None:
+                    going_on.steady_from_ns = steady_from_ns
+        for pump in range(self._nominal.pumps):
+            finished = self._update_pump(pump, frame)
+            if finished is not None:
+                ended.append(finished)
+        self._last_ns = frame.time_ns
+        return ended
+
+    def finish(self) -> list[Run]:
+        """Runs that are still open, at the end of a recording."""
+        return [run for pump in range(self._nominal.pumps) if (run := self._close(pump)) is not None]
+
+    def steady_sample(self, pump: int) -> tuple[float, float, float, float] | None:
+        """(flow, head, speed ratio, total flow) of a pump in the last frame, if it was steady."""
+        run = self._open[pump]
+        return run.rows[-1][1:] if run is not None and run.is_steady else None
+
+    def open_run(self, pump: int, segments: int) -> Run | None:
+        """The open run of a pump, when it has just filled a segment and has at least so many."""
+        run = self._open[pump]
+        if run is None or len(run.rows) < segments * SEGMENT_SAMPLES or len(run.rows) % SEGMENT_SAMPLES:
+            return None
+        return self._as_run(pump, run)
+
+    def _is_running(self, frame: Frame, pump: int) -> bool:
+        reading = frame.pumps[pump]
+        if reading.running is not None:
+            return reading.running
+        if not math.isnan(reading.frequency_hz):
+            return reading.frequency_hz > RUNNING_SHARE * self._nominal.frequencies_hz[pump]
+        if not math.isnan(reading.flow_m3h):
+            return reading.flow_m3h > RUNNING_SHARE * self._nominal.runout_flow_m3h(pump)
+        return self._open[pump] is not None
+
+    def _break(self, pump: int, gap_s: float) -> Run | None:
+        return self._close(pump) if gap_s > BREAK_S else None
+
+    def _update_pump(self, pump: int, frame: Frame) -> Run | None:
+        run = self._open[pump]
+        if not self._running[pump]:
+            return self._close(pump)
+        if run is None:
+            steady_from_ns = frame.time_ns + int(WARM_UP_S * NS_PER_S)
+            run = self._open[pump] = _Open(frame.time_ns, frame.time_ns, frame.time_ns, steady_from_ns)
+        finished = None
+        if frame.time_ns - run.part_ns >= MAX_RUN_S * NS_PER_S:
+            finished = self._as_run(pump, run)
+            run.part_ns = frame.time_ns
+            run.rows.clear()
+            run.seen.clear()
+        run.last_ns = frame.time_ns
+        self._collect(run, pump, frame)
+        return finished
+
+    def _collect(self, run: _Open, pump: int, frame: Frame) -> None:
+        run.is_steady = False
+        reading = frame.pumps[pump]
+        values = (reading.frequency_hz, reading.flow_m3h, reading.head_m, frame.level_m)
+        run.seen.update(name for name, value in zip(SIGNALS, values, strict=True) if not math.isnan(value))
+        speed_ratio = reading.frequency_hz / self._nominal.frequencies_hz[pump]
+        is_usable = abs(speed_ratio - 1.0) <= NEAR_NOMINAL and not math.isnan(reading.flow_m3h + reading.head_m)
+        if frame.time_ns < run.steady_from_ns or not is_usable:
+            return
+        total_m3h = reading.flow_m3h
+        if self._nominal.is_common_header:
+            total_m3h = sum(other.flow_m3h for other, on in zip(frame.pumps, self._running, strict=True) if on)
+            if math.isnan(total_m3h):
+                return
+        time_s = (frame.time_ns - run.part_ns) / NS_PER_S
+        run.is_steady = True
+        run.rows.append((time_s, reading.flow_m3h, reading.head_m, speed_ratio, total_m3h))
+
+    def _close(self, pump: int) -> Run | None:
+        run = self._open[pump]
+        self._open[pump] = None
+        return None if run is None else self._as_run(pump, run)
+
+    def _as_run(self, pump: int, run: _Open) -> Run:
+        rows = np.array(run.rows).reshape(-1, 5)
+        time_s, flow_m3h, head_m, speed_ratio, total_m3h = rows.T
+        pump_m, system_m = level_residuals(
+            flow_m3h,
+            head_m,
+            speed_ratio,
+            curve=self._nominal.curves[pump],
+            static_head_m=self._nominal.static_head_m,
+            friction_h2_m5=self._nominal.friction_h2_m5,
+            total_flow_m3h=total_m3h,
+        )
+        whole = len(rows) // SEGMENT_SAMPLES * SEGMENT_SAMPLES
+        residuals = np.column_stack([pump_m, system_m])[:whole]
+        return Run(
+            pump=pump,
+            window_ns=(run.part_ns, run.last_ns),
+            time_s=time_s,
+            flow_m3h=flow_m3h,
+            head_m=head_m,
+            speed_ratio=speed_ratio,
+            total_flow_m3h=total_m3h,
+            segments=residuals.reshape(-1, SEGMENT_SAMPLES, 2).mean(axis=1) if whole else np.empty((0, 2)),
+            missing=frozenset(SIGNALS) - run.seen,
+        )

@@ -1,0 +1,81 @@
+"""Buffer between the threads of a link and one event loop."""
+
+import asyncio
+import contextlib
+import threading
+from collections import deque
+
+
+class Mailbox:
+    """Messages that wait for one asyncio reader; a `Subscription` of every link.
+
+    Characteristics: buffered: up to `capacity` messages · when full: drops the oldest and counts it in `dropped` ·
+    threads: `put` from any, `receive` from one task of one loop · a wake-up crosses to the loop only while the reader
+    waits, so a burst costs one.
+
+    Parameters
+    ----------
+    capacity : int
+        Most messages that wait, >= 1.
+
+    Raises
+    ------
+    ValueError
+        If `capacity` is below one.
+
+    Examples
+    --------
+    >>> mailbox = Mailbox(capacity=2)
+    >>> for payload in (b"1", b"2", b"3"):
+    ...     mailbox.put(payload)
+    >>> asyncio.run(mailbox.receive()), mailbox.dropped
+    ([b'2', b'3'], 1)
+    """
+
+    def __init__(self, capacity: int) -> None:
+        if capacity < 1:
+            raise ValueError(f"capacity must be at least 1, got {capacity}")
+        self.dropped = 0
+        self._capacity = capacity
+        self._messages: deque[bytes] = deque()
+        self._reader: asyncio.Future[None] | None = None
+        self._lock = threading.Lock()
+
+    def put(self, payload: bytes) -> None:
+        """Add a message; never waits for the reader."""
+        with self._lock:
+            if len(self._messages) == self._capacity:
+                self._messages.popleft()
+                self.dropped += 1
+            self._messages.append(payload)
+            reader, self._reader = self._reader, None
+        if reader is not None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is left to wake
+                reader.get_loop().call_soon_threadsafe(_wake, reader)
+
+    async def receive(self) -> list[bytes]:
+        """Wait until a message is there, then return all that are, oldest first.
+
+        Lets other tasks run each time, even if messages are always there. Cancelling loses no message.
+
+        Raises
+        ------
+        RuntimeError
+            If another task waits already.
+        """
+        await asyncio.sleep(0)
+        while True:
+            with self._lock:
+                if self._messages:
+                    batch = list(self._messages)
+                    self._messages.clear()
+                    return batch
+                if self._reader is not None and not self._reader.done():
+                    raise RuntimeError("a mailbox has one reader, another task waits already")
+                reader = self._reader = asyncio.get_running_loop().create_future()
+            await reader
+
+
+def _wake(reader: asyncio.Future[None]) -> None:
+    if not reader.done():
+        reader.set_result(None)

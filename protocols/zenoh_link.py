@@ -1,0 +1,284 @@
+"""Bus over Zenoh: one process is the router, the others are its clients. The only import of zenoh.
+
+Nothing is found by scouting: a router listens on the endpoint that it is given, a client connects to it.
+"""
+
+import asyncio
+import concurrent.futures
+import contextlib
+import json
+import logging
+import random
+import re
+from typing import Any, Literal, Self
+
+import zenoh
+import zenoh.ext
+
+from wetwell.protocols.errors import ConfigError, LinkError
+from wetwell.protocols.mailbox import Mailbox
+from wetwell.protocols.messages import JSON_ENCODING
+
+logger = logging.getLogger(__name__)
+
+RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
+"""How a client looks for a lost router. Zenoh's own 1 to 4 s would leave a gap of that length."""
+
+HEARTBEAT_S = 1.0
+"""A publisher tells its last sequence number this long after a message, so that a lost last one is noticed."""
+
+
+class ZenohPublisher:
+    """Publisher on one key of a `ZenohBus`, with a cache for late joiners and for loss, and an answer to `get`."""
+
+    def __init__(self, session: zenoh.Session, key: str, history: int) -> None:
+        self._key = key
+        self._last: bytes | None = None
+        self._publisher = zenoh.ext.declare_advanced_publisher(
+            session,
+            key,
+            encoding=JSON_ENCODING,
+            congestion_control=zenoh.CongestionControl.DROP,
+            cache=zenoh.ext.CacheConfig(max_samples=history),
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S),
+            publisher_detection=True,
+        )
+        self._queryable = session.declare_queryable(key, self._answer)
+
+    def put(self, payload: bytes) -> None:
+        """Send a message; without a router it is kept in the cache for the time after.
+
+        Raises
+        ------
+        LinkError
+            If the bus is closed.
+        """
+        self._last = payload
+        try:
+            self._publisher.put(payload)
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot publish on '{self._key}': {_reason(error)}") from error
+
+    def _answer(self, query: zenoh.Query) -> None:
+        with query:
+            if self._last is not None:
+                query.reply(self._key, self._last, encoding=JSON_ENCODING)
+
+
+class ZenohBus:
+    """A `Bus` over a Zenoh session. Close it, or use it in a `with`: else the process never ends.
+
+    Characteristics: buffered: in each subscription, and in each publisher its last `history` messages · when full:
+    the oldest is dropped and counted; on the way to a slow subscriber messages are dropped and asked for again from
+    the publisher's history · threads: any may publish · reconnect: a client comes back by itself, usually
+    within 0.5 s of the router; its publishers, subscriptions and what it announced are then as before.
+
+    Messages sent while the router was away come afterwards: at once the last `history` of each publisher, if the
+    subscription has a `history`, and no older ones; with `history=0` all that the publisher keeps, but only with its
+    next message. A kept message may come twice: where that matters, drop it by its `seq`.
+
+    Parameters
+    ----------
+    session : zenoh.Session
+        Open session; the bus closes it.
+    is_router : bool
+        Whether others connect to this session.
+    """
+
+    def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
+        self._session = session
+        self._is_router = is_router
+        self._declared: list[object] = []  # zenoh undeclares what nobody holds
+        self._exit = contextlib.ExitStack()
+        self._exit.enter_context(session)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the network; twice is fine."""
+        self._exit.close()
+
+    def publisher(self, key: str, *, history: int = 1) -> ZenohPublisher:
+        """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss.
+
+        Raises
+        ------
+        ValueError
+            If `history` is below one.
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        if history < 1:
+            raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
+        try:
+            publisher = ZenohPublisher(self._session, key, history)
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot publish on '{key}': {_reason(error)}") from error
+        self._declared.append(publisher)
+        return publisher
+
+    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox:
+        """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox = Mailbox(capacity)
+
+        def deliver(sample: zenoh.Sample) -> None:
+            if sample.kind == zenoh.SampleKind.PUT:
+                mailbox.put(sample.payload.to_bytes())
+
+        kept = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history) if history else None
+        try:
+            subscriber = zenoh.ext.declare_advanced_subscriber(
+                self._session,
+                key,
+                deliver,
+                history=kept,
+                recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+            )
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
+        self._declared.append(subscriber)
+        return mailbox
+
+    def announce(self, key: str) -> None:
+        """Show under a key that this service lives, by a liveliness token that goes with the connection.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        try:
+            self._declared.append(self._session.liveliness().declare_token(key))
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot announce '{key}': {_reason(error)}") from error
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether messages can reach others now: a router always, a client while it has its router."""
+        if self._session.is_closed():
+            return False
+        return self._is_router or bool(self._session.info.routers_zid())
+
+
+def open_router(endpoint: str) -> ZenohBus:
+    """Bus to which others connect.
+
+    Parameters
+    ----------
+    endpoint : str
+        Where to listen, such as `tcp/127.0.0.1:7447`.
+
+    Raises
+    ------
+    ConfigError
+        If `endpoint` is not of that form.
+    LinkError
+        If the endpoint cannot be listened on, most often because another program does.
+    """
+    config = _config("router", endpoint)
+    config.insert_json5("scouting/delay", "0")  # nobody is scouted: do not wait for answers
+    try:
+        return ZenohBus(zenoh.open(config), is_router=True)
+    except zenoh.ZError as error:
+        raise LinkError(f"cannot listen on {endpoint}: {_reason(error)}") from error
+
+
+def open_client(endpoint: str, *, timeout_s: float = 2.0) -> ZenohBus:
+    """Bus through the router at an endpoint; waits up to `timeout_s` for it.
+
+    Raises
+    ------
+    ConfigError
+        If `endpoint` is not of the form `tcp/127.0.0.1:7447`.
+    LinkError
+        If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
+    """
+    config = _config("client", endpoint)
+    config.insert_json5("connect/timeout_ms", str(max(1, round(timeout_s * 1000))))
+    config.insert_json5("connect/retry", json.dumps(RECONNECT))
+    try:
+        return ZenohBus(zenoh.open(config), is_router=False)
+    except zenoh.ZError as error:
+        raise LinkError(
+            f"no router reached at {endpoint} within {timeout_s:g} s (wrong credentials look the same)"
+        ) from error
+
+
+async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_s: float = 10.0) -> ZenohBus:
+    """Bus through the router at an endpoint; tries until it is there, with full jitter, and logs each failure.
+
+    Parameters
+    ----------
+    endpoint : str
+        Where the router listens, such as `tcp/127.0.0.1:7447`.
+    timeout_s : float
+        Time limit of one try. [s]
+    longest_wait_s : float
+        Upper limit of the random wait between two tries, which otherwise grows as 1.5^n. [s]
+
+    Raises
+    ------
+    ConfigError
+        If `endpoint` is not of that form: no later try would help.
+    """
+    attempt = 0
+    while True:
+        try:
+            return await _open_in_thread(endpoint, timeout_s)
+        except LinkError as error:
+            attempt += 1
+            wait_s = random.uniform(0.0, min(longest_wait_s, 1.5 ** min(attempt, 100)))
+            logger.warning("%s; try %d, next in %.1f s", error, attempt, wait_s)
+        await asyncio.sleep(wait_s)
+
+
+async def _open_in_thread(endpoint: str, timeout_s: float) -> ZenohBus:
+    """Open a client without blocking the loop; a bus that comes after a cancellation is closed in the thread."""
+    executor = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh-open")
+    opening = executor.submit(open_client, endpoint, timeout_s=timeout_s)
+    executor.shutdown(wait=False)
+    try:
+        return await asyncio.wrap_future(opening)
+    except asyncio.CancelledError:
+        opening.add_done_callback(_close_late)
+        raise
+
+
+def _close_late(opening: concurrent.futures.Future[ZenohBus]) -> None:
+    if not opening.cancelled() and opening.exception() is None:
+        opening.result().close()
+
+
+def _config(mode: Literal["router", "client"], endpoint: str) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, Any] = {
+        "mode": mode,
+        "listen/endpoints": [endpoint] if mode == "router" else [],
+        "connect/endpoints": [endpoint] if mode == "client" else [],
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+    }
+    try:
+        for name, value in settings.items():
+            config.insert_json5(name, json.dumps(value))
+    except zenoh.ZError as error:
+        raise ConfigError(f"endpoint must be of the form tcp/ADDRESS:PORT, got '{endpoint}'") from error
+    return config
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """What a Zenoh error says, in one line, without places in its source."""
+    system = re.search(r"[^:\[]+(?= \(os error \d+\))", str(error))
+    if system:
+        return system.group().strip().lower()
+    return " ".join(re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).split())

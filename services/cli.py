@@ -1,0 +1,366 @@
+"""The command `wetwell`: parses and calls, nothing else."""
+
+import asyncio
+import re
+import sys
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn
+
+import typer
+
+from wetwell.protocols.errors import ConfigError, WetwellError
+from wetwell.services.settings import LogSettings, Settings, load_settings
+
+app = typer.Typer(
+    name="wetwell",
+    help="Watches wastewater pump stations and says whether a pump or the rising main is at fault.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+station_app = typer.Typer(no_args_is_help=True, help="Station files.")
+config_app = typer.Typer(no_args_is_help=True, help="Settings of the services.")
+app.add_typer(station_app, name="station")
+app.add_typer(config_app, name="config")
+
+StationOption = Annotated[
+    str, typer.Option("--station", metavar="FILE", help="Station file, or the name of a built-in station.")
+]
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", metavar="NAME", help="Built-in scenario, or a scenario file.")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
+SpeedOption = Annotated[
+    float | None, typer.Option(help="Seconds of the station in a second on the wall; default: the scenario's.")
+]
+ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file with settings.")]
+ZenohOption = Annotated[str | None, typer.Option("--zenoh", metavar="ENDPOINT", help="Such as tcp/127.0.0.1:7447.")]
+ModbusOption = Annotated[
+    str | None, typer.Option("--modbus", metavar="HOST:PORT", help="Address of the Modbus TCP server.")
+]
+WordOrderOption = Annotated[
+    Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+@app.command()
+def up(
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "demo",
+    seed: SeedOption = 1,
+    speed: SpeedOption = None,
+    limit: Annotated[
+        str | None, typer.Option("--for", metavar="TIME", help="Stop after this time on the wall: 90s, 10m, 2h.")
+    ] = None,
+    zenoh: ZenohOption = None,
+    modbus: ModbusOption = None,
+    word_order: WordOrderOption = None,
+    config: ConfigOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
+) -> None:
+    """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector."""
+    from wetwell.services.presets import find_scenario, find_station
+    from wetwell.services.supervisor import serve_all
+    from wetwell.services.terminal import banner, line_printer
+
+    settings = _settings(config, zenoh, modbus, word_order)
+    if settings.log == LogSettings():
+        settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
+    limit_s = None if limit is None else parse_duration_s(limit)
+    plant, plan = find_station(station), find_scenario(scenario)
+    _check(plant, plan, seed)
+    speed = plan.clock_speed if speed is None else _positive(speed, "--speed")
+    if not as_json:
+        typer.echo(banner(settings, plant, plan.name, speed))
+    live = [
+        "--station",
+        station,
+        "--scenario",
+        scenario,
+        "--seed",
+        str(seed),
+        "--speed",
+        str(speed),
+        "--modbus-server",
+    ]
+    commands = {"detector": ["detector", "--station", station], "simulator": ["simulator", *live]}
+    _run(settings, serve_all(settings, plant.name, commands, line_printer(as_json=as_json), limit_s))
+
+
+@app.command()
+def simulator(
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "nominal",
+    seed: SeedOption = 1,
+    speed: SpeedOption = None,
+    modbus_server: Annotated[
+        bool, typer.Option("--modbus-server", help="Also serve the same plant on Modbus TCP.")
+    ] = False,
+    zenoh: ZenohOption = None,
+    modbus: ModbusOption = None,
+    word_order: WordOrderOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Simulate a station live and publish its samples on Zenoh."""
+    _serve_plant(
+        _settings(config, zenoh, modbus, word_order), station, scenario, seed, speed, zenoh=True, modbus=modbus_server
+    )
+
+
+@app.command()
+def plc(
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "nominal",
+    seed: SeedOption = 1,
+    speed: SpeedOption = None,
+    modbus: ModbusOption = None,
+    word_order: WordOrderOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Simulate a station live behind a Modbus TCP server, as its PLC would show it; needs no Zenoh."""
+    _serve_plant(
+        _settings(config, None, modbus, word_order), station, scenario, seed, speed, zenoh=False, modbus=True
+    )
+
+
+@app.command()
+def detector(station: StationOption = "alpha", zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
+    """Judge the samples of a station on Zenoh and publish verdicts."""
+    from wetwell.services.detector import serve_detector
+    from wetwell.services.presets import find_station
+
+    settings = _settings(config, zenoh)
+    _run(settings, serve_detector(settings, find_station(station)))
+
+
+@app.command()
+def replay(
+    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    station: StationOption = "alpha",
+    speed: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Publish a recording on Zenoh as if it were live, then end."""
+    from wetwell.protocols.recording import read_recording
+    from wetwell.services.presets import find_station
+    from wetwell.services.replay import serve_replay
+
+    settings = _settings(config, zenoh)
+    rows = read_recording(recording)
+    _run(settings, serve_replay(settings, rows, find_station(station).name, _positive(speed, "--speed")))
+
+
+@app.command()
+def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
+    """Run a Zenoh router, for sites that have none."""
+    from wetwell.services.router import serve_router
+
+    settings = _settings(config, zenoh)
+    _run(settings, serve_router(settings))
+
+
+@app.command()
+def simulate(
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "nominal",
+    days: Annotated[float | None, typer.Option(help="Length; default: the scenario's.")] = None,
+    seed: SeedOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a simulated recording, with truth columns."""
+    from wetwell.services.batch import simulate as write
+
+    plant = _simulation(station, scenario, seed)
+    length_s = plant.scenario.duration_s if days is None else _positive(days, "--days") * 86_400.0
+    recording = write(plant, max(round(length_s), 1), out)
+    summary = {"recording": str(out), "rows": len(recording), "station": plant.station.name, "seed": seed}
+    _print(summary, as_json=as_json)
+
+
+@app.command()
+def detect(
+    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Verdicts, one JSON object a line.")],
+    station: StationOption = "alpha",
+    as_json: JsonOption = False,
+) -> None:
+    """Judge a recording with the streaming detector."""
+    from wetwell.protocols.recording import read_recording
+    from wetwell.services.batch import detect as judge
+    from wetwell.services.presets import find_station
+
+    plant = find_station(station)
+    rows = read_recording(recording)
+    for name in rows.ignored:
+        typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
+    _print(judge(plant, rows, out), as_json=as_json)
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(help="File in a foreign form.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    form: Annotated[Literal["skab"], typer.Option("--from", help="Form of the file.")] = "skab",
+    as_json: JsonOption = False,
+) -> None:
+    """Turn a file of another origin into a recording."""
+    from wetwell.protocols.importers import IMPORTERS
+    from wetwell.protocols.recording import write_recording
+
+    recording = IMPORTERS[form](source)
+    write_recording(recording, out)
+    _print({"recording": str(out), "rows": len(recording), "columns": sorted(recording.columns)}, as_json=as_json)
+
+
+@app.command("modbus-map")
+def modbus_map(
+    station: StationOption = "alpha",
+    form: Annotated[Literal["csv"], typer.Option("--format", help="Form of the map.")] = "csv",  # noqa: ARG001
+) -> None:
+    """Print the register map of a station's Modbus server."""
+    from wetwell.protocols.registers import register_csv, register_table
+    from wetwell.services.presets import find_station
+
+    plant = find_station(station)
+    typer.echo(register_csv(register_table(len(plant.pump), len(plant.control.start_levels_m))), nl=False)
+
+
+@station_app.command("check")
+def station_check(file: Annotated[str, typer.Argument(help="Station file.")]) -> None:
+    """Check a station file; says what is wrong with it, or nothing is."""
+    from wetwell.services.presets import find_station
+
+    typer.echo(f"{file}: station '{find_station(file).name}' is valid")
+
+
+@station_app.command("show")
+def station_show(
+    file: Annotated[str, typer.Argument(help="Station file.")] = "alpha", as_json: JsonOption = False
+) -> None:
+    """Print the duty points of a station, for each pump alone and for all together."""
+    from wetwell.services.presets import find_station
+    from wetwell.simulator.duty import duty_table
+
+    _print(duty_table(find_station(file)), as_json=as_json)
+
+
+@config_app.command("check")
+def config_check(file: Annotated[Path, typer.Argument(help="TOML file with settings.")]) -> None:
+    """Check a file with settings."""
+    load_settings(file)
+    typer.echo(f"{file}: settings are valid")
+
+
+@config_app.command("show")
+def config_show(config: ConfigOption = None) -> None:
+    """Print the settings that are in force, as JSON."""
+    typer.echo(load_settings(config).model_dump_json(indent=2))
+
+
+def parse_duration_s(text: str) -> float:
+    """Seconds in a text such as 90, 90s, 10m or 2h.
+
+    Raises
+    ------
+    ConfigError
+        If the text is none.
+
+    Examples
+    --------
+    >>> parse_duration_s("90"), parse_duration_s("10m"), parse_duration_s("1.5h")
+    (90.0, 600.0, 5400.0)
+    """
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh]?)", text)
+    if match is None:
+        raise ConfigError(f"--for: got '{text}', must be a time such as 90s, 10m or 2h")
+    return float(match[1]) * {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}[match[2]]
+
+
+def _settings(
+    config: Path | None,
+    zenoh: str | None = None,
+    modbus: str | None = None,
+    word_order: Literal["ABCD", "CDAB"] | None = None,
+) -> Settings:
+    flags: dict[str, Any] = {}
+    if zenoh is not None:
+        flags["zenoh"] = {"endpoint": zenoh}
+    if modbus is not None:
+        host, colon, port = modbus.rpartition(":")
+        if not colon or not port.isdecimal():
+            raise ConfigError(f"--modbus: got '{modbus}', must be HOST:PORT such as 127.0.0.1:5020")
+        flags["modbus"] = {"host": host, "port": int(port)}
+    if word_order is not None:
+        flags.setdefault("modbus", {})["word_order"] = word_order
+    return load_settings(config, flags)
+
+
+def _simulation(station: str, scenario: str, seed: int) -> Any:
+    from wetwell.services.presets import find_scenario, find_station
+
+    return _check(find_station(station), find_scenario(scenario), seed)
+
+
+def _check(station: Any, scenario: Any, seed: int) -> Any:
+    """Simulation of a scenario on a station that can run it."""
+    from wetwell.simulator.simulation import Simulation
+
+    try:
+        return Simulation(station, scenario, seed)
+    except ValueError as error:
+        raise ConfigError(f"scenario '{scenario.name}': {error}") from error
+
+
+def _serve_plant(
+    settings: Settings, station: str, scenario: str, seed: int, speed: float | None, *, zenoh: bool, modbus: bool
+) -> None:
+    from wetwell.services.simulator import serve_simulator
+
+    plant = _simulation(station, scenario, seed)
+    speed = plant.scenario.clock_speed if speed is None else _positive(speed, "--speed")
+    _run(settings, serve_simulator(settings, plant, speed, zenoh=zenoh, modbus=modbus))
+
+
+def _positive(value: float, flag: str) -> float:
+    if not 0.0 < value < float("inf"):
+        raise ConfigError(f"{flag}: got {value:g}, must be positive")
+    return value
+
+
+def _run(settings: Settings, service: Coroutine[Any, Any, None]) -> None:
+    from wetwell.services.daemon import start_logging
+
+    start_logging(settings.log.level)
+    asyncio.run(service)
+
+
+def _print(result: dict[str, object], *, as_json: bool) -> None:
+    from wetwell.services.terminal import as_json as to_json
+    from wetwell.services.terminal import as_lines
+
+    typer.echo(to_json(result) if as_json else as_lines(result))
+
+
+def main() -> NoReturn:
+    """Run the command; an error of the user's is one line on standard error and exit code 2."""
+    try:
+        app(standalone_mode=True)
+    except WetwellError as error:
+        typer.echo(f"wetwell: {error}", err=True)
+    except ExceptionGroup as group:
+        matched, rest = group.split(WetwellError)
+        if rest is not None or matched is None:
+            raise
+        typer.echo(f"wetwell: {_first(matched)}", err=True)
+    sys.exit(2)
+
+
+def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
+    error: BaseException = group
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error

@@ -1,0 +1,94 @@
+"""What every daemon has: a way to stop, ticks that do not drift, and health figures on the bus."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator, Callable
+
+from wetwell.protocols.keys import alive_key, status_key
+from wetwell.protocols.link import Bus
+from wetwell.protocols.messages import Status
+from wetwell.services.clock import now_ns
+
+log = logging.getLogger(__name__)
+
+PARENT_VARIABLE = "WETWELL_STOP_WITH_PARENT"
+"""Set for the children of a supervisor: they stop when their standard input ends, even if it was killed."""
+
+
+def start_logging(level: str) -> None:
+    """Log to standard error, one line an event."""
+    logging.basicConfig(
+        level=level, stream=sys.stderr, format="%(asctime)s %(levelname)s %(name)s: %(message)s", force=True
+    )
+
+
+@contextlib.asynccontextmanager
+async def stop_event() -> AsyncIterator[asyncio.Event]:
+    """Yield an event that SIGINT, SIGTERM or the end of the parent sets; a second signal acts as usual."""
+    loop, stop = asyncio.get_running_loop(), asyncio.Event()
+    signals = (signal.SIGINT, signal.SIGTERM)
+
+    def request(sig: signal.Signals) -> None:
+        log.info("stopping on %s", sig.name)
+        stop.set()
+        loop.remove_signal_handler(sig)
+
+    def read_parent() -> None:
+        if not os.read(sys.stdin.fileno(), 1024):
+            loop.remove_reader(sys.stdin.fileno())
+            log.info("stopping with the parent process")
+            stop.set()
+
+    has_parent = os.environ.get(PARENT_VARIABLE) == "1"
+    for sig in signals:
+        loop.add_signal_handler(sig, request, sig)
+    if has_parent:
+        loop.add_reader(sys.stdin.fileno(), read_parent)
+    try:
+        yield stop
+    finally:
+        for sig in signals:
+            loop.remove_signal_handler(sig)
+        if has_parent:
+            loop.remove_reader(sys.stdin.fileno())
+
+
+async def ticks(period_s: float, stop: asyncio.Event) -> AsyncIterator[float]:
+    """Yield the time since the start, in s, on each multiple of the period until stopped; late ticks are skipped."""
+    loop = asyncio.get_running_loop()
+    start, n = loop.time(), 0
+    while not stop.is_set():
+        yield loop.time() - start
+        n = max(n + 1, int((loop.time() - start) // period_s) + 1)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout_at(start + n * period_s):
+                await stop.wait()
+
+
+async def until(stop: asyncio.Event, task: asyncio.Task[None]) -> None:
+    """Wait until stopped or until the task ends; then cancel it. An error of the task is raised."""
+    waiting = asyncio.create_task(stop.wait(), name="stop")
+    try:
+        await asyncio.wait({waiting, task}, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for each in (waiting, task):
+            each.cancel()
+        await asyncio.gather(waiting, task, return_exceptions=True)
+    if not task.cancelled() and (error := task.exception()) is not None:
+        raise error
+
+
+async def report_health(
+    bus: Bus, station: str, service: str, period_s: float, figures: Callable[[], dict[str, float]]
+) -> None:
+    """Show that a service lives, and publish its figures for ever."""
+    bus.announce(alive_key(station, service))
+    publisher = bus.publisher(status_key(station, service))
+    never = asyncio.Event()
+    async for _ in ticks(period_s, never):
+        status = Status(time=now_ns(), station=station, service=service, state="running", figures=figures())
+        publisher.put(status.encode())

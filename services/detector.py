@@ -1,0 +1,88 @@
+"""The detector daemon: samples from the bus in, verdicts on the bus out."""
+
+import asyncio
+import contextlib
+import logging
+from collections import Counter
+
+from wetwell.protocols.zenoh_link import connect_client
+
+from wetwell.detector.nominal import nominal_of
+from wetwell.detector.pipeline import Detector
+from wetwell.protocols.keys import sample_key, verdict_key
+from wetwell.protocols.link import Bus
+from wetwell.protocols.messages import MessageError, Sample, Verdict
+from wetwell.protocols.station import Station
+from wetwell.services.daemon import report_health, stop_event, until
+from wetwell.services.settings import Settings
+
+log = logging.getLogger(__name__)
+
+SAMPLE_HISTORY = 600
+VERDICT_HISTORY = 100
+
+
+async def serve_detector(settings: Settings, station: Station) -> None:
+    """Judge a station until stopped. A router that is away is waited for."""
+    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
+        running = asyncio.create_task(_run(settings, station, stack), name="detector.run")
+        await until(stop, running)
+
+
+async def _run(settings: Settings, station: Station, stack: contextlib.AsyncExitStack) -> None:
+    bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
+    judge = StationJudge(bus, station)
+    async with asyncio.TaskGroup() as group:
+        group.create_task(
+            report_health(bus, station.name, "detector", settings.health.period_s, judge.figures),
+            name="detector.health",
+        )
+        group.create_task(judge.run(), name="detector.judge")
+
+
+class StationJudge:
+    """Feeds the detector of one station from a bus and publishes what it says."""
+
+    def __init__(self, bus: Bus, station: Station) -> None:
+        self._station = station.name
+        self._detector = Detector(station.name, nominal_of(station))
+        self._samples = bus.subscribe(sample_key(station.name), history=SAMPLE_HISTORY)
+        self._publishers = [
+            bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
+            for pump in range(1, len(station.pump) + 1)
+        ]
+        self._states: dict[int, str] = {}
+        self._counts: Counter[str] = Counter()
+
+    async def run(self) -> None:
+        """Judge for ever. A payload that is no sample is counted and left out."""
+        log.info("station '%s': waiting for samples", self._station)
+        while True:
+            for payload in await self._samples.receive():
+                self._take(payload)
+            await asyncio.sleep(0)  # let the health figures out between batches
+
+    def figures(self) -> dict[str, float]:
+        """Health figures."""
+        counts = {name: float(count) for name, count in (self._detector.counts | self._counts).items()}
+        return counts | {"dropped": float(self._samples.dropped)}
+
+    def _take(self, payload: bytes) -> None:
+        try:
+            sample = Sample.decode(payload)
+        except MessageError as error:
+            self._counts["malformed"] += 1
+            log.warning("station '%s': %s", self._station, error)
+            return
+        if sample.station != self._station:
+            self._counts["foreign"] += 1
+            return
+        for verdict in self._detector.update(sample):
+            self._publish(verdict)
+
+    def _publish(self, verdict: Verdict) -> None:
+        self._counts["verdicts"] += 1
+        self._publishers[verdict.pump - 1].put(verdict.encode())
+        if self._states.get(verdict.pump) != verdict.state:
+            log.info("station '%s' pump %d: %s", self._station, verdict.pump, verdict.state)
+        self._states[verdict.pump] = verdict.state

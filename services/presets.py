@@ -1,0 +1,80 @@
+"""Stations and scenarios by name or by file."""
+
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from wetwell.protocols.errors import ConfigError, first_fault
+from wetwell.protocols.recording import read_recording
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.station import Station, load_station, load_toml
+from wetwell.simulator.scenario import Scenario
+
+_PLANT = files("wetwell.simulator")
+
+
+def preset_names(kind: str) -> list[str]:
+    """Names of the stations or scenarios that come with the package; `kind` is "stations" or "scenarios"."""
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in (_PLANT / kind).iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def find_station(name_or_path: str) -> Station:
+    """Station that comes with the package under this name, or in this file.
+
+    Raises
+    ------
+    ConfigError
+        If there is none, or its file breaks a rule.
+    """
+    with as_file(_PLANT / "stations") as folder:
+        return load_station(_find(name_or_path, folder, "station"))
+
+
+def find_scenario(name_or_path: str) -> Scenario:
+    """Scenario that comes with the package under this name, or in this file.
+
+    Raises
+    ------
+    ConfigError
+        If there is none, or its file breaks a rule.
+    """
+    with as_file(_PLANT / "scenarios") as folder:
+        path = _find(name_or_path, folder, "scenario")
+        table = load_toml(path)
+    _read_inflow(table, path)
+    try:
+        return Scenario.model_validate(table)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {first_fault(error)}") from error
+
+
+def _find(name_or_path: str, folder: Path, kind: str) -> Path:
+    preset = folder / f"{name_or_path}.toml"
+    if "/" not in name_or_path and preset.is_file():
+        return preset
+    path = Path(name_or_path)
+    if path.is_file() or path.suffix:
+        return path
+    names = ", ".join(sorted(preset.stem for preset in folder.glob("*.toml")))
+    raise ConfigError(f"{kind} '{name_or_path}' is neither a file nor one of {names}")
+
+
+def _read_inflow(table: dict[str, Any], path: Path) -> None:
+    """Put the series of a recording in the place of its file's name: `inflow = {kind = "recorded", file = "..."}`."""
+    inflow = table.get("inflow")
+    if not isinstance(inflow, dict) or inflow.get("kind") != "recorded" or "file" not in inflow:
+        return
+    source = path.parent / str(inflow.pop("file"))
+    recording = read_recording(source)
+    flow_m3h = recording.column("inflow_m3h")
+    known = np.flatnonzero(np.isfinite(flow_m3h))
+    if known.size == 0:
+        raise ConfigError(f"{path}: inflow.file: '{source}' has no values in column 'inflow_m3h'")
+    order = known[np.unique(recording.time_ns[known], return_index=True)[1]]
+    inflow["time_s"] = (recording.time_ns[order] - recording.time_ns[order[0]]) / NS_PER_S
+    inflow["flow_m3h"] = np.maximum(flow_m3h[order], 0.0)

@@ -1,0 +1,118 @@
+"""The simulator daemon: a plant that lives, seen on Zenoh, on Modbus TCP, or on both."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+
+from wetwell.protocols.zenoh_link import connect_client
+
+from wetwell.protocols.keys import sample_key
+from wetwell.protocols.link import Bus
+from wetwell.protocols.modbus_server import ModbusServer
+from wetwell.protocols.recording import Recording
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.services.clock import due_seconds, tick_period_s
+from wetwell.services.daemon import report_health, stop_event, ticks, until
+from wetwell.services.settings import Settings
+from wetwell.simulator.simulation import Simulation
+
+log = logging.getLogger(__name__)
+
+HISTORY = 600
+"""Samples that the bus keeps for late joiners: ten minutes at one a second."""
+
+Sink = Callable[[Recording], None]
+
+
+async def serve_simulator(
+    settings: Settings, simulation: Simulation, speed: float, *, zenoh: bool, modbus: bool
+) -> None:
+    """Run a plant until stopped.
+
+    Raises
+    ------
+    LinkError
+        If the Modbus port cannot be opened. A router that is away is waited for.
+    """
+    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
+        sinks: list[Sink] = []
+        if modbus:
+            sinks.append(await _modbus_sink(settings, simulation, stack))
+        running = asyncio.create_task(
+            _run(settings, simulation, speed, sinks, stack, zenoh=zenoh), name="simulator.run"
+        )
+        await until(stop, running)
+        log.info("stopped after %d s of station '%s'", simulation.seconds, simulation.station.name)
+
+
+async def _run(
+    settings: Settings,
+    simulation: Simulation,
+    speed: float,
+    sinks: list[Sink],
+    stack: contextlib.AsyncExitStack,
+    *,
+    zenoh: bool,
+) -> None:
+    async with asyncio.TaskGroup() as group:
+        if zenoh:
+            bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
+            sinks.append(_zenoh_sink(bus, simulation))
+            group.create_task(
+                report_health(
+                    bus,
+                    simulation.station.name,
+                    "simulator",
+                    settings.health.period_s,
+                    lambda: {"seconds": float(simulation.seconds), "speed": speed},
+                ),
+                name="simulator.health",
+            )
+        group.create_task(_live(simulation, speed, sinks), name="simulator.live")
+
+
+async def _live(simulation: Simulation, speed: float, sinks: list[Sink]) -> None:
+    log.info("station '%s', scenario '%s', speed %g", simulation.station.name, simulation.scenario.name, speed)
+    first = simulation.seconds
+    never = asyncio.Event()
+    async for elapsed_s in ticks(tick_period_s(speed), never):
+        due = due_seconds(elapsed_s, speed, simulation.seconds - first)
+        if due > 0:
+            recording = simulation.advance(due, truth=False)
+            for sink in sinks:
+                sink(recording)
+
+
+def _zenoh_sink(bus: Bus, simulation: Simulation) -> Sink:
+    station = simulation.station.name
+    publisher = bus.publisher(sample_key(station), history=HISTORY)
+
+    def publish(recording: Recording) -> None:
+        for sample in recording.samples(station, first_seq=simulation.seconds - len(recording)):
+            publisher.put(sample.encode())
+
+    return publish
+
+
+async def _modbus_sink(settings: Settings, simulation: Simulation, stack: contextlib.AsyncExitStack) -> Sink:
+    server = await stack.enter_async_context(
+        ModbusServer(
+            host=settings.modbus.host,
+            port=settings.modbus.port,
+            unit_id=settings.modbus.unit_id,
+            word_order=settings.modbus.word_order,
+            pumps=len(simulation.station.pump),
+            levels=len(simulation.station.control.start_levels_m),
+            on_write=simulation.change_settings,
+        )
+    )
+    server.update(simulation.settings)
+
+    def show(recording: Recording) -> None:
+        values: dict[str, float | None] = {name: float(column[-1]) for name, column in recording.columns.items()}
+        values["heartbeat"] = simulation.seconds % 65536
+        values["time_s"] = int(recording.time_ns[-1]) // NS_PER_S
+        server.update(values | simulation.settings)
+
+    return show

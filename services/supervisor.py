@@ -1,0 +1,128 @@
+"""The whole service on one machine: router, simulator with its PLC, detector; verdicts on the terminal."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import sys
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+
+from wetwell.protocols.zenoh_link import open_router
+
+from wetwell.protocols.errors import WetwellError
+from wetwell.protocols.keys import verdict_key
+from wetwell.protocols.link import Bus, Subscription
+from wetwell.protocols.messages import Verdict
+from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
+from wetwell.services.settings import Settings
+
+log = logging.getLogger(__name__)
+
+STOP_TIMEOUT_S = 10.0
+
+
+class ChildError(WetwellError):
+    """A child process has ended by itself."""
+
+
+async def serve_all(
+    settings: Settings,
+    station: str,
+    commands: Mapping[str, Sequence[str]],
+    show: Callable[[Verdict], None],
+    limit_s: float | None,
+) -> None:
+    """Run router and children until stopped, until the time is over, or until a child ends.
+
+    Parameters
+    ----------
+    settings : Settings
+        For the router here and, by the environment, for the children.
+    station : str
+        Name whose verdicts are shown.
+    commands : dict
+        Arguments of `wetwell` for each child, by name.
+    show : callable
+        Gets each verdict.
+    limit_s : float, optional
+        Time after which all is stopped. [s]
+
+    Raises
+    ------
+    LinkError
+        If the router's endpoint cannot be opened.
+    ChildError
+        If a child ends before it was asked to.
+    """
+    async with stop_event() as stop:
+        with open_router(settings.zenoh.endpoint) as bus:
+            running = asyncio.create_task(_run(settings, bus, station, commands, show), name="up.run")
+            if limit_s is not None:
+                asyncio.get_running_loop().call_later(limit_s, stop.set)
+            await until(stop, running)
+
+
+async def _run(
+    settings: Settings, bus: Bus, station: str, commands: Mapping[str, Sequence[str]], show: Callable[[Verdict], None]
+) -> None:
+    verdicts = bus.subscribe(verdict_key(station))
+    async with contextlib.AsyncExitStack() as stack:
+        children = {
+            name: await stack.enter_async_context(_child(settings, name, arguments))
+            for name, arguments in commands.items()
+        }
+        waits = [asyncio.create_task(_watch(name, child), name=f"up.{name}") for name, child in children.items()]
+        shows = asyncio.create_task(_show(verdicts, show), name="up.verdicts")
+        try:
+            done, _ = await asyncio.wait([*waits, shows], return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            for task in (*waits, shows):
+                task.cancel()
+
+
+async def _show(verdicts: Subscription, show: Callable[[Verdict], None]) -> None:
+    while True:
+        for payload in await verdicts.receive():
+            show(Verdict.decode(payload))
+
+
+async def _watch(name: str, child: asyncio.subprocess.Process) -> None:
+    code = await child.wait()
+    raise ChildError(f"{name} ended by itself with exit code {code}; what it said stands above")
+
+
+@contextlib.asynccontextmanager
+async def _child(
+    settings: Settings, name: str, arguments: Sequence[str]
+) -> AsyncIterator[asyncio.subprocess.Process]:
+    """Start a child in a session of its own; at the end ask it to stop, and make it stop if it does not."""
+    environment = os.environ | {
+        PARENT_VARIABLE: "1",
+        "WETWELL_ZENOH": settings.zenoh.model_dump_json(),
+        "WETWELL_MODBUS": settings.modbus.model_dump_json(),
+        "WETWELL_LOG": settings.log.model_dump_json(),
+        "WETWELL_HEALTH": settings.health.model_dump_json(),
+    }
+    child = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        "wetwell.services",
+        *arguments,
+        stdin=asyncio.subprocess.PIPE,
+        env=environment,
+        start_new_session=True,
+    )
+    try:
+        yield child
+    finally:
+        if child.returncode is None:
+            child.terminate()
+            try:
+                async with asyncio.timeout(STOP_TIMEOUT_S):
+                    await child.wait()
+            except TimeoutError:
+                log.warning("%s did not stop within %g s and is killed", name, STOP_TIMEOUT_S)
+                child.kill()
+                await child.wait()

@@ -1,0 +1,116 @@
+"""What `wetwell up` prints: where to look, then each change of state."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+
+from wetwell.protocols.messages import State, Verdict
+from wetwell.protocols.registers import register_table
+from wetwell.protocols.stamps import to_iso
+from wetwell.protocols.station import Station
+from wetwell.services.settings import Settings
+
+WORDS: dict[State, str] = {
+    "learning": "learning",
+    "normal": "normal",
+    "pump_fault": "PUMP FAULT",
+    "system_fault": "SYSTEM FAULT",
+    "pump_and_system_fault": "PUMP AND SYSTEM FAULT",
+    "sensor_fault": "SENSOR FAULT",
+    "unknown": "unknown",
+}
+
+
+def banner(settings: Settings, station: Station, scenario: str, speed: float) -> str:
+    """Where to poll and what to subscribe to."""
+    table = register_table(len(station.pump), len(station.control.start_levels_m))
+    level = next(register for register in table if register.name == "level_m" and register.table == "input")
+    modbus = settings.modbus
+    order = "-B " if modbus.word_order == "ABCD" else ""
+    return f"""\
+wetwell: station '{station.name}', {len(station.pump)} pumps, scenario '{scenario}', {speed:g} times as fast as life
+
+Modbus TCP   {modbus.host}:{modbus.port}, unit id {modbus.unit_id}, {modbus.word_order}; map: wetwell modbus-map
+  mbpoll -m tcp -p {modbus.port} -a {modbus.unit_id} -0 -r {level.address} -t 3:float {order}-1 {modbus.host}
+
+Zenoh        {settings.zenoh.endpoint}
+  import zenoh
+  config = zenoh.Config()
+  config.insert_json5("mode", '"client"')
+  config.insert_json5("connect/endpoints", '["{settings.zenoh.endpoint}"]')
+  with zenoh.open(config) as bus, bus.declare_subscriber("wetwell/{station.name}/**") as messages:
+      for message in messages: print(message.key_expr, message.payload.to_string())
+
+Ctrl-C stops. Verdicts, in the station's time:
+"""
+
+
+def line_printer(*, as_json: bool) -> Callable[[Verdict], None]:
+    """Printer of verdicts: every one as JSON, or a line for people where a state changes or learning goes on."""
+    told: dict[int, tuple[State, str]] = {}
+
+    def show(verdict: Verdict) -> None:
+        if as_json:
+            print(verdict.encode().decode(), flush=True)  # noqa: T201 - this is what the command prints
+            return
+        reason = str(verdict.evidence.get("reason", ""))
+        news = (verdict.state, reason.split(".", 1)[0] if verdict.state == "learning" else "")
+        if told.get(verdict.pump) != news:
+            print(verdict_line(verdict), flush=True)  # noqa: T201 - this is what the command prints
+        told[verdict.pump] = news
+
+    return show
+
+
+def verdict_line(verdict: Verdict) -> str:
+    """One line for people.
+
+    Examples
+    --------
+    >>> print(verdict_line(Verdict(
+    ...     time=0, station="alpha", pump=2, state="pump_fault", probability={"pump_fault": 0.998, "normal": 0.002},
+    ...     evidence={"shift_m": {"pump": -5.9, "system": 0.06}}, onset=0, window=(0, 0))))
+    1970-01-01T00:00:00Z  pump 2  PUMP FAULT             p = 0.998  pump curve -5.90 m, system curve +0.06 m
+    """
+    words = [f"{to_iso(verdict.time)}  pump {verdict.pump}  {WORDS[verdict.state]:<21}"]
+    if verdict.state in verdict.probability and verdict.state != "learning":
+        words.append(f"p = {verdict.probability[verdict.state]:.3f}")
+    if "shift_m" in verdict.evidence:
+        shift_m = verdict.evidence["shift_m"]
+        words.append(f"pump curve {shift_m['pump']:+.2f} m, system curve {shift_m['system']:+.2f} m")
+    if "reason" in verdict.evidence:
+        words.append(str(verdict.evidence["reason"]))
+    return "  ".join(words).rstrip()
+
+
+def as_json(value: object) -> str:
+    """JSON text for standard output."""
+    return json.dumps(value, indent=2)
+
+
+def as_lines(result: Mapping[str, object], indent: str = "") -> str:
+    """A result for people: one value a line, a list of alike tables as one table.
+
+    Examples
+    --------
+    >>> print(as_lines({"rows": 3, "pumps": [{"pump": 1, "head_m": 26.0}, {"pump": 2, "head_m": 25.5}]}))
+    rows: 3
+    pumps:
+      pump  head_m
+         1    26.0
+         2    25.5
+    """
+    lines = []
+    for key, value in result.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{key}:", as_lines(value, indent + "  ")]
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            lines += [f"{indent}{key}:", *_rows(value, indent + "  ")]
+        else:
+            lines.append(f"{indent}{key}: {value}")
+    return "\n".join(lines)
+
+
+def _rows(tables: Sequence[Mapping[str, object]], indent: str) -> list[str]:
+    cells = [list(tables[0]), *([str(value) for value in table.values()] for table in tables)]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
+    return [indent + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]

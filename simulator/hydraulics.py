@@ -1,0 +1,156 @@
+"""Duty points: where pump curves meet the system curve, alone or on a common header."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.simulator.jit import compiled
+
+Floats = npt.NDArray[np.float64]
+
+FLOW_TOLERANCE_M3H = 1e-10
+MAX_ITERATIONS = 200
+
+
+@compiled
+def pump_head_m(c0: float, c1: float, c2: float, speed_ratio: float, flow_m3h: float) -> float:
+    r"""Head of a centrifugal pump at a given flow and speed.
+
+    $$H(Q, N) = c_0 N^2 + c_1 N Q + c_2 Q^2, \qquad N = f / f_n$$
+
+    The affinity laws in closed form: H scales with N² where Q scales with N. May be negative past run-out.
+
+    Parameters
+    ----------
+    c0, c1, c2 : float
+        Curve at nominal speed. [m, m/(m³/h), m/(m³/h)²]
+    speed_ratio : float
+        N, speed over nominal speed. [1]
+    flow_m3h : float
+        Volume flow through the pump. [m³/h]
+
+    Returns
+    -------
+    head_m : float
+        [m]
+
+    References
+    ----------
+    .. [1] J. F. Gülich, Centrifugal Pumps, Springer: similarity laws.
+
+    Examples
+    --------
+    >>> pump_head_m(20.0, 0.0, -0.001, 1.0, 100.0)
+    10.0
+    >>> pump_head_m(20.0, 0.0, -0.001, 0.5, 50.0)
+    2.5
+    """
+    return c0 * speed_ratio**2 + c1 * speed_ratio * flow_m3h + c2 * flow_m3h**2
+
+
+@compiled
+def flow_at_head_m3h(c0: float, c1: float, c2: float, speed_ratio: float, head_m: float) -> float:
+    r"""Flow at which a pump makes a given head; zero behind a closed check valve.
+
+    The positive root of $c_2 Q^2 + c_1 N Q + c_0 N^2 - H = 0$ in the form that loses no digits,
+
+    $$Q = \frac{2 \ell}{b + \sqrt{b^2 + 4 a \ell}}, \qquad \ell = c_0 N^2 - H,\ a = -c_2,\ b = -c_1 N$$
+
+    With c2 − k for c2 and the static head for H this is the duty point against H_s + k Q².
+
+    Parameters
+    ----------
+    c0, c1, c2 : float
+        Falling curve: c1 <= 0, c2 <= 0, not both zero. [m, m/(m³/h), m/(m³/h)²]
+    speed_ratio : float
+        N, speed over nominal speed, >= 0. [1]
+    head_m : float
+        Head against which the pump works. [m]
+
+    Returns
+    -------
+    flow_m3h : float
+        Zero where the head reaches the shut-off head c0 N². [m³/h]
+
+    Examples
+    --------
+    >>> flow_at_head_m3h(20.0, 0.0, -0.001, 1.0, 10.0)
+    100.0
+    >>> flow_at_head_m3h(20.0, 0.0, -0.001, 0.5, 10.0)
+    0.0
+    """
+    lift_m = c0 * speed_ratio**2 - head_m
+    if speed_ratio <= 0.0 or lift_m <= 0.0:
+        return 0.0
+    b = -c1 * speed_ratio
+    return 2.0 * lift_m / (b + math.sqrt(b * b - 4.0 * c2 * lift_m))
+
+
+@compiled
+def individual_flows(
+    curves: Floats, speed_ratio: Floats, static_head_m: float, friction_h2_m5: float, flow_m3h: Floats
+) -> None:
+    """Duty flow of each pump against a rising main of its own.
+
+    Parameters
+    ----------
+    curves : (pumps, 3) array
+        c0, c1, c2 of each pump. [m, m/(m³/h), m/(m³/h)²]
+    speed_ratio : (pumps,) array
+        [1]
+    static_head_m, friction_h2_m5 : float
+        System curve H = H_s + k Q². [m, h²/m⁵]
+    flow_m3h : (pumps,) array
+        Receives the flows. [m³/h]
+    """
+    for i in range(speed_ratio.size):
+        flow_m3h[i] = flow_at_head_m3h(
+            curves[i, 0], curves[i, 1], curves[i, 2] - friction_h2_m5, speed_ratio[i], static_head_m
+        )
+
+
+@compiled
+def common_flows(
+    curves: Floats, speed_ratio: Floats, static_head_m: float, friction_h2_m5: float, flow_m3h: Floats
+) -> None:
+    r"""Duty flows of pumps on one header, at any speeds.
+
+    The total flow solves $\sum_i Q_i(H_s + k Q^2) = Q$. The left side falls and the right side rises with Q, so
+    that there is one root; Newton's method finds it, kept inside a bracket by bisection. One running pump is solved
+    in closed form. A pump whose shut-off head lies under the header's head gives no flow: its check valve is closed.
+
+    Parameters and result as in `individual_flows`.
+    """
+    individual_flows(curves, speed_ratio, static_head_m, 0.0, flow_m3h)
+    running = np.sum(flow_m3h > 0.0)
+    if running == 0:
+        return
+    if running == 1:
+        alone = np.argmax(flow_m3h)
+        flow_m3h[alone] = flow_at_head_m3h(
+            curves[alone, 0], curves[alone, 1], curves[alone, 2] - friction_h2_m5, speed_ratio[alone], static_head_m
+        )
+        return
+    low_m3h = 0.0
+    high_m3h = flow_m3h.sum()
+    total_m3h = high_m3h / (1.0 + running)
+    for _ in range(MAX_ITERATIONS):
+        head_m = static_head_m + friction_h2_m5 * total_m3h**2
+        excess_m3h = -total_m3h
+        slope = -1.0
+        for i in range(speed_ratio.size):
+            flow_m3h[i] = flow_at_head_m3h(curves[i, 0], curves[i, 1], curves[i, 2], speed_ratio[i], head_m)
+            excess_m3h += flow_m3h[i]
+            if flow_m3h[i] > 0.0:
+                steepness = curves[i, 1] * speed_ratio[i] + 2.0 * curves[i, 2] * flow_m3h[i]
+                slope += 2.0 * friction_h2_m5 * total_m3h / steepness
+        if excess_m3h > 0.0:
+            low_m3h = total_m3h
+        else:
+            high_m3h = total_m3h
+        if abs(excess_m3h) <= FLOW_TOLERANCE_M3H or high_m3h - low_m3h <= FLOW_TOLERANCE_M3H:
+            return
+        total_m3h -= excess_m3h / slope
+        if not low_m3h < total_m3h < high_m3h:
+            total_m3h = 0.5 * (low_m3h + high_m3h)

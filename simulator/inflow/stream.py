@@ -1,0 +1,18 @@
+"""What every inflow model gives: a stream of seconds."""
+
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+
+class InflowStream(Protocol):
+    """Inflow, second by second, from the start of the scenario on.
+
+    The numbers do not depend on the lengths in which they are taken.
+    """
+
+    def take(self, seconds: int) -> Floats:
+        """(seconds,) inflow of the next seconds, >= 0, in m³/h."""

@@ -1,0 +1,45 @@
+"""Scenario: what happens to a station, from the weather to the faults."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from wetwell.protocols.messages import Stamp
+from wetwell.protocols.station import NAME_PATTERN, NonNegative, Positive, Table
+from wetwell.simulator.faults import Fault
+from wetwell.simulator.inflow import Inflow
+from wetwell.simulator.inflow.empirical import EmpiricalInflow
+
+DEFAULT_START_NS = 1_735_689_600_000_000_000
+"""2025-01-01T00:00:00Z: a fixed date, so that the same seed gives the same bytes."""
+
+
+class Scenario(Table):
+    """Inflow, faults, start and length.
+
+    Parameters
+    ----------
+    name : str
+    description : str
+        One line for people.
+    duration_s : float
+        Length of a batch run where none is asked for; a live run goes on after it. [s]
+    start_time : stamp
+        Time of the first sample.
+    initial_level_m : float
+        [m]
+    clock_speed : float
+        Seconds of the station in a second on the wall, where none is asked for. [1]
+    inflow : one of the inflow models
+    fault : sequence of faults
+        Any number at once.
+    """
+
+    name: Annotated[str, Field(pattern=NAME_PATTERN)]
+    description: str = ""
+    duration_s: Positive = 172_800.0
+    start_time: Stamp = DEFAULT_START_NS
+    initial_level_m: NonNegative = 1.0
+    clock_speed: Positive = 1.0
+    inflow: Inflow = EmpiricalInflow()
+    fault: tuple[Fault, ...] = ()

@@ -1,0 +1,168 @@
+"""A plant that runs a scenario: live seconds and batches of days by the same code."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.recording import Recording
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.station import Station, check_levels
+from wetwell.simulator.faults.profile import PumpFault
+from wetwell.simulator.kernel import advance
+from wetwell.simulator.plant import (
+    Forcing,
+    Record,
+    empty_record,
+    healthy_forcing,
+    plant_at_rest,
+    plant_parameters,
+)
+from wetwell.simulator.scenario import Scenario
+
+Floats = npt.NDArray[np.float64]
+
+
+class Simulation:
+    """A station under a scenario, from its first second on.
+
+    The same station, scenario and seed give the same numbers, byte for byte, in whatever blocks they are taken.
+
+    Raises
+    ------
+    ValueError
+        If a fault names a pump that the station does not have, or the station names an effect that is not known.
+    """
+
+    def __init__(self, station: Station, scenario: Scenario, seed: int) -> None:
+        for effect in station.effect:
+            raise ValueError(f"effect: got '{effect.name}', no effect is known to this version")
+        for number, fault in enumerate(scenario.fault, start=1):
+            if isinstance(fault, PumpFault) and fault.pump > len(station.pump):
+                raise ValueError(
+                    f"fault[{number}].pump: got {fault.pump}, station '{station.name}' has {len(station.pump)} pumps"
+                )
+        inflow_rng, self._sensor_rng = np.random.default_rng(seed).spawn(2)
+        self.station = station
+        self.scenario = scenario
+        self._inflow = scenario.inflow.stream(inflow_rng)
+        self._parameters = plant_parameters(station)
+        self._state = plant_at_rest(len(station.pump), scenario.initial_level_m)
+        self._second = 0
+
+    @property
+    def seconds(self) -> int:
+        """Seconds simulated so far."""
+        return self._second
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """What an operator may change, by register name: start and stop levels, automatic (1) or off (0)."""
+        levels = {
+            f"{kind}_level{n}_m": float(level_m)
+            for kind, levels_m in (
+                ("start", self._parameters.start_levels_m),
+                ("stop", self._parameters.stop_levels_m),
+            )
+            for n, level_m in enumerate(levels_m, start=1)
+        }
+        automatic = {f"pump{i}_auto": float(flag) for i, flag in enumerate(self._parameters.is_automatic, start=1)}
+        return levels | automatic
+
+    def change_settings(self, changes: Mapping[str, float]) -> None:
+        """Change settings by register name, all or none; they act from the next second on.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown or the levels would not work together.
+        """
+        settings = self.settings
+        unknown = [name for name in changes if name not in settings]
+        if unknown:
+            raise ValueError(f"{unknown[0]} is not a setting of station '{self.station.name}'")
+        settings |= changes
+        count = self._parameters.start_levels_m.size
+        start_m = tuple(settings[f"start_level{n}_m"] for n in range(1, count + 1))
+        stop_m = tuple(settings[f"stop_level{n}_m"] for n in range(1, count + 1))
+        check_levels(start_m, stop_m)
+        self._parameters.start_levels_m[:] = start_m
+        self._parameters.stop_levels_m[:] = stop_m
+        self._parameters.is_automatic[:] = [
+            settings[f"pump{i}_auto"] > 0 for i in range(1, len(self.station.pump) + 1)
+        ]
+
+    def advance(self, seconds: int, *, truth: bool = True) -> Recording:
+        """Simulate the next seconds.
+
+        Parameters
+        ----------
+        seconds : int
+            Length of the block. [s]
+        truth : bool
+            Whether to give the truth columns.
+
+        Returns
+        -------
+        recording : Recording
+            One row a second.
+        """
+        pumps = len(self.station.pump)
+        time_s = np.arange(self._second, self._second + seconds, dtype=np.float64)
+        forcing = healthy_forcing(self._inflow.take(seconds), pumps)
+        for fault in self.scenario.fault:
+            fault.apply(forcing, time_s)
+        record = empty_record(pumps, seconds)
+        advance(self._parameters, self._state, forcing, self._sensor_rng, record)
+        stamps_ns = self.scenario.start_time + NS_PER_S * np.arange(self._second, self._second + seconds)
+        self._second += seconds
+        return Recording(
+            time_ns=stamps_ns,
+            columns=_measured(record),
+            truth=self._truth(record, forcing, time_s) if truth else {},
+        )
+
+    def _truth(self, record: Record, forcing: Forcing, time_s: Floats) -> dict[str, npt.NDArray[Any]]:
+        system = np.zeros(time_s.size, dtype=np.bool_)
+        pumps = np.zeros((len(self.station.pump), time_s.size), dtype=np.bool_)
+        for fault in self.scenario.fault:
+            if isinstance(fault, PumpFault):
+                pumps[fault.pump - 1] |= fault.is_active(time_s)
+            else:
+                system |= fault.is_active(time_s)
+        truth: dict[str, npt.NDArray[Any]] = {
+            "truth_state": _state_names(np.logical_or.reduce(pumps), system),
+            "truth_level_m": record.true_level_m,
+            "truth_inflow_m3h": forcing.inflow_m3h,
+            "truth_friction_factor": forcing.friction_factor,
+            "truth_static_rise_m": forcing.static_rise_m,
+        }
+        for i in range(pumps.shape[0]):
+            truth |= {
+                f"truth_pump{i + 1}_state": _state_names(pumps[i], system),
+                f"truth_pump{i + 1}_speed_factor": forcing.speed_factor[i],
+                f"truth_pump{i + 1}_flow_m3h": record.true_flow_m3h[i],
+                f"truth_pump{i + 1}_head_m": record.true_head_m[i],
+            }
+        return truth
+
+
+def _measured(record: Record) -> dict[str, Floats]:
+    columns = {"level_m": record.level_m, "inflow_m3h": record.inflow_m3h}
+    for i in range(record.frequency_hz.shape[0]):
+        columns |= {
+            f"pump{i + 1}_frequency_hz": record.frequency_hz[i],
+            f"pump{i + 1}_flow_m3h": record.flow_m3h[i],
+            f"pump{i + 1}_head_m": record.head_m[i],
+            f"pump{i + 1}_power_kw": record.power_kw[i],
+            f"pump{i + 1}_running": (record.frequency_hz[i] > 0).astype(np.float64),
+        }
+    return columns
+
+
+_STATES = np.array(["normal", "pump_fault", "system_fault", "pump_and_system_fault"])
+
+
+def _state_names(pump: npt.NDArray[np.bool_], system: npt.NDArray[np.bool_]) -> npt.NDArray[np.str_]:
+    return _STATES[pump + 2 * system.astype(np.int64)]
