@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
 
 
 def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
@@ -35,6 +34,8 @@ def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float,
     >>> round(c0, 9), abs(round(c1, 9)), round(c2, 9)
     (20.0, 0.0, -0.0001)
     """
+    from scipy.optimize import lsq_linear  # noqa: PLC0415 - slow to import, and needed by datasheet points only
+
     flow_m3h = np.array([flow for flow, _ in points], dtype=float)
     head_m = np.array([head for _, head in points], dtype=float)
     if np.unique(flow_m3h).size < 3:

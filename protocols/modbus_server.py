@@ -171,7 +171,7 @@ class ModbusServer:
         tables = ([coils], [discretes], [measured, settings], [measured])
         return SimDevice(self._unit_id, simdata=tables, action=self._guard)
 
-    async def _guard(  # noqa: PLR0917 - the arguments are pymodbus' choice
+    async def _guard(
         self,
         function: int,
         start: int,

@@ -142,28 +142,30 @@ def _suffix(path: Path) -> str:
 
 def _read_table(path: Path) -> pa.Table:
     suffix = _suffix(path)
+    header: list[str] = []
     try:
         if suffix == ".parquet":
             return pa.parquet.read_table(path)
         header = _csv_header(path)
-        types = {name: pa.string() if name == "time" else pa.float64() for name in header}
-        types = {name: kind for name, kind in types.items() if not name.startswith(TRUTH_PREFIX)}
+        types = {name: pa.float64() for name in header if name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name)}
         return pa.csv.read_csv(
             path,
             read_options=pa.csv.ReadOptions(use_threads=False),
             convert_options=pa.csv.ConvertOptions(
-                column_types={
-                    name: kind
-                    for name, kind in types.items()
-                    if name == "time" or name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name)
-                },
-                strings_can_be_null=False,
+                column_types=types | {"time": pa.string()}, strings_can_be_null=False
             ),
         )
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error) as error:
-        raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
+        raise RecordingError(f"{path}: {_csv_fault(str(error), header)}") from error
+
+
+def _csv_fault(message: str, header: list[str]) -> str:
+    """First line of an Arrow message, with the column's name for its number and rows counted from 1 as elsewhere."""
+    line = next(iter(message.splitlines()), "not a recording")
+    line = re.sub(r"In CSV column #(\d+): ", lambda match: f"column '{header[int(match[1])]}', ", line)
+    return re.sub(r"Row #(\d+)", lambda match: f"row {int(match[1]) - 1}", line)
 
 
 def _csv_header(path: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -70,7 +71,7 @@ class Pump(Table):
             raise ValueError(f"curve: head must fall with flow (c1 <= 0, c2 <= 0), got c1 = {c1:g}, c2 = {c2:g}")
         return self
 
-    @property
+    @cached_property
     def coefficients(self) -> tuple[float, float, float]:
         """(c0, c1, c2) of H = c0 N² + c1 N Q + c2 Q², Q in m³/h."""
         if self.curve is not None:

@@ -10,6 +10,7 @@ import json
 import logging
 import random
 import re
+import threading
 from typing import Any, Literal, Self
 
 import zenoh
@@ -75,7 +76,8 @@ class ZenohBus:
 
     Messages sent while the router was away come afterwards: at once the last `history` of each publisher, if the
     subscription has a `history`, and no older ones; with `history=0` all that the publisher keeps, but only with its
-    next message. A kept message may come twice: where that matters, drop it by its `seq`.
+    next message. Likewise the last message, lost on its way, is noticed after `HEARTBEAT_S` or with the next one. A kept message may come twice: where that matters, drop it by its `seq`. Of many messages in the
+    first milliseconds after `publisher` or `subscribe` the beginning can be lost.
 
     Parameters
     ----------
@@ -91,6 +93,7 @@ class ZenohBus:
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
+        self._lock = threading.Lock()  # zenoh refuses to be asked while another thread closes the session
 
     def __enter__(self) -> Self:
         return self
@@ -100,7 +103,8 @@ class ZenohBus:
 
     def close(self) -> None:
         """Leave the network; twice is fine."""
-        self._exit.close()
+        with self._lock:
+            self._exit.close()
 
     def publisher(self, key: str, *, history: int = 1) -> ZenohPublisher:
         """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss.
@@ -129,6 +133,7 @@ class ZenohBus:
         LinkError
             If the key is not a key expression or the bus is closed.
         """
+        # Without history no heartbeat either: the first one of a publisher would bring its whole cache.
         mailbox = Mailbox(capacity)
 
         def deliver(sample: zenoh.Sample) -> None:
@@ -142,7 +147,7 @@ class ZenohBus:
                 key,
                 deliver,
                 history=kept,
-                recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+                recovery=zenoh.ext.RecoveryConfig(heartbeat=True if history else None, periodic_queries=None),
             )
         except zenoh.ZError as error:
             raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
@@ -165,9 +170,10 @@ class ZenohBus:
     @property
     def is_connected(self) -> bool:
         """Whether messages can reach others now: a router always, a client while it has its router."""
-        if self._session.is_closed():
-            return False
-        return self._is_router or bool(self._session.info.routers_zid())
+        with self._lock:
+            if self._session.is_closed():
+                return False
+            return self._is_router or bool(self._session.info.routers_zid())
 
 
 def open_router(endpoint: str) -> ZenohBus:

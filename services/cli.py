@@ -5,12 +5,16 @@ import re
 import sys
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
 from wetwell.protocols.errors import ConfigError, WetwellError
 from wetwell.services.settings import LogSettings, Settings, load_settings
+
+if TYPE_CHECKING:
+    from wetwell.simulator.scenario import Scenario
+    from wetwell.simulator.simulation import Simulation
 
 app = typer.Typer(
     name="wetwell",
@@ -61,7 +65,6 @@ def up(
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
     """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector."""
-    from wetwell.services.presets import find_scenario, find_station
     from wetwell.services.supervisor import serve_all
     from wetwell.services.terminal import banner, line_printer
 
@@ -69,11 +72,9 @@ def up(
     if settings.log == LogSettings():
         settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
     limit_s = None if limit is None else parse_duration_s(limit)
-    plant, plan = find_station(station), find_scenario(scenario)
-    _check(plant, plan, seed)
-    speed = plan.clock_speed if speed is None else _positive(speed, "--speed")
+    plant, speed = _live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
     if not as_json:
-        typer.echo(banner(settings, plant, plan.name, speed))
+        typer.echo(banner(settings, plant.station, plant.scenario.name, speed))
     live = [
         "--station",
         station,
@@ -86,7 +87,7 @@ def up(
         "--modbus-server",
     ]
     commands = {"detector": ["detector", "--station", station], "simulator": ["simulator", *live]}
-    _run(settings, serve_all(settings, plant.name, commands, line_printer(as_json=as_json), limit_s))
+    _run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
 
 
 @app.command()
@@ -173,8 +174,10 @@ def simulate(
 ) -> None:
     """Write a simulated recording, with truth columns."""
     from wetwell.services.batch import simulate as write
+    from wetwell.services.presets import find_scenario
+    from wetwell.simulator.scenario import DEFAULT_START_NS
 
-    plant = _simulation(station, scenario, seed)
+    plant = _plant(station, find_scenario(scenario), seed, DEFAULT_START_NS)
     length_s = plant.scenario.duration_s if days is None else _positive(days, "--days") * 86_400.0
     recording = write(plant, max(round(length_s), 1), out)
     summary = {"recording": str(out), "rows": len(recording), "station": plant.station.name, "seed": seed}
@@ -299,20 +302,26 @@ def _settings(
     return load_settings(config, flags)
 
 
-def _simulation(station: str, scenario: str, seed: int) -> Any:
-    from wetwell.services.presets import find_scenario, find_station
-
-    return _check(find_station(station), find_scenario(scenario), seed)
-
-
-def _check(station: Any, scenario: Any, seed: int) -> Any:
+def _plant(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":
     """Simulation of a scenario on a station that can run it."""
+    from wetwell.services.presets import find_station
     from wetwell.simulator.simulation import Simulation
 
     try:
-        return Simulation(station, scenario, seed)
+        return Simulation(find_station(station), scenario, seed, start_ns)
     except ValueError as error:
-        raise ConfigError(f"scenario '{scenario.name}': {error}") from error
+        raise ConfigError(str(error)) from error
+
+
+def _live_plant(station: str, scenario: str, seed: int, speed: float | None) -> tuple["Simulation", float]:
+    """Simulation and its speed; at the speed of life it starts now, else at a fixed date."""
+    from wetwell.services.clock import this_second_ns
+    from wetwell.services.presets import find_scenario
+    from wetwell.simulator.scenario import DEFAULT_START_NS
+
+    plan = find_scenario(scenario)
+    speed = plan.clock_speed if speed is None else _positive(speed, "--speed")
+    return _plant(station, plan, seed, this_second_ns() if speed == 1.0 else DEFAULT_START_NS), speed
 
 
 def _serve_plant(
@@ -320,8 +329,7 @@ def _serve_plant(
 ) -> None:
     from wetwell.services.simulator import serve_simulator
 
-    plant = _simulation(station, scenario, seed)
-    speed = plant.scenario.clock_speed if speed is None else _positive(speed, "--speed")
+    plant, speed = _live_plant(station, scenario, seed, speed)
     _run(settings, serve_simulator(settings, plant, speed, zenoh=zenoh, modbus=modbus))
 
 

@@ -2,6 +2,8 @@
 
 import time
 
+from wetwell.protocols.stamps import NS_PER_S
+
 MAX_CATCH_UP_S = 3600
 """Most seconds of a station that one tick brings; what is due beyond them comes with the next ticks."""
 
@@ -9,6 +11,11 @@ MAX_CATCH_UP_S = 3600
 def now_ns() -> int:
     """Time of day in nanoseconds since 1970."""
     return time.time_ns()
+
+
+def this_second_ns() -> int:
+    """Time of day, cut to the whole second."""
+    return now_ns() // NS_PER_S * NS_PER_S
 
 
 def tick_period_s(speed: float) -> float:

@@ -12,7 +12,7 @@ from wetwell.protocols.zenoh_link import open_router
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.keys import verdict_key
 from wetwell.protocols.link import Bus, Subscription
-from wetwell.protocols.messages import Verdict
+from wetwell.protocols.messages import MessageError, Verdict
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
 from wetwell.services.settings import Settings
 
@@ -85,7 +85,10 @@ async def _run(
 async def _show(verdicts: Subscription, show: Callable[[Verdict], None]) -> None:
     while True:
         for payload in await verdicts.receive():
-            show(Verdict.decode(payload))
+            try:
+                show(Verdict.decode(payload))
+            except MessageError as error:  # anybody may publish on the bus
+                log.warning("%s", error)
 
 
 async def _watch(name: str, child: asyncio.subprocess.Process) -> None:

@@ -24,8 +24,9 @@ class Scenario(Table):
         One line for people.
     duration_s : float
         Length of a batch run where none is asked for; a live run goes on after it. [s]
-    start_time : stamp
-        Time of the first sample.
+    start_time : stamp, optional
+        Time of the first sample. Without it a live run at the speed of life starts now, every other at
+        `DEFAULT_START_NS`.
     initial_level_m : float
         [m]
     clock_speed : float
@@ -38,7 +39,7 @@ class Scenario(Table):
     name: Annotated[str, Field(pattern=NAME_PATTERN)]
     description: str = ""
     duration_s: Positive = 172_800.0
-    start_time: Stamp = DEFAULT_START_NS
+    start_time: Stamp | None = None
     initial_level_m: NonNegative = 1.0
     clock_speed: Positive = 1.0
     inflow: Inflow = EmpiricalInflow()

@@ -19,7 +19,7 @@ from wetwell.simulator.plant import (
     plant_at_rest,
     plant_parameters,
 )
-from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
 
 Floats = npt.NDArray[np.float64]
 
@@ -29,19 +29,31 @@ class Simulation:
 
     The same station, scenario and seed give the same numbers, byte for byte, in whatever blocks they are taken.
 
+    Parameters
+    ----------
+    station : Station
+    scenario : Scenario
+    seed : int
+        >= 0.
+    start_ns : int
+        Time of the first sample, where the scenario names none.
+
     Raises
     ------
     ValueError
         If a fault names a pump that the station does not have, or the station names an effect that is not known.
     """
 
-    def __init__(self, station: Station, scenario: Scenario, seed: int) -> None:
+    def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
         for effect in station.effect:
-            raise ValueError(f"effect: got '{effect.name}', no effect is known to this version")
+            raise ValueError(
+                f"station '{station.name}': effect: got '{effect.name}', no effect is known to this version"
+            )
         for number, fault in enumerate(scenario.fault, start=1):
             if isinstance(fault, PumpFault) and fault.pump > len(station.pump):
                 raise ValueError(
-                    f"fault[{number}].pump: got {fault.pump}, station '{station.name}' has {len(station.pump)} pumps"
+                    f"scenario '{scenario.name}': fault[{number}].pump: got {fault.pump}, "
+                    f"station '{station.name}' has {len(station.pump)} pumps"
                 )
         inflow_rng, self._sensor_rng = np.random.default_rng(seed).spawn(2)
         self.station = station
@@ -49,6 +61,7 @@ class Simulation:
         self._inflow = scenario.inflow.stream(inflow_rng)
         self._parameters = plant_parameters(station)
         self._state = plant_at_rest(len(station.pump), scenario.initial_level_m)
+        self._start_ns = scenario.start_time if scenario.start_time is not None else start_ns
         self._second = 0
 
     @property
@@ -115,7 +128,7 @@ class Simulation:
             fault.apply(forcing, time_s)
         record = empty_record(pumps, seconds)
         advance(self._parameters, self._state, forcing, self._sensor_rng, record)
-        stamps_ns = self.scenario.start_time + NS_PER_S * np.arange(self._second, self._second + seconds)
+        stamps_ns = self._start_ns + NS_PER_S * np.arange(self._second, self._second + seconds)
         self._second += seconds
         return Recording(
             time_ns=stamps_ns,

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 
@@ -37,6 +38,9 @@ def read_skab(path: Path) -> Recording:
     for name in ("datetime", FLOW_COLUMN):
         if name not in table.column_names:
             raise RecordingError(f"{path}: column '{name}' is missing, is this a SKAB file?")
+    if table["datetime"].null_count:
+        row = int(np.argmax(table["datetime"].is_null().to_numpy())) + 1
+        raise RecordingError(f"{path}: column 'datetime', row {row}: is empty")
     try:
         stamps = table["datetime"].cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
         flow_l_min = table[FLOW_COLUMN].cast(pa.float64()).to_numpy()
@@ -45,6 +49,6 @@ def read_skab(path: Path) -> Recording:
             for name, truth in LABELS.items()
             if name in table.column_names
         }
-    except pa.ArrowInvalid as error:
+    except pa.ArrowException as error:
         raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
     return Recording(time_ns=stamps, columns={"pump1_flow_m3h": LITRES_PER_MINUTE_M3H * flow_l_min}, truth=truth)

@@ -1,0 +1,107 @@
+"""The command line: a user's error is one line on standard error and exit code 2, and nothing half written."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from wetwell.services.cli import main
+
+STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-4]}]\n'
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["wetwell", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["station", "check", "{station}"], "{station}: sump.area_m2: got -8.0, input should be greater than 0"),
+        (["station", "check", "nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory"),
+        (["station", "check", "nosuch"], "station 'nosuch' is neither a file nor one of alpha"),
+        (["simulate", "--out", "{tmp}/x.txt"], "{tmp}/x.txt: a recording ends in one of .csv, .csv.gz, .parquet"),
+        (["simulate", "--out", "{tmp}/no/x.csv"], "{tmp}/no/x.csv: cannot be written: No such file or directory"),
+        (["simulate", "--out", "{tmp}/x.csv", "--days", "-1"], "--days: got -1, must be positive"),
+        (
+            ["simulate", "--out", "{tmp}/x.csv", "--scenario", "{scenario}"],
+            "scenario 'wrong': fault[1].pump: got 9, station 'alpha' has 3 pumps",
+        ),
+        (
+            ["simulate", "--out", "{tmp}/x.csv", "--station", "{effect}"],
+            "station 's': effect: got 'air_pocket', no effect is known to this version",
+        ),
+        (["detect", "--recording", "{tmp}/no.csv", "--out", "{tmp}/v"], "{tmp}/no.csv: cannot be read: No such file"),
+        (["detect", "--recording", "{bad}", "--out", "{tmp}/v"], "{bad}: column 'pump1_flow_m3h', row 2: CSV conv"),
+        (["convert", "{bad}", "--out", "{tmp}/v.csv"], "{bad}: column 'datetime' is missing, is this a SKAB file?"),
+        (["up", "--for", "soon"], "--for: got 'soon', must be a time such as 90s, 10m or 2h"),
+        (["up", "--modbus", "here"], "--modbus: got 'here', must be HOST:PORT such as 127.0.0.1:5020"),
+        (["up", "--zenoh", "udp"], "settings: zenoh.endpoint: got 'udp', string should match pattern"),
+        (["config", "check", "{settings}"], "{settings}: modbus.prot: unknown key"),
+    ],
+)
+def test_an_error_is_one_line(
+    arguments: list[str],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    files = {
+        "station": STATION.replace("8.0", "-8.0"),
+        "effect": STATION + '[[effect]]\nname = "air_pocket"\n',
+        "scenario": 'name = "wrong"\n[[fault]]\nkind = "blockage"\npump = 9\nstart_s = 1\nend_s = 2\n',
+        "bad": "time,pump1_flow_m3h\n2025-01-01,1\n2025-01-01,abc\n",
+        "settings": "[modbus]\nprot = 1\n",
+    }
+    paths = {name: tmp_path / f"{name}.{'csv' if name == 'bad' else 'toml'}" for name in files}
+    for name, text in files.items():
+        paths[name].write_text(text)
+    names = {"tmp": tmp_path, **paths}
+    before = sorted(tmp_path.iterdir())
+    assert run(monkeypatch, *(argument.format(**names) for argument in arguments)) == 2
+    printed = capsys.readouterr()
+    assert printed.err.splitlines()[-1].startswith("wetwell: " + said.format(**names))
+    assert "Traceback" not in printed.err
+    assert printed.out == ""
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_wrong_flags_end_with_2(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(monkeypatch, "simulate", "--nosuch") == 2
+    assert "--nosuch" in capsys.readouterr().err
+
+
+def test_simulate_then_detect(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, verdicts = tmp_path / "r.parquet", tmp_path / "v.jsonl"
+    assert run(monkeypatch, "simulate", "--days", "0.05", "--out", recording, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["rows"] == 4320
+    assert run(monkeypatch, "detect", "--recording", recording, "--out", verdicts, "--json") == 0
+    summary = json.loads(capsys.readouterr().out)
+    lines = [json.loads(line) for line in verdicts.read_text().splitlines()]
+    assert summary["counts"]["samples"] == 4320
+    assert summary["verdicts"] == {"learning": len(lines)}
+    assert {line["pump"] for line in lines} == {1, 2, 3}
+    assert all(line["schema"] == "wetwell.verdict/1" and line["station"] == "alpha" for line in lines)
+
+
+def test_modbus_map_is_csv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(monkeypatch, "modbus-map", "--format", "csv") == 0
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert head == "name,table,address,count,type,unit,access,description"
+    assert any(row.startswith("pump3_head_m,input,") for row in rows)
+
+
+def test_station_show_gives_the_duty_points(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, "station", "show", "alpha", "--json") == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["each_pump_alone"][0]["flow_m3h"] == pytest.approx(200.0, abs=0.01)
+    assert shown["total_flow_m3h"] == pytest.approx(600.0, abs=0.03)
