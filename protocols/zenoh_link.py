@@ -11,6 +11,7 @@ import logging
 import random
 import re
 import threading
+from datetime import timedelta
 from typing import Any, Literal, Self
 
 import zenoh
@@ -25,8 +26,8 @@ logger = logging.getLogger(__name__)
 RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 """How a client looks for a lost router. Zenoh's own 1 to 4 s would leave a gap of that length."""
 
-HEARTBEAT_S = 1.0
-"""A publisher tells its last sequence number this long after a message, so that a lost last one is noticed."""
+LAST_LOSS_S = 1.0
+"""So long after it a message that was lost, and that no other followed, is noticed."""
 
 
 class ZenohPublisher:
@@ -41,7 +42,7 @@ class ZenohPublisher:
             encoding=JSON_ENCODING,
             congestion_control=zenoh.CongestionControl.DROP,
             cache=zenoh.ext.CacheConfig(max_samples=history),
-            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S),
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=LAST_LOSS_S),
             publisher_detection=True,
         )
         self._queryable = session.declare_queryable(key, self._answer)
@@ -74,10 +75,11 @@ class ZenohBus:
     the publisher's history · threads: any may publish · reconnect: a client comes back by itself, usually
     within 0.5 s of the router; its publishers, subscriptions and what it announced are then as before.
 
-    Messages sent while the router was away come afterwards: at once the last `history` of each publisher, if the
-    subscription has a `history`, and no older ones; with `history=0` all that the publisher keeps, but only with its
-    next message. Likewise the last message, lost on its way, is noticed after `HEARTBEAT_S` or with the next one. A kept message may come twice: where that matters, drop it by its `seq`. Of many messages in the
-    first milliseconds after `publisher` or `subscribe` the beginning can be lost.
+    Messages that were lost, or sent while the router was away, come afterwards as far as the publisher keeps them:
+    with a `history` at once, but after an absence no more than the last `history` of each publisher; without one
+    after `LAST_LOSS_S`, and only of publishers from which something came before. A kept message may come twice:
+    where that matters, drop it by its `seq`. Of many messages in the first milliseconds after `publisher` or
+    `subscribe` the beginning can be lost for good.
 
     Parameters
     ----------
@@ -133,7 +135,6 @@ class ZenohBus:
         LinkError
             If the key is not a key expression or the bus is closed.
         """
-        # Without history no heartbeat either: the first one of a publisher would bring its whole cache.
         mailbox = Mailbox(capacity)
 
         def deliver(sample: zenoh.Sample) -> None:
@@ -147,7 +148,7 @@ class ZenohBus:
                 key,
                 deliver,
                 history=kept,
-                recovery=zenoh.ext.RecoveryConfig(heartbeat=True if history else None, periodic_queries=None),
+                recovery=_recovery(with_history=history > 0),
             )
         except zenoh.ZError as error:
             raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
@@ -263,6 +264,17 @@ async def _open_in_thread(endpoint: str, timeout_s: float) -> ZenohBus:
 def _close_late(opening: concurrent.futures.Future[ZenohBus]) -> None:
     if not opening.cancelled() and opening.exception() is None:
         opening.result().close()
+
+
+def _recovery(*, with_history: bool) -> zenoh.ext.RecoveryConfig:
+    """How a subscription notices that the last message was lost: by heartbeats, or by asking the known publishers.
+
+    A heartbeat of a publisher that is not known yet brings all that it keeps: not wanted without history.
+    """
+    if with_history:
+        return zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
+    period: Any = timedelta(seconds=LAST_LOSS_S)  # zenoh's stub says float, zenoh 1.10 takes only this
+    return zenoh.ext.RecoveryConfig(heartbeat=None, periodic_queries=period)
 
 
 def _config(mode: Literal["router", "client"], endpoint: str) -> zenoh.Config:
