@@ -1,7 +1,7 @@
 """The baseline: where the residuals of a healthy pump lie, and how they scatter. Learnt, checked, then fixed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -26,38 +26,32 @@ class Baseline:
     Attributes
     ----------
     offset_m : (2,) array
-        Mean of the level residuals (r_p, r_s). [m]
+        Median of the level residuals (r_p, r_s). [m]
     segment_covariance : (2, 2) array
-        Covariance of segment means within a run, autocorrelation included. [m²]
+        Covariance of segment means within a run, times `correlation_factor`. [m²]
+    correlation_factor : float
+        Growth of the variance of a run's mean by correlation between its segments.
     run_variance : (2,) array
         Variance of run means that the scatter within runs does not explain, floor included. [m²]
-    flow_m3h, flow_squared, total_squared : float
-        Mean of Q/N, (Q/N)² and the squared total flow at which the offset was learnt.
+    flow_m3h, total_m3h : float
+        Median of Q/N and of the total flow: where the offset was learnt. [m³/h]
     """
 
     offset_m: Floats
     segment_covariance: Floats
+    correlation_factor: float
     run_variance: Floats
     flow_m3h: float
-    flow_squared: float
-    total_squared: float
+    total_m3h: float
 
     def with_noise_of(self, run: Run, weight: float) -> "Baseline":
         """The baseline with its scatter moved towards that of a normal run; the offset never moves."""
         if len(run.segments) < 3:
             return self
-        recent = np.cov(run.segments, rowvar=False)
+        recent = np.cov(run.segments, rowvar=False) * self.correlation_factor
         limit = 4.0 * np.trace(self.segment_covariance)
         recent *= min(1.0, limit / max(float(np.trace(recent)), 1e-300))
-        blended = (1.0 - weight) * self.segment_covariance + weight * recent
-        return Baseline(
-            offset_m=self.offset_m,
-            segment_covariance=blended,
-            run_variance=self.run_variance,
-            flow_m3h=self.flow_m3h,
-            flow_squared=self.flow_squared,
-            total_squared=self.total_squared,
-        )
+        return replace(self, segment_covariance=(1.0 - weight) * self.segment_covariance + weight * recent)
 
 
 def learn(runs: Sequence[Run], shutoff_head_m: float) -> Baseline:
@@ -66,18 +60,19 @@ def learn(runs: Sequence[Run], shutoff_head_m: float) -> Baseline:
     counts = np.array([len(run.segments) for run in runs])
     centred = np.concatenate([run.segments - mean for run, mean in zip(runs, means, strict=True)])
     freedom = max(len(centred) - len(runs), 1)
-    within = centred.T @ centred / freedom * _correlation_factor(runs)
-    offset_m = np.average(means, axis=0, weights=counts)
+    factor = _correlation_factor(runs)
+    within = centred.T @ centred / freedom * factor
     unexplained = means.var(axis=0, ddof=1) - np.diag(within) * np.mean(1.0 / counts)
     floor = (FLOOR_SHARE * shutoff_head_m) ** 2
     flow = np.concatenate([run.flow_m3h / run.speed_ratio for run in runs])
+    total = np.concatenate([run.total_flow_m3h for run in runs])
     return Baseline(
-        offset_m=offset_m,
+        offset_m=np.median(np.concatenate([run.segments for run in runs]), axis=0),
         segment_covariance=within,
+        correlation_factor=factor,
         run_variance=np.maximum(unexplained, 0.0) + floor,
-        flow_m3h=float(flow.mean()),
-        flow_squared=float(np.mean(flow**2)),
-        total_squared=float(np.mean(np.concatenate([run.total_flow_m3h for run in runs]) ** 2)),
+        flow_m3h=float(np.median(flow)),
+        total_m3h=float(np.median(total)),
     )
 
 

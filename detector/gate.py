@@ -2,10 +2,10 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from wetwell.detector.nominal import Nominal
-from wetwell.protocols.messages import Sample
+from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.stamps import NS_PER_S
 
 NAN = math.nan
@@ -13,10 +13,12 @@ MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
 CONFIRMATIONS = 10
 LEVEL_RANGE_M = (-1.0, 100.0)
+POWER_RANGE_KW = (-1.0, 1.0e6)
+
+Range = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class PumpFrame:
+class PumpFrame(NamedTuple):
     """What is known of one pump in one second; NaN is "no value", None is "not said"."""
 
     frequency_hz: float
@@ -26,9 +28,11 @@ class PumpFrame:
     running: bool | None
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """A sample that has passed the gate. `gap_s` is the time since the one before, 0 for the first."""
+class Frame(NamedTuple):
+    """A sample that has passed the gate.
+
+    `gap_s` is the time since the one before: 0 for the first, infinite where nobody knows, after a clock step.
+    """
 
     time_ns: int
     gap_s: float
@@ -44,6 +48,9 @@ class Gate:
     come from a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another,
     the gate follows them and counts a clock step.
 
+    `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has
+    passed over; a sample that comes late after all is counted there too.
+
     Memory: constant.
     """
 
@@ -52,13 +59,12 @@ class Gate:
         self._other_ns: int | None = None
         self._other_count = 0
         self._last_seq: int | None = None
-        self._ranges = [
-            {
-                "frequency_hz": (-0.5, 2.0 * nominal.frequencies_hz[pump]),
-                "flow_m3h": (-0.1 * nominal.runout_flow_m3h(pump), 2.0 * nominal.runout_flow_m3h(pump)),
-                "head_m": (-10.0, 3.0 * nominal.curves[pump][0]),
-                "power_kw": (-1.0, math.inf),
-            }
+        self._ranges: list[tuple[Range, Range, Range]] = [
+            (
+                (-0.5, 2.0 * nominal.frequencies_hz[pump]),
+                (-0.1 * nominal.runout_flow_m3h(pump), 2.0 * nominal.runout_flow_m3h(pump)),
+                (-10.0, 3.0 * nominal.curves[pump][0]),
+            )
             for pump in range(nominal.pumps)
         ]
         self.counts: Counter[str] = Counter()
@@ -67,9 +73,9 @@ class Gate:
         """Frame of a sample, or None where it is dropped."""
         self.counts["samples"] += 1
         gap_s = self._gap_s(sample.time)
+        self._count_lost(sample.seq, is_dropped=gap_s is None)
         if gap_s is None:
             return None
-        self._count_lost(sample.seq)
         if gap_s > MAX_GAP_S:
             self.counts["gaps"] += 1
         if sample.quality == "bad":
@@ -81,35 +87,39 @@ class Gate:
             sample.time,
             gap_s,
             self._checked(sample.level_m, LEVEL_RANGE_M),
-            tuple(
-                self._pump(sample, pump, ranges) if pump < len(sample.pumps) else _NOTHING
-                for pump, ranges in enumerate(self._ranges)
-            ),
+            self._pump_frames(sample.pumps),
         )
 
-    def _pump(self, sample: Sample, pump: int, ranges: dict[str, tuple[float, float]]) -> PumpFrame:
-        reading = sample.pumps[pump]
-        return PumpFrame(
-            self._checked(reading.frequency_hz, ranges["frequency_hz"]),
-            self._checked(reading.flow_m3h, ranges["flow_m3h"]),
-            self._checked(reading.head_m, ranges["head_m"]),
-            self._checked(reading.power_kw, ranges["power_kw"]),
-            reading.running,
-        )
+    def _pump_frames(self, readings: tuple[PumpReading, ...]) -> tuple[PumpFrame, ...]:
+        checked = self._checked
+        frames = [
+            PumpFrame(
+                checked(reading.frequency_hz, frequency_range),
+                checked(reading.flow_m3h, flow_range),
+                checked(reading.head_m, head_range),
+                checked(reading.power_kw, POWER_RANGE_KW),
+                reading.running,
+            )
+            for reading, (frequency_range, flow_range, head_range) in zip(readings, self._ranges, strict=False)
+        ]
+        frames += [_NOTHING] * (len(self._ranges) - len(frames))
+        return tuple(frames)
 
-    def _checked(self, value: float | None, limits: tuple[float, float]) -> float:
-        if value is None or not math.isfinite(value):
-            self.counts["missing_values"] += 1
-            return NAN
-        if not limits[0] <= value <= limits[1]:
-            self.counts["out_of_range_values"] += 1
-            return NAN
-        return value
+    def _checked(self, value: float | None, limits: Range) -> float:
+        if value is not None and limits[0] <= value <= limits[1]:
+            return value
+        is_missing = value is None or not math.isfinite(value)
+        self.counts["missing_values" if is_missing else "out_of_range_values"] += 1
+        return NAN
 
-    def _count_lost(self, seq: int) -> None:
-        if self._last_seq is not None and seq > self._last_seq + 1:
+    def _count_lost(self, seq: int, *, is_dropped: bool) -> None:
+        if self._last_seq is None:
+            self._last_seq = seq
+            return
+        if seq > self._last_seq + 1:
             self.counts["lost"] += seq - self._last_seq - 1
-        self._last_seq = seq
+        if seq > self._last_seq or not is_dropped:
+            self._last_seq = seq
 
     def _gap_s(self, time_ns: int) -> float | None:
         """Seconds since the last sample let through; None if this one is to be dropped."""
@@ -125,7 +135,7 @@ class Gate:
             self.counts["doubled"] += 1
             return None
         self.counts["late" if gap_s < 0.0 else "future"] += 1
-        follows = self._other_ns is not None and 0.0 < (time_ns - self._other_ns) / NS_PER_S <= MAX_GAP_S
+        follows = self._other_ns is not None and 0.0 < (time_ns - self._other_ns) / NS_PER_S <= MAX_JUMP_S
         self._other_count = self._other_count + 1 if follows else 1
         self._other_ns = time_ns
         if self._other_count < CONFIRMATIONS:

@@ -4,7 +4,6 @@ from collections import deque
 
 from wetwell.detector.baseline import MIN_RUNS, MIN_SEGMENTS, Baseline, learn, objection
 from wetwell.detector.runs import Run
-from wetwell.protocols.stamps import NS_PER_S
 
 LEARNING_S = 6.0 * 3600.0
 
@@ -12,15 +11,15 @@ LEARNING_S = 6.0 * 3600.0
 class Learning:
     """Collects the runs of one pump until they can serve as a baseline.
 
-    Only the last `LEARNING_S` count (but always `MIN_RUNS`), so that a disturbance passes out of sight when it is
-    over. While the runs disagree, learning goes on and `reason` says why.
+    Only the last `LEARNING_S` in which the station was seen count, whatever its clock was set to (but always
+    `MIN_RUNS`), so that a disturbance passes out of sight when it is over. While the runs disagree, learning goes on
+    and `reason` says why.
 
     Memory: the steady samples of `LEARNING_S`.
     """
 
     def __init__(self) -> None:
-        self._runs: deque[Run] = deque()
-        self._first_ns: int | None = None
+        self._runs: deque[tuple[float, Run]] = deque()
         self.reason = "no pump run yet"
 
     @property
@@ -28,33 +27,31 @@ class Learning:
         """Mean of r_p over the runs so far. [m]."""
         if not self._runs:
             return None
-        return float(sum(run.segments[:, 0].mean() for run in self._runs) / len(self._runs))
+        return float(sum(run.segments[:, 0].mean() for _, run in self._runs) / len(self._runs))
 
-    def start(self, time_ns: int) -> None:
-        """Count the learning time from here on, if it does not count yet."""
-        if self._first_ns is None:
-            self._first_ns = time_ns
+    def add(self, run: Run, seen_s: float) -> None:
+        """Take a run into account that ended when the station had been seen for so long.
 
-    def add(self, run: Run) -> None:
-        """Take a run into account; runs with too few segments are passed over."""
+        Runs with too few segments are passed over.
+        """
         if len(run.segments) < MIN_SEGMENTS:
             return
-        self._runs.append(run)
-        while len(self._runs) > MIN_RUNS and (run.window_ns[1] - self._runs[0].window_ns[0] > LEARNING_S * NS_PER_S):
+        self._runs.append((seen_s, run))
+        while len(self._runs) > MIN_RUNS and seen_s - self._runs[0][0] > LEARNING_S:
             self._runs.popleft()
 
-    def baseline(self, time_ns: int, shutoff_head_m: float) -> Baseline | None:
+    def baseline(self, seen_s: float, shutoff_head_m: float) -> Baseline | None:
         """The baseline, or None while learning has to go on."""
-        learnt_s = (time_ns - (self._first_ns if self._first_ns is not None else time_ns)) / NS_PER_S
-        if learnt_s < LEARNING_S:
-            self.reason = f"{learnt_s / 3600.0:.1f} of {LEARNING_S / 3600.0:.0f} h"
+        if seen_s < LEARNING_S:
+            self.reason = f"{seen_s / 3600.0:.1f} of {LEARNING_S / 3600.0:.0f} h"
             return None
         if len(self._runs) < MIN_RUNS:
             self.reason = f"{len(self._runs)} of {MIN_RUNS} usable runs"
             return None
-        doubt = objection(self._runs, shutoff_head_m)
+        runs = [run for _, run in self._runs]
+        doubt = objection(runs, shutoff_head_m)
         if doubt is not None:
             self.reason = doubt
             return None
         self.reason = ""
-        return learn(self._runs, shutoff_head_m)
+        return learn(runs, shutoff_head_m)

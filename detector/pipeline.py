@@ -8,10 +8,11 @@ import numpy as np
 from wetwell.detector.baseline import Baseline, sibling_objection
 from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.evidence import f_test_figures, run_evidence
-from wetwell.detector.gate import Frame, Gate
+from wetwell.detector.gate import Gate
 from wetwell.detector.learning import Learning
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.posterior import (
+    FAULTS,
     PRIOR,
     STATES,
     Floats,
@@ -38,7 +39,7 @@ class _Pump:
         self.learning = Learning()
         self.baseline: Baseline | None = None
         self.prior: Floats = PRIOR
-        self.state: State | None = None
+        self.state: State = "learning"
         self.onset_ns: int | None = None
         self.early: State | None = None
         self.rolling = RollingFTest(ROLLING_SAMPLES)
@@ -69,6 +70,8 @@ class Detector:
         self._runs = RunTracker(nominal)
         self._pumps = [_Pump() for _ in range(nominal.pumps)]
         self._rng = np.random.default_rng(0)
+        self._seen_s = 0.0
+        self._is_new = True
 
     @property
     def counts(self) -> dict[str, int]:
@@ -80,25 +83,24 @@ class Detector:
         frame = self._gate.update(sample)
         if frame is None:
             return ()
-        verdicts = [self._first_verdict(index, frame) for index, pump in enumerate(self._pumps) if pump.state is None]
+        verdicts: list[Verdict] = []
+        if self._is_new:
+            self._is_new = False
+            verdicts += [self._first_verdict(index, frame.time_ns) for index in range(len(self._pumps))]
+        if math.isfinite(frame.gap_s):
+            self._seen_s += frame.gap_s
         verdicts += [self._judge(run, frame.time_ns) for run in self._runs.update(frame)]
-        for index, pump in enumerate(self._pumps):
-            steady = self._runs.steady_sample(index)
-            if steady is not None:
-                pump.rolling.update(frame.time_ns / NS_PER_S, *steady)
-                verdicts += self._look_early(index, frame.time_ns)
+        for index, *steady in self._runs.steady_samples():
+            self._pumps[index].rolling.update(frame.time_ns / NS_PER_S, *steady)
+            verdicts += self._look_early(index, frame.time_ns)
         return tuple(verdicts)
 
     def finish(self) -> tuple[Verdict, ...]:
         """Verdicts on the runs that are still open at the end of a recording."""
         return tuple(self._judge(run, run.window_ns[1]) for run in self._runs.finish())
 
-    def _first_verdict(self, index: int, frame: Frame) -> Verdict:
-        pump = self._pumps[index]
-        pump.state = "learning"
-        pump.learning.start(frame.time_ns)
-        window_ns = (frame.time_ns, frame.time_ns)
-        return self._verdict(index, frame.time_ns, window_ns, {"learning": 1.0}, {"reason": "begins"})
+    def _first_verdict(self, index: int, time_ns: int) -> Verdict:
+        return self._verdict(index, time_ns, (time_ns, time_ns), {"learning": 1.0}, {"reason": "begins"})
 
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         """Verdict on a run that has ended."""
@@ -116,9 +118,9 @@ class Detector:
             )
             if lacking or pump.baseline is not None:
                 pump.state = "unknown"
-            return self._verdict(run.pump, time_ns, run.window_ns, {_told(pump.state): 1.0}, evidence)
+            return self._verdict(run.pump, time_ns, run.window_ns, {pump.state: 1.0}, evidence)
         if pump.baseline is None:
-            self._learn(run, time_ns)
+            self._learn(run)
         evidence |= run_evidence(run, pump.baseline, self._rng)
         if pump.baseline is None:
             pump.state = "learning"
@@ -132,15 +134,15 @@ class Detector:
         return self._verdict(run.pump, time_ns, run.window_ns, _named(probability), evidence)
 
     def _look_early(self, index: int, time_ns: int) -> list[Verdict]:
-        """Verdict within a run, when two looks in a row are all but sure of a fault not told yet."""
+        """Verdict on the end of a run that goes on, when two looks in a row are sure of a fault not told yet."""
         pump = self._pumps[index]
-        run = self._runs.open_run(index, EARLY_SEGMENTS)
+        run = self._runs.last_segments(index, EARLY_SEGMENTS) if pump.baseline is not None else None
         if pump.baseline is None or run is None:
             return []
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
         probability = self._weigh(run, pump.baseline, evidence)
         state = _decide(probability)
-        is_sure = state not in ("normal", "unknown") and probability[STATES.index(state)] > EARLY_PROBABILITY
+        is_sure = state in FAULTS and 1.0 - probability[0] > EARLY_PROBABILITY
         previous, pump.early = pump.early, state if is_sure else None
         if pump.early is None or pump.early != previous or state == pump.state:
             return []
@@ -148,10 +150,10 @@ class Detector:
         evidence |= run_evidence(run, pump.baseline, self._rng)
         return [self._verdict(index, time_ns, run.window_ns, _named(probability), evidence)]
 
-    def _learn(self, run: Run, time_ns: int) -> None:
+    def _learn(self, run: Run) -> None:
         pump = self._pumps[run.pump]
-        pump.learning.add(run)
-        baseline = pump.learning.baseline(time_ns, self._nominal.curves[run.pump][0])
+        pump.learning.add(run, self._seen_s)
+        baseline = pump.learning.baseline(self._seen_s, self._nominal.curves[run.pump][0])
         if baseline is None:
             return
         offsets_m = [
@@ -161,6 +163,7 @@ class Detector:
         doubt = sibling_objection(run.pump, offsets_m, self._nominal.curves)
         if doubt is None:
             pump.baseline = baseline
+            pump.learning = Learning()
         else:
             pump.learning.reason = doubt
 
@@ -174,7 +177,7 @@ class Detector:
 
     def _take_state(self, run: Run, state: State) -> None:
         pump = self._pumps[run.pump]
-        if state in ("normal", "unknown"):
+        if state not in FAULTS:
             pump.onset_ns = None
         elif pump.onset_ns is None:
             pump.onset_ns = run.window_ns[0]
@@ -199,10 +202,10 @@ class Detector:
             time=time_ns,
             station=self._station,
             pump=index + 1,
-            state=_told(pump.state),
+            state=pump.state,
             probability=probability,
             evidence=evidence,
-            onset=pump.onset_ns,
+            onset=pump.onset_ns if pump.state in FAULTS else None,
             window=window_ns,
         )
 
@@ -212,10 +215,6 @@ def _decide(probability: Floats) -> State:
     if 1.0 - probability[0] > ALARM_PROBABILITY:
         return STATES[1 + int(np.argmax(probability[1:]))]
     return "normal" if probability[0] > 0.5 else "unknown"
-
-
-def _told(state: State | None) -> State:
-    return "learning" if state is None else state
 
 
 def _named(probability: Floats) -> dict[State, float]:

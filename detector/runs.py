@@ -34,7 +34,7 @@ class Run:
         From 0.
     window_ns : (first, last) stamp of the run
     time_s, flow_m3h, head_m, speed_ratio, total_flow_m3h : (n,) arrays
-        Steady samples that have flow, head and frequency; time since the first of them.
+        Steady samples that have flow, head and frequency; time since the start of the run.
     segments : (m, 2) array
         Means of the level residuals (r_p, r_s) over 25 samples each. [m]
     missing : frozenset of str
@@ -77,42 +77,42 @@ class RunTracker:
 
     def __init__(self, nominal: Nominal) -> None:
         self._nominal = nominal
+        self._pumps = range(nominal.pumps)
         self._open: list[_Open | None] = [None] * nominal.pumps
         self._running: tuple[bool, ...] = (False,) * nominal.pumps
-        self._last_ns = 0
 
     def update(self, frame: Frame) -> list[Run]:
         """Runs that this frame ends."""
-        ended = [run for pump in range(self._nominal.pumps) if (run := self._break(pump, frame.gap_s)) is not None]
-        running = tuple(self._is_running(frame, pump) for pump in range(self._nominal.pumps))
+        ended = self.finish() if frame.gap_s > BREAK_S else []
+        running = tuple([self._is_running(frame, pump) for pump in self._pumps])
         if running != self._running:
             self._running = running
             steady_from_ns = frame.time_ns + int(WARM_UP_S * NS_PER_S)
             for going_on in self._open:
                 if going_on is not None:
                     going_on.steady_from_ns = steady_from_ns
-        for pump in range(self._nominal.pumps):
-            finished = self._update_pump(pump, frame)
-            if finished is not None:
-                ended.append(finished)
-        self._last_ns = frame.time_ns
+        for pump in self._pumps:
+            if self._running[pump] or self._open[pump] is not None:
+                finished = self._update_pump(pump, frame)
+                if finished is not None:
+                    ended.append(finished)
         return ended
 
     def finish(self) -> list[Run]:
         """Runs that are still open, at the end of a recording."""
-        return [run for pump in range(self._nominal.pumps) if (run := self._close(pump)) is not None]
+        return [run for pump in self._pumps if (run := self._close(pump)) is not None]
 
-    def steady_sample(self, pump: int) -> tuple[float, float, float, float] | None:
-        """(flow, head, speed ratio, total flow) of a pump in the last frame, if it was steady."""
-        run = self._open[pump]
-        return run.rows[-1][1:] if run is not None and run.is_steady else None
+    def steady_samples(self) -> list[tuple[int, float, float, float, float]]:
+        """(pump, flow, head, speed ratio, total flow) of each pump that was steady in the last frame."""
+        return [(pump, *run.rows[-1][1:]) for pump, run in enumerate(self._open) if run is not None and run.is_steady]
 
-    def open_run(self, pump: int, segments: int) -> Run | None:
-        """The open run of a pump, when it has just filled a segment and has at least so many."""
+    def last_segments(self, pump: int, segments: int) -> Run | None:
+        """The last segments of an open run, when it has just filled one and has at least so many."""
         run = self._open[pump]
-        if run is None or len(run.rows) < segments * SEGMENT_SAMPLES or len(run.rows) % SEGMENT_SAMPLES:
+        samples = segments * SEGMENT_SAMPLES
+        if run is None or len(run.rows) < samples or len(run.rows) % SEGMENT_SAMPLES:
             return None
-        return self._as_run(pump, run)
+        return self._as_run(pump, run, len(run.rows) - samples)
 
     def _is_running(self, frame: Frame, pump: int) -> bool:
         reading = frame.pumps[pump]
@@ -123,9 +123,6 @@ class RunTracker:
         if not math.isnan(reading.flow_m3h):
             return reading.flow_m3h > RUNNING_SHARE * self._nominal.runout_flow_m3h(pump)
         return self._open[pump] is not None
-
-    def _break(self, pump: int, gap_s: float) -> Run | None:
-        return self._close(pump) if gap_s > BREAK_S else None
 
     def _update_pump(self, pump: int, frame: Frame) -> Run | None:
         run = self._open[pump]
@@ -167,8 +164,9 @@ class RunTracker:
         self._open[pump] = None
         return None if run is None else self._as_run(pump, run)
 
-    def _as_run(self, pump: int, run: _Open) -> Run:
-        rows = np.array(run.rows).reshape(-1, 5)
+    def _as_run(self, pump: int, run: _Open, first_row: int = 0) -> Run:
+        """The run from a row on; where that is not the first, its window begins there."""
+        rows = np.array(run.rows[first_row:]).reshape(-1, 5)
         time_s, flow_m3h, head_m, speed_ratio, total_m3h = rows.T
         pump_m, system_m = level_residuals(
             flow_m3h,
@@ -183,7 +181,7 @@ class RunTracker:
         residuals = np.column_stack([pump_m, system_m])[:whole]
         return Run(
             pump=pump,
-            window_ns=(run.part_ns, run.last_ns),
+            window_ns=(run.part_ns + round(time_s[0] * NS_PER_S) if first_row else run.part_ns, run.last_ns),
             time_s=time_s,
             flow_m3h=flow_m3h,
             head_m=head_m,

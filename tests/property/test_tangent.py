@@ -16,7 +16,7 @@ c2s = st.floats(-5e-4, -1e-5)
 frictions = st.floats(1e-5, 2e-3)
 statics = st.floats(0.0, 8.0)
 speeds = st.lists(st.floats(0.9, 1.1), min_size=3, max_size=8)
-numbers = st.floats(-100.0, 100.0)
+numbers = st.floats(-100.0, 100.0).map(lambda value: value if abs(value) > 1e-100 else 0.0)
 NEGLIGIBLE_M = 1e-10
 
 
