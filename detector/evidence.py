@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.baseline import Baseline
 from wetwell.detector.bootstrap import block_bootstrap_interval
 from wetwell.detector.curve_drift import pump_curve_f_test, system_curve_f_test
 from wetwell.detector.f_test import FTest
-from wetwell.detector.runs import Run
-from wetwell.detector.tangent import attribution_index
+from wetwell.detector.nominal import Nominal
+from wetwell.detector.residuals import Array
+from wetwell.detector.runs import SEGMENT_SAMPLES, Run
+from wetwell.detector.tangent import attribution_index, tangent_residuals
 
 MIN_SAMPLES = 10
 RESAMPLES = 500
@@ -17,11 +18,11 @@ CONFIDENCE = 0.95
 BLOCK_SEGMENTS = 2
 
 
-def run_evidence(run: Run, baseline: Baseline | None, rng: np.random.Generator) -> dict[str, Any]:
-    """Figures of both methods on a run.
+def run_evidence(run: Run, nominal: Nominal, rng: np.random.Generator) -> dict[str, Any]:
+    """Figures of both methods of the paper on a run by itself.
 
-    `f_test`: drift of either curve within the run. `index`: share of the pump in the way from the learnt operating
-    point to the segments of the run, with its block-bootstrap interval; only once a baseline is learnt.
+    `f_test`: drift of either curve within the run. `tangent`: the attribution index of the steps between its
+    segments, with its block-bootstrap interval.
     """
     evidence: dict[str, Any] = {}
     if len(run.time_s) >= MIN_SAMPLES:
@@ -29,18 +30,31 @@ def run_evidence(run: Run, baseline: Baseline | None, rng: np.random.Generator) 
             "pump": f_test_figures(pump_curve_f_test(run.time_s, run.flow_m3h, run.head_m, run.speed_ratio)),
             "system": f_test_figures(system_curve_f_test(run.time_s, run.total_flow_m3h, run.head_m)),
         }
-    if baseline is not None:
-        pump_m, system_m = (run.segments - baseline.offset_m).T
-        low, high = block_bootstrap_interval(
-            pump_m,
-            system_m,
-            block=min(BLOCK_SEGMENTS, len(pump_m)),
-            resamples=RESAMPLES,
-            confidence=CONFIDENCE,
-            rng=rng,
+    if len(run.segments) > 1:
+        steps = tangent_residuals(
+            run.flow_m3h,
+            run.head_m,
+            run.speed_ratio,
+            curve=nominal.curves[run.pump],
+            friction_h2_m5=nominal.friction_h2_m5,
+            samples_per_segment=SEGMENT_SAMPLES,
+            total_flow_m3h=run.total_flow_m3h,
         )
-        evidence["index"] = {"value": round(attribution_index(pump_m, system_m), 4), "interval": [low, high]}
+        evidence["tangent"] = index_figures(*steps, rng)
     return evidence
+
+
+def index_figures(pump_m: Array, system_m: Array, rng: np.random.Generator) -> dict[str, Any]:
+    """Attribution index of residuals and its 95 % interval, as a message carries them."""
+    low, high = block_bootstrap_interval(
+        pump_m,
+        system_m,
+        block=min(BLOCK_SEGMENTS, len(pump_m)),
+        resamples=RESAMPLES,
+        confidence=CONFIDENCE,
+        rng=rng,
+    )
+    return {"value": round(attribution_index(pump_m, system_m), 4), "interval": [round(low, 4), round(high, 4)]}
 
 
 def f_test_figures(test: FTest) -> dict[str, float]:

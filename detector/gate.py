@@ -12,6 +12,8 @@ NAN = math.nan
 MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
 CONFIRMATIONS = 10
+RESENT_SAMPLES = 1000
+"""More samples than a bus sends again after a lost link; they come with numbers that were there before."""
 LEVEL_RANGE_M = (-1.0, 100.0)
 POWER_RANGE_KW = (-1.0, 1.0e6)
 
@@ -46,7 +48,8 @@ class Gate:
     A value that is absent, NaN or outside its range becomes NaN and is counted. A sample that is doubled or late is
     dropped and counted. A sample that jumps more than `MAX_JUMP_S` ahead ("future"), and samples that are behind, may
     come from a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another,
-    the gate follows them and counts a clock step.
+    the gate follows them and counts a clock step. Where their numbers are old too they are most likely sent again
+    after a lost link, and it takes more than `RESENT_SAMPLES` of them: then the source has begun anew.
 
     `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has
     passed over; a sample that comes late after all is counted there too.
@@ -72,7 +75,7 @@ class Gate:
     def update(self, sample: Sample) -> Frame | None:
         """Frame of a sample, or None where it is dropped."""
         self.counts["samples"] += 1
-        gap_s = self._gap_s(sample.time)
+        gap_s = self._gap_s(sample.time, sample.seq)
         self._count_lost(sample.seq, is_dropped=gap_s is None)
         if gap_s is None:
             return None
@@ -121,7 +124,7 @@ class Gate:
         if seq > self._last_seq or not is_dropped:
             self._last_seq = seq
 
-    def _gap_s(self, time_ns: int) -> float | None:
+    def _gap_s(self, time_ns: int, seq: int) -> float | None:
         """Seconds since the last sample let through; None if this one is to be dropped."""
         if self._last_ns is None:
             self._last_ns = time_ns
@@ -138,7 +141,8 @@ class Gate:
         follows = self._other_ns is not None and 0.0 < (time_ns - self._other_ns) / NS_PER_S <= MAX_JUMP_S
         self._other_count = self._other_count + 1 if follows else 1
         self._other_ns = time_ns
-        if self._other_count < CONFIRMATIONS:
+        is_new = self._last_seq is None or seq > self._last_seq
+        if self._other_count < (CONFIRMATIONS if is_new else RESENT_SAMPLES):
             return None
         self.counts["clock_steps"] += 1
         self._last_ns = time_ns

@@ -29,6 +29,11 @@ class Learning:
             return None
         return float(sum(run.segments[:, 0].mean() for _, run in self._runs) / len(self._runs))
 
+    @property
+    def runs(self) -> list[Run]:
+        """The runs so far."""
+        return [run for _, run in self._runs]
+
     def add(self, run: Run, seen_s: float) -> None:
         """Take a run into account that ended when the station had been seen for so long.
 
@@ -48,10 +53,9 @@ class Learning:
         if len(self._runs) < MIN_RUNS:
             self.reason = f"{len(self._runs)} of {MIN_RUNS} usable runs"
             return None
-        runs = [run for _, run in self._runs]
-        doubt = objection(runs, shutoff_head_m)
+        doubt = objection(self.runs, shutoff_head_m)
         if doubt is not None:
             self.reason = doubt
             return None
         self.reason = ""
-        return learn(runs, shutoff_head_m)
+        return learn(self.runs, shutoff_head_m)

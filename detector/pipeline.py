@@ -9,6 +9,7 @@ from wetwell.detector.baseline import Baseline, sibling_objection
 from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.evidence import f_test_figures, run_evidence
 from wetwell.detector.gate import Gate
+from wetwell.detector.index_limits import IndexLimits
 from wetwell.detector.learning import Learning
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.posterior import (
@@ -21,7 +22,7 @@ from wetwell.detector.posterior import (
     shift_of,
     shift_scales_m,
 )
-from wetwell.detector.runs import SEGMENT_SAMPLES, Run, RunTracker
+from wetwell.detector.runs import NEEDED, SEGMENT_SAMPLES, Run, RunTracker
 from wetwell.protocols.messages import Sample, State, Verdict
 from wetwell.protocols.stamps import NS_PER_S
 
@@ -43,6 +44,7 @@ class _Pump:
         self.onset_ns: int | None = None
         self.early: State | None = None
         self.rolling = RollingFTest(ROLLING_SAMPLES)
+        self.limits = IndexLimits()
 
 
 class Detector:
@@ -89,7 +91,8 @@ class Detector:
             verdicts += [self._first_verdict(index, frame.time_ns) for index in range(len(self._pumps))]
         if math.isfinite(frame.gap_s):
             self._seen_s += frame.gap_s
-        verdicts += [self._judge(run, frame.time_ns) for run in self._runs.update(frame)]
+        ended = self._runs.update(frame)
+        verdicts += [self._judge(run, frame.time_ns) for run in ended + self._runs.newly_blind_runs()]
         for index, *steady in self._runs.steady_samples():
             self._pumps[index].rolling.update(frame.time_ns / NS_PER_S, *steady)
             verdicts += self._look_early(index, frame.time_ns)
@@ -110,7 +113,7 @@ class Detector:
         if run.missing:
             evidence["missing"] = sorted(run.missing)
         if not len(run.segments):
-            lacking = run.missing & {"frequency_hz", "flow_m3h", "head_m"}
+            lacking = run.missing & NEEDED
             evidence["reason"] = (
                 f"without {', '.join(sorted(lacking))} pump and system cannot be told apart"
                 if lacking
@@ -121,7 +124,7 @@ class Detector:
             return self._verdict(run.pump, time_ns, run.window_ns, {pump.state: 1.0}, evidence)
         if pump.baseline is None:
             self._learn(run)
-        evidence |= run_evidence(run, pump.baseline, self._rng)
+        evidence |= run_evidence(run, self._nominal, self._rng)
         if pump.baseline is None:
             pump.state = "learning"
             evidence["reason"] = pump.learning.reason
@@ -129,8 +132,10 @@ class Detector:
         probability = self._weigh(run, pump.baseline, evidence)
         pump.prior = prior_of_next_run(probability)
         self._take_state(run, _decide(probability))
+        evidence["index"] = pump.limits.figures(run, pump.baseline, self._rng)
         if pump.state == "normal":
             pump.baseline = pump.baseline.with_noise_of(run, NOISE_WEIGHT)
+            pump.limits.add(run, pump.baseline)
         return self._verdict(run.pump, time_ns, run.window_ns, _named(probability), evidence)
 
     def _look_early(self, index: int, time_ns: int) -> list[Verdict]:
@@ -147,7 +152,8 @@ class Detector:
         if pump.early is None or pump.early != previous or state == pump.state:
             return []
         self._take_state(run, state)
-        evidence |= run_evidence(run, pump.baseline, self._rng)
+        evidence |= run_evidence(run, self._nominal, self._rng)
+        evidence["index"] = pump.limits.figures(run, pump.baseline, self._rng)
         return [self._verdict(index, time_ns, run.window_ns, _named(probability), evidence)]
 
     def _learn(self, run: Run) -> None:
@@ -163,6 +169,8 @@ class Detector:
         doubt = sibling_objection(run.pump, offsets_m, self._nominal.curves)
         if doubt is None:
             pump.baseline = baseline
+            for learnt in pump.learning.runs:
+                pump.limits.add(learnt, baseline)
             pump.learning = Learning()
         else:
             pump.learning.reason = doubt

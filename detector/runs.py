@@ -22,6 +22,10 @@ RUNNING_SHARE = 0.05
 """Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
 
 SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m")
+NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
+"""Without these a pump cannot be told from the system."""
+BLIND_S = 60.0
+"""A run that has lacked one of them for so long is reported at once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +67,7 @@ class _Open:
     rows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     seen: set[str] = field(default_factory=set)
     is_steady: bool = False
+    is_reported_blind: bool = False
 
 
 class RunTracker:
@@ -105,6 +110,17 @@ class RunTracker:
     def steady_samples(self) -> list[tuple[int, float, float, float, float]]:
         """(pump, flow, head, speed ratio, total flow) of each pump that was steady in the last frame."""
         return [(pump, *run.rows[-1][1:]) for pump, run in enumerate(self._open) if run is not None and run.is_steady]
+
+    def newly_blind_runs(self) -> list[Run]:
+        """Open runs that have lacked a needed signal since their start, `BLIND_S` ago; each is given once."""
+        blind = []
+        for pump, run in enumerate(self._open):
+            if run is None or run.is_reported_blind or run.last_ns - run.start_ns < BLIND_S * NS_PER_S:
+                continue
+            run.is_reported_blind = True
+            if not run.seen >= NEEDED:
+                blind.append(self._as_run(pump, run))
+        return blind
 
     def last_segments(self, pump: int, segments: int) -> Run | None:
         """The last segments of an open run, when it has just filled one and has at least so many."""

@@ -7,12 +7,11 @@ import os
 import sys
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 
-from wetwell.protocols.zenoh_link import open_router
-
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.keys import verdict_key
 from wetwell.protocols.link import Bus, Subscription
 from wetwell.protocols.messages import MessageError, Verdict
+from wetwell.protocols.zenoh_link import open_router
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
 from wetwell.services.settings import Settings
 

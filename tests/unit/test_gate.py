@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.detector.gate import CONFIRMATIONS, Gate
+from wetwell.detector.gate import CONFIRMATIONS, RESENT_SAMPLES, Gate
 from wetwell.detector.nominal import nominal_of
 from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
@@ -100,6 +100,23 @@ def test_a_clock_that_was_set_is_followed_after_the_confirmations(gate, step_s, 
     assert gate.counts["clock_steps"] == 1
     assert gate.counts["future" if step_s > 0 else "late"] == CONFIRMATIONS
     assert gate.counts["lost"] == 0
+
+
+def test_old_samples_that_a_bus_sends_again_are_dropped_however_many(gate):
+    for second in range(2000):
+        gate.update(sample(second))
+    assert [gate.update(sample(second)) for second in range(1400, 2000)] == [None] * 600
+    assert gate.update(sample(2000)).gap_s == 1.0
+    assert gate.counts == {"samples": 2601, "late": 599, "doubled": 1}
+
+
+def test_a_source_that_begins_anew_with_an_old_clock_is_followed_in_the_end(gate):
+    for second in range(3000, 3010):
+        gate.update(sample(second))
+    frames = [gate.update(sample(second)) for second in range(RESENT_SAMPLES)]
+    assert frames[:-1] == [None] * (RESENT_SAMPLES - 1)
+    assert frames[-1].gap_s == math.inf
+    assert gate.counts["clock_steps"] == 1
 
 
 def test_wild_stamps_among_good_ones_are_never_followed(gate):

@@ -101,7 +101,7 @@ def test_a_common_header_carries_the_flow_of_all_running_pumps(common_tracker):
     feed(common_tracker, range(60), ON, ON._replace(flow_m3h=100.0), OFF._replace(flow_m3h=7.0))
     first, second = common_tracker.finish()
     assert set(first.total_flow_m3h) == set(second.total_flow_m3h) == {300.0}
-    assert set(first.flow_m3h), set(second.flow_m3h) == ({200.0}, {100.0})
+    assert (set(first.flow_m3h), set(second.flow_m3h)) == ({200.0}, {100.0})
 
 
 def test_a_common_header_is_not_judged_while_one_flow_is_unknown(common_tracker):
@@ -116,6 +116,14 @@ def test_a_signal_that_never_came_is_named(tracker, name):
     (run,) = tracker.finish()
     assert run.missing == {name}
     assert len(run.time_s) == len(run.segments) == 0
+
+
+def test_a_run_that_lacks_a_needed_signal_is_told_once_after_a_minute(tracker):
+    blind, told = ON._replace(head_m=NAN), []
+    for second in range(100):
+        tracker.update(frame(second, blind, ON))
+        told += [(second, run.pump, run.missing) for run in tracker.newly_blind_runs()]
+    assert told == [(60, 0, {"head_m"})]
 
 
 def test_a_signal_that_came_at_times_is_not_missing(tracker):

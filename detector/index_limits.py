@@ -1,0 +1,55 @@
+"""Adaptive limits of the attribution index: what it is in health, kept up with the last normal runs."""
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from wetwell.detector.baseline import Baseline
+from wetwell.detector.evidence import index_figures
+from wetwell.detector.runs import Run
+from wetwell.detector.tangent import attribution_index
+
+RUNS = 50
+"""Normal runs that the limits rest on."""
+OUTER_SHARE = 0.05
+SYSTEM_BELOW = 0.4
+PUMP_ABOVE = 0.6
+"""The paper's fixed limits; the learnt ones never lie inside them."""
+
+
+class IndexLimits:
+    """Limits of the attribution index of one pump, and what the index says of a run.
+
+    The index is that of the way from the learnt operating point to the segments of a run: the tangent residuals
+    taken over the time since learning, so that a fault that has stopped growing still shows. Noise alone gives an
+    index set by the slopes of the curves, so the limits come from healthy runs: the outer 5 % on each side, and
+    never inside the paper's .4 and .6.
+
+    Memory: `RUNS` numbers. Warm-up: the learning phase.
+    """
+
+    def __init__(self) -> None:
+        self._healthy: deque[float] = deque(maxlen=RUNS)
+
+    def add(self, run: Run, baseline: Baseline) -> None:
+        """Take a normal run into account."""
+        self._healthy.append(attribution_index(*(run.segments - baseline.offset_m).T))
+
+    def limits(self) -> tuple[float, float]:
+        """(system below, pump above)."""
+        if not self._healthy:
+            return SYSTEM_BELOW, PUMP_ABOVE
+        low, high = np.quantile(np.array(self._healthy), [OUTER_SHARE, 1.0 - OUTER_SHARE])
+        return min(float(low), SYSTEM_BELOW), max(float(high), PUMP_ABOVE)
+
+    def figures(self, run: Run, baseline: Baseline, rng: np.random.Generator) -> dict[str, Any]:
+        """Index, its interval, the limits, and what the index alone says: "pump", "system" or nothing."""
+        pump_m, system_m = (run.segments - baseline.offset_m).T
+        figures = index_figures(pump_m, system_m, rng)
+        low, high = self.limits()
+        below, above = figures["interval"][1] < low, figures["interval"][0] > high
+        return figures | {
+            "limits": [round(low, 4), round(high, 4)],
+            "says": "system" if below else "pump" if above else None,
+        }
