@@ -5,14 +5,13 @@ import contextlib
 import logging
 from collections import Counter
 
-from wetwell.protocols.zenoh_link import connect_client
-
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
 from wetwell.protocols.keys import sample_key, verdict_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Sample, Verdict
 from wetwell.protocols.station import Station
+from wetwell.protocols.zenoh_link import connect_client
 from wetwell.services.daemon import report_health, stop_event, until
 from wetwell.services.settings import Settings
 

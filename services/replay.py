@@ -4,11 +4,10 @@ import asyncio
 import contextlib
 import logging
 
-from wetwell.protocols.zenoh_link import connect_client
-
 from wetwell.protocols.keys import sample_key
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.zenoh_link import connect_client
 from wetwell.services.clock import tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
 from wetwell.services.settings import Settings

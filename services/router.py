@@ -3,7 +3,6 @@
 import logging
 
 from wetwell.protocols.zenoh_link import open_router
-
 from wetwell.services.daemon import stop_event
 from wetwell.services.settings import Settings
 

@@ -5,13 +5,12 @@ import contextlib
 import logging
 from collections.abc import Callable
 
-from wetwell.protocols.zenoh_link import connect_client
-
 from wetwell.protocols.keys import sample_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.modbus_server import ModbusServer
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.zenoh_link import connect_client
 from wetwell.services.clock import due_seconds, tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
 from wetwell.services.settings import Settings
