@@ -3,6 +3,7 @@
 import math
 import tomllib
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -48,9 +49,21 @@ class Table(BaseModel):
 
 
 class Sump(Table):
-    """The wet well."""
+    """The wet well: an area, or a profile of points (level, area) with the area linear between them; an overflow."""
 
     area_m2: Positive
+    profile: tuple[tuple[Finite, Positive], ...] | None = None
+    overflow_level_m: Positive | None = None
+    weir_width_m: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _check_profile(self) -> Self:
+        levels_m = [level_m for level_m, _ in self.profile or ()]
+        if levels_m and (levels_m[0] != 0.0 or any(low >= high for low, high in pairwise(levels_m))):
+            raise ValueError(f"profile: levels must rise from 0, got {levels_m}")
+        if self.profile is not None and not levels_m:
+            raise ValueError("profile: at least one point (level_m, area_m2) is needed")
+        return self
 
 
 class Pump(Table):
@@ -88,14 +101,25 @@ class RisingMain(Table):
 
 
 class Control(Table):
-    """Start and stop by level, with ramps. Fewer levels than pumps: the others stand by in rotation."""
+    """Start and stop by level, with ramps. Fewer levels than pumps: the others stand by in rotation.
 
-    mode: Literal["on_off"] = "on_off"
+    Mode "pid" starts and stops by the same levels, and holds `setpoint_m` by the speed of the running pumps.
+    `max_starts_per_hour` is for each pump, 0 sets no limit; `out_of_service` counts pumps from 1.
+    """
+
+    mode: Literal["on_off", "pid"] = "on_off"
     start_levels_m: Annotated[tuple[Finite, ...], Field(min_length=1)] = (1.6, 1.8, 2.0)
     stop_levels_m: Annotated[tuple[Finite, ...], Field(min_length=1)] = (0.5, 0.8, 1.0)
     ramp_s: Positive = 10.0
     min_frequency_hz: NonNegative = 0.0
     dwell_s: NonNegative = 0.0
+    rotation: Literal["round_robin", "fixed", "least_run_time"] = "round_robin"
+    max_starts_per_hour: Annotated[int, Field(ge=0, le=60)] = 0
+    out_of_service: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    setpoint_m: Finite = 1.0
+    gain_hz_m: Positive = 20.0
+    integral_s: Positive = 120.0
+    derivative_s: NonNegative = 0.0
 
     @model_validator(mode="after")
     def _check_levels(self) -> Self:
@@ -104,22 +128,33 @@ class Control(Table):
 
 
 class Electrical(Table):
-    """Motor and supply of every pump."""
+    """Motor and supply of every pump.
+
+    Power model "current" is the paper's: the current follows the frequency; "load": it follows the shaft power.
+    """
 
     voltage_v: Positive = 400.0
     rated_current_a: Positive = 30.0
     power_factor: Fraction = 0.9
     efficiency: Fraction = 0.9
+    power_model: Literal["current", "load"] = "current"
+    motor_efficiency: Fraction = 0.92
+    drive_efficiency: Fraction = 0.97
+    shutoff_power_share: Annotated[float, Field(ge=0, le=1)] = 0.4
 
 
 class Sensors(Table):
-    """Standard deviations of the measurements: relative, but for the level in metres."""
+    """Standard deviations of the measurements: relative, but for the level in metres.
+
+    `correlation` is that of the noise from one second to the next.
+    """
 
     flow_noise: NonNegative = 0.01
     head_noise: NonNegative = 0.01
     power_noise: NonNegative = 0.01
     inflow_noise: NonNegative = 0.01
     level_noise_m: NonNegative = 0.002
+    correlation: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
 
 class EffectTable(BaseModel):
@@ -166,6 +201,9 @@ class Station(Table):
         levels, pumps = len(self.control.start_levels_m), len(self.pump)
         if levels > pumps:
             raise ValueError(f"control.start_levels_m: {levels} levels for {pumps} pumps, at most one a pump")
+        absent = [number for number in self.control.out_of_service if number > pumps]
+        if absent:
+            raise ValueError(f"control.out_of_service: got {absent[0]}, there are {pumps} pumps")
         for number, pump in enumerate(self.pump, start=1):
             if pump.coefficients[0] <= self.rising_main.static_head_m:
                 raise ValueError(

@@ -1,31 +1,49 @@
-"""Supervisory logic: start and stop pumps by the measured level, in rotation."""
+"""Supervisory logic: start and stop pumps by the measured level, in rotation, or hold the level by their speed."""
 
 import numpy as np
 import numpy.typing as npt
 
 from wetwell.simulator.jit import compiled
 
+Floats = npt.NDArray[np.float64]
+
 NOTHING = -1
+ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)
+ROTATIONS = ("round_robin", "fixed", "least_run_time")
+SECONDS_PER_HOUR = 3600
 
 
 @compiled
-def next_in_rotation(rotation: int, is_commanded: npt.NDArray[np.bool_], is_automatic: npt.NDArray[np.bool_]) -> int:
-    """Index of the pump that starts next: the first from `rotation` on that is automatic and idle, or -1."""
-    pumps = is_commanded.size
+def next_in_rotation(rotation: int, turn: int, run_s: Floats, is_ready: Floats) -> int:
+    """Index of the pump that starts next, or -1 if none is ready.
+
+    Parameters
+    ----------
+    rotation : int
+        `ROUND_ROBIN`: the first ready one from `turn` on; `FIXED`: the first ready one; `LEAST_RUN_TIME`: the ready
+        one that has run least.
+    turn : int
+        Pump after the one that started last.
+    run_s : (pumps,) array
+        [s]
+    is_ready : (pumps,) array
+        1 for automatic, standing, and not started too often; else 0.
+    """
+    pumps = is_ready.size
+    best = NOTHING
     for step in range(pumps):
-        pump = (rotation + step) % pumps
-        if is_automatic[pump] and not is_commanded[pump]:
-            return pump
-    return NOTHING
+        pump = (turn + step) % pumps if rotation == ROUND_ROBIN else step
+        if is_ready[pump] <= 0.0:
+            continue
+        if best == NOTHING or (rotation == LEAST_RUN_TIME and run_s[pump] < run_s[best]):
+            best = pump
+        if rotation != LEAST_RUN_TIME:
+            break
+    return best
 
 
 @compiled
-def wanted_change(
-    measured_level_m: float,
-    running: int,
-    start_levels_m: npt.NDArray[np.float64],
-    stop_levels_m: npt.NDArray[np.float64],
-) -> int:
+def wanted_change(measured_level_m: float, running: int, start_levels_m: Floats, stop_levels_m: Floats) -> int:
     r"""Start one pump (+1), stop one (-1) or leave all as they are (0).
 
     $$n^+ = n + 1 \text{ if } L \ge S_{n+1},\quad n - 1 \text{ if } L \le E_n,\quad n \text{ otherwise}$$
@@ -49,3 +67,47 @@ def wanted_change(
     if running > 0 and measured_level_m <= stop_levels_m[min(running, stop_levels_m.size) - 1]:
         return -1
     return 0
+
+
+@compiled
+def controlled_frequency_hz(
+    measured_level_m: float,
+    setpoint_m: float,
+    gain_hz_m: float,
+    integral_s: float,
+    derivative_s: float,
+    minimum_hz: float,
+    nominal_hz: float,
+    memory: Floats,
+) -> float:
+    r"""Frequency by which running pumps hold the level: a PID controller.
+
+    $$f = f_n + K \left(e + \frac{1}{T_i} \int e\, dt + T_d \frac{dL}{dt}\right), \qquad e = L - L_\text{set}$$
+
+    limited to [minimum, nominal]. The integral stands while the limit holds the output and the error would push it
+    further (anti-windup by conditional integration).
+
+    Parameters
+    ----------
+    measured_level_m, setpoint_m : float
+        [m]
+    gain_hz_m, integral_s, derivative_s : float
+        K, T_i, T_d. [Hz/m, s, s]
+    minimum_hz, nominal_hz : float
+        Limits. [Hz]
+    memory : (3,) array
+        Integral part in Hz, last level in m, and 1 once there is one; changed in place.
+
+    References
+    ----------
+    .. [1] K. J. Åström, T. Hägglund, Advanced PID Control, ISA 2006: conditional integration.
+    """
+    error_m = measured_level_m - setpoint_m
+    slope_m_s = measured_level_m - memory[1] if memory[2] > 0.0 else 0.0
+    memory[1] = measured_level_m
+    memory[2] = 1.0
+    integral_hz = memory[0] + gain_hz_m * error_m / integral_s
+    wanted_hz = nominal_hz + gain_hz_m * (error_m + derivative_s * slope_m_s) + integral_hz
+    if minimum_hz < wanted_hz < nominal_hz or (wanted_hz >= nominal_hz) == (error_m < 0.0):
+        memory[0] = integral_hz
+    return float(min(max(wanted_hz, minimum_hz), nominal_hz))

@@ -1,18 +1,22 @@
-"""Variable-frequency drive: soft start, soft stop, reversal in mid-ramp, dwell."""
+"""Variable-frequency drive: soft start, soft stop, reversal in mid-ramp, dwell; and how the shaft follows it."""
+
+import math
 
 from wetwell.simulator.jit import compiled
 
 ROUNDING_HZ = 1e-9
 """Far above the rounding of a ramp's sum, far under any drive's resolution."""
+AT_REST = 0.005
+"""Speed ratio under which a shaft that runs out counts as standing."""
 
 
 @compiled
 def next_frequency_hz(
-    frequency_hz: float, is_commanded: bool, rate_hz_s: float, minimum_hz: float, nominal_hz: float, dwell_s: float
+    frequency_hz: float, is_commanded: bool, rate_hz_s: float, minimum_hz: float, target_hz: float, dwell_s: float
 ) -> float:
     """Frequency one second later.
 
-    Commanded, the drive goes from `minimum_hz` to `nominal_hz` at `rate_hz_s`; otherwise back to `minimum_hz`, where
+    Commanded, the drive goes from `minimum_hz` to `target_hz` at `rate_hz_s`; otherwise back to `minimum_hz`, where
     it stays while a dwell is left, then to zero. A command that changes in mid-ramp turns the ramp around.
 
     Examples
@@ -23,11 +27,43 @@ def next_frequency_hz(
     20.0
     >>> next_frequency_hz(20.0, False, 5.0, 20.0, 50.0, 0.0)
     0.0
+    >>> next_frequency_hz(50.0, True, 5.0, 20.0, 42.0, 0.0)
+    45.0
     """
-    if is_commanded:
+    if is_commanded and frequency_hz <= target_hz:
         risen_hz = max(frequency_hz, minimum_hz) + rate_hz_s
-        return risen_hz if risen_hz < nominal_hz - ROUNDING_HZ else nominal_hz
-    if frequency_hz > minimum_hz:
+        return risen_hz if risen_hz < target_hz - ROUNDING_HZ else target_hz
+    lowest_hz = target_hz if is_commanded else minimum_hz
+    if frequency_hz > lowest_hz:
         fallen_hz = frequency_hz - rate_hz_s
-        return fallen_hz if fallen_hz > minimum_hz + ROUNDING_HZ else minimum_hz
+        return fallen_hz if fallen_hz > lowest_hz + ROUNDING_HZ else lowest_hz
     return minimum_hz if dwell_s > 0.0 and frequency_hz > 0.0 else 0.0
+
+
+@compiled
+def turned_ratio(commanded_ratio: float, before_ratio: float, ramp_power: float, lag_s: float) -> float:
+    r"""Speed ratio of the shaft for a commanded one: another shape of the ramp, and a first-order lag.
+
+    $$N = N_c^p, \qquad N \leftarrow N_\text{before} + (N - N_\text{before}) (1 - e^{-1 / \tau})$$
+
+    At rest and at nominal speed the shape makes no difference.
+
+    Parameters
+    ----------
+    commanded_ratio, before_ratio : float
+        Commanded now, and turned one second before. [1]
+    ramp_power : float
+        p; 1 follows the command. [1]
+    lag_s : float
+        τ; 0 follows at once. [s]
+
+    Examples
+    --------
+    >>> turned_ratio(0.5, 0.4, 1.0, 0.0), turned_ratio(0.5, 0.4, 2.0, 0.0)
+    (0.5, 0.25)
+    """
+    ratio = commanded_ratio if ramp_power == 1.0 else commanded_ratio**ramp_power
+    if lag_s <= 0.0:
+        return ratio
+    ratio = before_ratio + (ratio - before_ratio) * (1.0 - math.exp(-1.0 / lag_s))
+    return ratio if commanded_ratio > 0.0 or ratio > AT_REST else 0.0

@@ -42,9 +42,9 @@ def _curve(number: int, pump: Pump) -> dict[str, object]:
 def _duty(station: Station, running: list[bool]) -> list[dict[str, Any]]:
     parameters = plant_parameters(station)
     speed_ratio = np.array(running, dtype=float)
-    flow_m3h = np.empty(len(running))
+    flow_m3h = np.zeros(len(running))
     solve = common_flows if parameters.is_common_header else individual_flows
-    solve(parameters.curves, speed_ratio, parameters.static_head_m, parameters.friction_h2_m5, flow_m3h)
+    solve(parameters.curves, speed_ratio, parameters.static_head_m, parameters.friction_h2_m5, 0.0, flow_m3h)
     electrical = station.electrical
     power_kw = electrical_power_kw(electrical.voltage_v, electrical.rated_current_a, electrical.power_factor, 1.0)
     rows: list[dict[str, Any]] = []

@@ -50,12 +50,14 @@ def pump_head_m(c0: float, c1: float, c2: float, speed_ratio: float, flow_m3h: f
 
 
 @compiled
-def flow_at_head_m3h(c0: float, c1: float, c2: float, speed_ratio: float, head_m: float) -> float:
+def flow_at_head_m3h(
+    c0: float, c1: float, c2: float, speed_ratio: float, head_m: float, inertia_m_m3h: float = 0.0
+) -> float:
     r"""Flow at which a pump makes a given head; zero behind a closed check valve.
 
-    The positive root of $c_2 Q^2 + c_1 N Q + c_0 N^2 - H = 0$ in the form that loses no digits,
+    The positive root of $c_2 Q^2 + (c_1 N - j) Q + c_0 N^2 - H = 0$ in the form that loses no digits,
 
-    $$Q = \frac{2 \ell}{b + \sqrt{b^2 + 4 a \ell}}, \qquad \ell = c_0 N^2 - H,\ a = -c_2,\ b = -c_1 N$$
+    $$Q = \frac{2 \ell}{b + \sqrt{b^2 + 4 a \ell}}, \qquad \ell = c_0 N^2 - H,\ a = -c_2,\ b = j - c_1 N$$
 
     With c2 − k for c2 and the static head for H this is the duty point against H_s + k Q².
 
@@ -67,6 +69,8 @@ def flow_at_head_m3h(c0: float, c1: float, c2: float, speed_ratio: float, head_m
         N, speed over nominal speed, >= 0. [1]
     head_m : float
         Head against which the pump works. [m]
+    inertia_m_m3h : float
+        j, see `individual_flows`. [m/(m³/h)]
 
     Returns
     -------
@@ -81,17 +85,28 @@ def flow_at_head_m3h(c0: float, c1: float, c2: float, speed_ratio: float, head_m
     0.0
     """
     lift_m = c0 * speed_ratio**2 - head_m
-    if speed_ratio <= 0.0 or lift_m <= 0.0:
+    if lift_m <= 0.0 or (speed_ratio <= 0.0 and inertia_m_m3h <= 0.0):
         return 0.0
-    b = -c1 * speed_ratio
+    b = inertia_m_m3h - c1 * speed_ratio
     return 2.0 * lift_m / (b + math.sqrt(b * b - 4.0 * c2 * lift_m))
 
 
 @compiled
 def individual_flows(
-    curves: Floats, speed_ratio: Floats, static_head_m: float, friction_h2_m5: float, flow_m3h: Floats
+    curves: Floats,
+    speed_ratio: Floats,
+    static_head_m: float,
+    friction_h2_m5: float,
+    inertia_m_m3h: float,
+    flow_m3h: Floats,
 ) -> None:
-    """Duty flow of each pump against a rising main of its own.
+    r"""Duty flow of each pump against a rising main of its own.
+
+    With inertia the column of water has to be accelerated; one implicit step of
+
+    $$j\,(Q - Q_\text{before}) = H_\text{pump}(Q) - H_s - k Q^2, \qquad Q \ge 0$$
+
+    is again a quadratic equation, so that a step of any length is stable. With j = 0 it is the duty point.
 
     Parameters
     ----------
@@ -101,56 +116,92 @@ def individual_flows(
         [1]
     static_head_m, friction_h2_m5 : float
         System curve H = H_s + k Q². [m, h²/m⁵]
+    inertia_m_m3h : float
+        j: head that changes the flow by 1 m³/h within the step. [m/(m³/h)]
     flow_m3h : (pumps,) array
-        Receives the flows. [m³/h]
+        Flows before the step, replaced by those after it. [m³/h]
     """
     for i in range(speed_ratio.size):
         flow_m3h[i] = flow_at_head_m3h(
-            curves[i, 0], curves[i, 1], curves[i, 2] - friction_h2_m5, speed_ratio[i], static_head_m
+            curves[i, 0],
+            curves[i, 1],
+            curves[i, 2] - friction_h2_m5,
+            speed_ratio[i],
+            static_head_m - inertia_m_m3h * flow_m3h[i],
+            inertia_m_m3h,
         )
 
 
 @compiled
 def common_flows(
-    curves: Floats, speed_ratio: Floats, static_head_m: float, friction_h2_m5: float, flow_m3h: Floats
+    curves: Floats,
+    speed_ratio: Floats,
+    static_head_m: float,
+    friction_h2_m5: float,
+    inertia_m_m3h: float,
+    flow_m3h: Floats,
 ) -> None:
     r"""Duty flows of pumps on one header, at any speeds.
 
-    The total flow solves $\sum_i Q_i(H_s + k Q^2) = Q$. The left side falls and the right side rises with Q, so
-    that there is one root; Newton's method finds it, kept inside a bracket by bisection. One running pump is solved
-    in closed form. A pump whose shut-off head lies under the header's head gives no flow: its check valve is closed.
+    The total flow Q solves
 
-    Parameters and result as in `individual_flows`.
+    $$\sum_i Q_i(H) = Q, \qquad H = H_s + k Q^2 + j\,(Q - Q_\text{before})$$
+
+    The left side falls and the right side rises with Q, so that there is one root; Newton's method finds it, kept
+    inside a bracket by bisection. One running pump is solved in closed form. A pump whose shut-off head lies under
+    the header's head gives no flow: its check valve is closed.
+
+    Parameters and result as in `individual_flows`; the inertia acts on the total flow.
     """
-    individual_flows(curves, speed_ratio, static_head_m, 0.0, flow_m3h)
-    running = np.sum(flow_m3h > 0.0)
+    before_m3h = 0.0
+    running = 0
+    alone = 0
+    for i in range(speed_ratio.size):
+        before_m3h += flow_m3h[i]
+        if speed_ratio[i] > 0.0 or flow_m3h[i] > 0.0:
+            running += 1
+            alone = i
+        else:
+            flow_m3h[i] = 0.0
     if running == 0:
         return
     if running == 1:
-        alone = np.argmax(flow_m3h)
         flow_m3h[alone] = flow_at_head_m3h(
-            curves[alone, 0], curves[alone, 1], curves[alone, 2] - friction_h2_m5, speed_ratio[alone], static_head_m
+            curves[alone, 0],
+            curves[alone, 1],
+            curves[alone, 2] - friction_h2_m5,
+            speed_ratio[alone],
+            static_head_m - inertia_m_m3h * before_m3h,
+            inertia_m_m3h,
         )
         return
+    lowest_head_m = static_head_m - inertia_m_m3h * before_m3h
     low_m3h = 0.0
-    high_m3h = flow_m3h.sum()
+    high_m3h = _flows_at_head(curves, speed_ratio, lowest_head_m, flow_m3h)[0]
     total_m3h = high_m3h / (1.0 + running)
     for _ in range(MAX_ITERATIONS):
-        head_m = static_head_m + friction_h2_m5 * total_m3h**2
-        excess_m3h = -total_m3h
-        slope = -1.0
-        for i in range(speed_ratio.size):
-            flow_m3h[i] = flow_at_head_m3h(curves[i, 0], curves[i, 1], curves[i, 2], speed_ratio[i], head_m)
-            excess_m3h += flow_m3h[i]
-            if flow_m3h[i] > 0.0:
-                steepness = curves[i, 1] * speed_ratio[i] + 2.0 * curves[i, 2] * flow_m3h[i]
-                slope += 2.0 * friction_h2_m5 * total_m3h / steepness
+        head_m = lowest_head_m + (inertia_m_m3h + friction_h2_m5 * total_m3h) * total_m3h
+        pumped_m3h, steepness = _flows_at_head(curves, speed_ratio, head_m, flow_m3h)
+        excess_m3h = pumped_m3h - total_m3h
         if excess_m3h > 0.0:
             low_m3h = total_m3h
         else:
             high_m3h = total_m3h
         if abs(excess_m3h) <= FLOW_TOLERANCE_M3H or high_m3h - low_m3h <= FLOW_TOLERANCE_M3H:
             return
-        total_m3h -= excess_m3h / slope
+        total_m3h -= excess_m3h / (steepness * (inertia_m_m3h + 2.0 * friction_h2_m5 * total_m3h) - 1.0)
         if not low_m3h < total_m3h < high_m3h:
             total_m3h = 0.5 * (low_m3h + high_m3h)
+
+
+@compiled
+def _flows_at_head(curves: Floats, speed_ratio: Floats, head_m: float, flow_m3h: Floats) -> tuple[float, float]:
+    """Set the flow of each pump at the header's head; sum of the flows and of their slopes over the head."""
+    total_m3h = 0.0
+    steepness = 0.0
+    for i in range(speed_ratio.size):
+        flow_m3h[i] = flow_at_head_m3h(curves[i, 0], curves[i, 1], curves[i, 2], speed_ratio[i], head_m, 0.0)
+        if flow_m3h[i] > 0.0:
+            total_m3h += flow_m3h[i]
+            steepness += 1.0 / (curves[i, 1] * speed_ratio[i] + 2.0 * curves[i, 2] * flow_m3h[i])
+    return total_m3h, steepness

@@ -1,50 +1,160 @@
-"""Mass balance of the wet well."""
+"""The wet well: level and volume over its profile, and the overflow weir."""
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.simulator import layout as at
 from wetwell.simulator.jit import compiled
 
+Floats = npt.NDArray[np.float64]
+
 SECONDS_PER_HOUR = 3600.0
+WEIR_COEFFICIENT_M05_S = 1.84
+"""Of a sharp-crested weir in metric units (Francis)."""
 
 
-@compiled
-def next_level_m(level_m: float, inflow_m3h: float, flow_m3h: npt.NDArray[np.float64], area_m2: float) -> float:
-    r"""Level one second later.
-
-    $$A \frac{dL}{dt} = Q_{in} - \sum_i Q_i$$
-
-    An explicit step: the flows are those of the second's beginning. Where the pumps would take more than there is,
-    the flows are reduced in place, all by the same factor, so that the wet well runs dry and no water is invented.
-
-    Parameters
-    ----------
-    level_m : float
-        Level above the floor, >= 0. [m]
-    inflow_m3h : float
-        [m³/h]
-    flow_m3h : (pumps,) array
-        Flows out; reduced in place where the wet well runs dry. [m³/h]
-    area_m2 : float
-        [m²]
-
-    Returns
-    -------
-    level_m : float
-        [m]
+def profile_of(points: Sequence[tuple[float, float]]) -> Floats:
+    """Profile of points (level_m, area_m2) with the volume under each point, (3, k), rows as in `layout`.
 
     Examples
     --------
-    >>> next_level_m(1.0, 36.0, np.array([0.0]), 1.0)
+    >>> profile_of([(0.0, 2.0), (1.0, 4.0), (2.0, 4.0)])
+    array([[0., 1., 2.],
+           [2., 4., 4.],
+           [0., 3., 7.]])
+    """
+    levels_m, areas_m2 = np.array(points, dtype=float).T
+    slices_m3 = 0.5 * (areas_m2[1:] + areas_m2[:-1]) * np.diff(levels_m)
+    return np.array([levels_m, areas_m2, np.concatenate([[0.0], np.cumsum(slices_m3)])])
+
+
+@compiled
+def _slope_m(profile: Floats, k: int) -> float:
+    """Growth of the area with the height in slice k, in m."""
+    rise_m = profile[at.PROFILE_LEVEL, k + 1] - profile[at.PROFILE_LEVEL, k]
+    return float((profile[at.PROFILE_AREA, k + 1] - profile[at.PROFILE_AREA, k]) / rise_m)
+
+
+@compiled
+def level_at_volume_m(volume_m3: float, profile: Floats) -> float:
+    r"""Level at which the wet well holds a volume.
+
+    Within a slice with area $a + s x$ at height x the volume is $a x + s x^2 / 2$, so that
+
+    $$x = \frac{2 V}{a + \sqrt{a^2 + 2 s V}}$$
+
+    Above the last point of the profile its area goes on.
+
+    Parameters
+    ----------
+    volume_m3 : float
+        [m³]
+    profile : (3, k) array
+        k >= 1, from `profile_of`. [m, m², m³]
+
+    Examples
+    --------
+    >>> level_at_volume_m(3.0, profile_of([(0.0, 2.0), (1.0, 4.0)]))
+    1.0
+    """
+    last = profile.shape[1] - 1
+    if volume_m3 >= profile[at.PROFILE_VOLUME, last]:
+        above_m3 = volume_m3 - profile[at.PROFILE_VOLUME, last]
+        return float(profile[at.PROFILE_LEVEL, last] + above_m3 / profile[at.PROFILE_AREA, last])
+    k = last - 1
+    while k > 0 and volume_m3 < profile[at.PROFILE_VOLUME, k]:
+        k -= 1
+    rest_m3 = volume_m3 - profile[at.PROFILE_VOLUME, k]
+    area_m2 = profile[at.PROFILE_AREA, k]
+    slope_m = _slope_m(profile, k)
+    height_m = 2.0 * rest_m3 / (area_m2 + math.sqrt(area_m2**2 + 2.0 * slope_m * rest_m3))
+    return float(profile[at.PROFILE_LEVEL, k] + height_m)
+
+
+@compiled
+def volume_at_level_m3(level_m: float, profile: Floats) -> float:
+    """Volume in the wet well at a level: the inverse of `level_at_volume_m`.
+
+    Examples
+    --------
+    >>> volume_at_level_m3(1.5, profile_of([(0.0, 2.0), (1.0, 4.0)]))
+    5.0
+    """
+    last = profile.shape[1] - 1
+    if level_m >= profile[at.PROFILE_LEVEL, last]:
+        above_m = level_m - profile[at.PROFILE_LEVEL, last]
+        return float(profile[at.PROFILE_VOLUME, last] + above_m * profile[at.PROFILE_AREA, last])
+    k = last - 1
+    while k > 0 and level_m < profile[at.PROFILE_LEVEL, k]:
+        k -= 1
+    height_m = level_m - profile[at.PROFILE_LEVEL, k]
+    area_m2 = profile[at.PROFILE_AREA, k]
+    slope_m = _slope_m(profile, k)
+    return float(profile[at.PROFILE_VOLUME, k] + height_m * (area_m2 + 0.5 * slope_m * height_m))
+
+
+@compiled
+def overflow_m3h(level_m: float, crest_m: float, width_m: float, profile: Floats) -> float:
+    r"""Flow over the overflow weir.
+
+    $$Q = C\, b\, h^{3/2}, \qquad h = L - L_\text{crest}$$
+
+    At most what stands above the crest leaves within a second.
+
+    References
+    ----------
+    .. [1] J. B. Francis, Lowell Hydraulic Experiments, 1855: sharp-crested weir, C = 1.84 in metres and seconds.
+
+    Examples
+    --------
+    >>> profile = profile_of([(0.0, 8.0)])
+    >>> overflow_m3h(1.0, 2.0, 1.0, profile), round(overflow_m3h(2.25, 2.0, 1.0, profile), 3)
+    (0.0, 828.0)
+    """
+    height_m = level_m - crest_m
+    if height_m <= 0.0:
+        return 0.0
+    weir_m3h = WEIR_COEFFICIENT_M05_S * width_m * height_m * math.sqrt(height_m) * SECONDS_PER_HOUR
+    above_m3 = volume_at_level_m3(level_m, profile) - volume_at_level_m3(crest_m, profile)
+    return min(weir_m3h, above_m3 * SECONDS_PER_HOUR)
+
+
+@compiled
+def next_volume_m3(volume_m3: float, inflow_m3h: float, overflow_m3h: float, flow_m3h: Floats) -> float:
+    r"""Volume one second later.
+
+    $$\frac{dV}{dt} = Q_{in} - Q_\text{over} - \sum_i Q_i$$
+
+    Where the pumps would take more than there is, their flows are reduced in place, all by the same factor, so that
+    the wet well runs dry and no water is invented.
+
+    Parameters
+    ----------
+    volume_m3 : float
+        >= 0. [m³]
+    inflow_m3h, overflow_m3h : float
+        [m³/h]
+    flow_m3h : (pumps,) array
+        Flows out; reduced in place where the wet well runs dry. [m³/h]
+
+    Examples
+    --------
+    >>> next_volume_m3(1.0, 36.0, 0.0, np.array([0.0]))
     1.01
     >>> flow_m3h = np.array([72.0])
-    >>> next_level_m(0.01, 0.0, flow_m3h, 1.0), flow_m3h
+    >>> next_volume_m3(0.01, 0.0, 0.0, flow_m3h), flow_m3h
     (0.0, array([36.]))
     """
-    outflow_m3h = float(flow_m3h.sum())
-    rise_m = (inflow_m3h - outflow_m3h) / (SECONDS_PER_HOUR * area_m2)
-    if level_m + rise_m >= 0.0:
-        return level_m + rise_m
-    available_m3h = level_m * area_m2 * SECONDS_PER_HOUR + inflow_m3h
-    flow_m3h *= available_m3h / outflow_m3h
+    outflow_m3h = 0.0
+    for i in range(flow_m3h.size):
+        outflow_m3h += flow_m3h[i]
+    volume_after_m3 = volume_m3 + (inflow_m3h - overflow_m3h - outflow_m3h) / SECONDS_PER_HOUR
+    if volume_after_m3 >= 0.0:
+        return volume_after_m3
+    available_m3h = volume_m3 * SECONDS_PER_HOUR + inflow_m3h - overflow_m3h
+    for i in range(flow_m3h.size):
+        flow_m3h[i] *= available_m3h / outflow_m3h
     return 0.0

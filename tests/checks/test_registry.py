@@ -1,6 +1,7 @@
 """What holds for every registered fault and inflow, so that a new one is checked without a test of its own."""
 
 import json
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -116,22 +117,29 @@ def test_fault_of_zero_strength_is_identity(part):
     nothing = part(**needed(part), **dict.fromkeys(strengths, 0.0))
     forcing, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3) for _ in range(2))
     nothing.apply(forcing, np.arange(100.0))
-    assert all(left.tobytes() == right.tobytes() for left, right in zip(forcing, untouched, strict=True))
+    assert all(
+        left.tobytes() == right.tobytes() for left, right in zip(forcing.arrays, untouched.arrays, strict=True)
+    )
+
+
+def part_of(forcing, first, last):
+    """Views of some of the seconds of a forcing."""
+    views = {field.name: getattr(forcing, field.name) for field in fields(forcing) if field.name != "arrays"}
+    return replace(forcing, **{name: array[..., first:last] for name, array in views.items()})
 
 
 @every_fault
 def test_fault_acts_only_in_its_time_and_in_any_blocks(part):
     fault = part(**(needed(part) | {"after": "clear"}))
     time_s = np.arange(100.0)
-    whole, parts, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3) for _ in range(3))
+    whole, parts, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(3))
     fault.apply(whole, time_s)
     for first, last in ((0, 1), (1, 37), (37, 37), (37, 100)):
-        block = type(parts)(*(array[..., first:last] for array in parts))
-        fault.apply(block, time_s[first:last])
-    assert all(left.tobytes() == right.tobytes() for left, right in zip(whole, parts, strict=True))
+        fault.apply(part_of(parts, first, last), time_s[first:last])
+    assert all(left.tobytes() == right.tobytes() for left, right in zip(whole.arrays, parts.arrays, strict=True))
     changed = np.zeros(100, dtype=bool)
-    for left, right in zip(whole, untouched, strict=True):
-        changed |= np.atleast_2d(left != right).any(axis=0)
+    for left, right in zip(whole.arrays, untouched.arrays, strict=True):
+        changed |= (left != right).reshape(-1, 100).any(axis=0)
     assert np.flatnonzero(changed).tolist() == list(range(21, 61))
 
 

@@ -21,8 +21,8 @@ TOLERANCE_M3H = 1e-8
 
 
 def solved(layout, curves, speed_ratio, static_head_m, friction_h2_m5):
-    flow_m3h = np.full(len(curves), np.nan)
-    layout(np.array(curves), np.array(speed_ratio), static_head_m, friction_h2_m5, flow_m3h)
+    flow_m3h = np.zeros(len(curves))
+    layout(np.array(curves), np.array(speed_ratio), static_head_m, friction_h2_m5, 0.0, flow_m3h)
     return flow_m3h
 
 

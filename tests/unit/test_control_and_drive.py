@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.station import Control
-from wetwell.simulator.control import NOTHING, next_in_rotation, wanted_change
+from wetwell.simulator.control import FIXED, LEAST_RUN_TIME, NOTHING, ROUND_ROBIN, next_in_rotation, wanted_change
 from wetwell.simulator.drive import next_frequency_hz
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
@@ -26,7 +26,7 @@ class Bench:
         """Hold a level for some seconds; the frequencies of each pump in them, (pumps, seconds)."""
         rows = []
         for _ in range(seconds):
-            self.simulation._state.level_m[0] = level_m
+            self.simulation._plant.level_m = level_m
             recording = self.simulation.advance(1)
             rows.append([recording.columns[f"pump{i}_frequency_hz"][0] for i in (1, 2, 3)])
         return np.array(rows).T
@@ -34,7 +34,7 @@ class Bench:
     @property
     def commanded(self):
         """Numbers of the commanded pumps, from 1."""
-        return (np.flatnonzero(self.simulation._state.is_commanded) + 1).tolist()
+        return sorted(self.simulation._plant.commanded)
 
 
 @pytest.fixture
@@ -146,7 +146,7 @@ def test_last_started_stops_first(bench):
     bench.at(2.1)
     bench.at(2.1)
     assert bench.commanded == [1, 2, 3]
-    assert bench.simulation._state.started.tolist() == [1, 2, 0]
+    assert bench.simulation._plant.commanded == [2, 3, 1]
     bench.at(1.01, 5)
     assert bench.commanded == [1, 2, 3]
     bench.at(1.0)
@@ -198,11 +198,23 @@ def test_wanted_change(level_m, running, change):
     assert wanted_change(level_m, running, STARTS_M, STOPS_M) == change
 
 
-def test_rotation_with_all_pumps_busy_or_off():
-    busy, auto = np.array([True, False, True]), np.array([True, True, True])
-    assert next_in_rotation(2, busy, auto) == 1
-    assert next_in_rotation(0, np.array([True, True, True]), auto) == NOTHING
-    assert next_in_rotation(0, busy, np.array([True, False, True])) == NOTHING
+@pytest.mark.parametrize(
+    ("rotation", "turn", "ready", "chosen"),
+    [
+        (ROUND_ROBIN, 2, [1, 1, 1], 2),
+        (ROUND_ROBIN, 2, [1, 1, 0], 0),
+        (ROUND_ROBIN, 1, [1, 0, 0], 0),
+        (FIXED, 2, [0, 1, 1], 1),
+        (LEAST_RUN_TIME, 2, [1, 1, 1], 1),
+        (LEAST_RUN_TIME, 0, [1, 0, 1], 2),
+        (ROUND_ROBIN, 0, [0, 0, 0], NOTHING),
+        (FIXED, 0, [0, 0, 0], NOTHING),
+        (LEAST_RUN_TIME, 0, [0, 0, 0], NOTHING),
+    ],
+)
+def test_rotation(rotation, turn, ready, chosen):
+    run_s = np.array([30.0, 10.0, 20.0])
+    assert next_in_rotation(rotation, turn, run_s, np.array(ready, dtype=float)) == chosen
 
 
 @pytest.mark.parametrize(

@@ -185,7 +185,7 @@ BAD_FILES = {
         changed('"common"', '"shared"'),
         "rising_main.layout: got 'shared', input should be 'individual'",
     ),
-    "mode not built": (changed('"on_off"', '"pid"'), "control.mode: got 'pid', input should be 'on_off'"),
+    "wrong mode": (changed('"on_off"', '"fuzzy"'), "control.mode: got 'fuzzy', input should be 'on_off' or 'pid'"),
     "minimum over nominal": (
         changed("min_frequency_hz = 20.0", "min_frequency_hz = 50.0"),
         "control.min_frequency_hz: got 50, must lie under pump[1].nominal_frequency_hz = 50",
