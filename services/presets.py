@@ -11,6 +11,7 @@ from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.recording import read_recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import Station, load_station, load_toml
+from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.scenario import Scenario
 
 _PLANT = files("wetwell.simulator")
@@ -29,10 +30,16 @@ def find_station(name_or_path: str) -> Station:
     Raises
     ------
     ConfigError
-        If there is none, or its file breaks a rule.
+        If there is none, its file breaks a rule, or one of its effects does.
     """
     with as_file(_PLANT / "stations") as folder:
-        return load_station(_find(name_or_path, folder, "station"))
+        path = _find(name_or_path, folder, "station")
+        station = load_station(path)
+    try:
+        effective_parameters(station)
+    except ValueError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    return station
 
 
 def find_scenario(name_or_path: str) -> Scenario:

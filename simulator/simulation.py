@@ -9,16 +9,11 @@ import numpy.typing as npt
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import Station, check_levels
+from wetwell.simulator import layout as at
+from wetwell.simulator.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
+from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults.profile import PumpFault
-from wetwell.simulator.kernel import advance
-from wetwell.simulator.plant import (
-    Forcing,
-    Record,
-    empty_record,
-    healthy_forcing,
-    plant_at_rest,
-    plant_parameters,
-)
+from wetwell.simulator.plant import Forcing, Plant, Record, healthy_forcing
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
 
 Floats = npt.NDArray[np.float64]
@@ -41,14 +36,11 @@ class Simulation:
     Raises
     ------
     ValueError
-        If a fault names a pump that the station does not have, or the station names an effect that is not known.
+        If a fault names a pump that the station does not have, or an effect of the station is not known or wrong.
     """
 
     def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
-        for effect in station.effect:
-            raise ValueError(
-                f"station '{station.name}': effect: got '{effect.name}', no effect is known to this version"
-            )
+        self._effects = effects_of(station)
         for number, fault in enumerate(scenario.fault, start=1):
             if isinstance(fault, PumpFault) and fault.pump > len(station.pump):
                 raise ValueError(
@@ -59,15 +51,13 @@ class Simulation:
         self.station = station
         self.scenario = scenario
         self._inflow = scenario.inflow.stream(inflow_rng)
-        self._parameters = plant_parameters(station)
-        self._state = plant_at_rest(len(station.pump), scenario.initial_level_m)
+        self._plant = Plant(effective_parameters(station), scenario.initial_level_m)
         self._start_ns = scenario.start_time if scenario.start_time is not None else start_ns
-        self._second = 0
 
     @property
     def seconds(self) -> int:
         """Seconds simulated so far."""
-        return self._second
+        return self._plant.seconds
 
     @property
     def settings(self) -> dict[str, float]:
@@ -75,12 +65,12 @@ class Simulation:
         levels = {
             f"{kind}_level{n}_m": float(level_m)
             for kind, levels_m in (
-                ("start", self._parameters.start_levels_m),
-                ("stop", self._parameters.stop_levels_m),
+                ("start", self._plant.levels_m[at.START_LEVEL]),
+                ("stop", self._plant.levels_m[at.STOP_LEVEL]),
             )
             for n, level_m in enumerate(levels_m, start=1)
         }
-        automatic = {f"pump{i}_auto": float(flag) for i, flag in enumerate(self._parameters.is_automatic, start=1)}
+        automatic = {f"pump{i}_auto": float(flag) for i, flag in enumerate(self._plant.is_automatic, start=1)}
         return levels | automatic
 
     def change_settings(self, changes: Mapping[str, float]) -> None:
@@ -96,15 +86,12 @@ class Simulation:
         if unknown:
             raise ValueError(f"{unknown[0]} is not a setting of station '{self.station.name}'")
         settings |= changes
-        count = self._parameters.start_levels_m.size
+        count = self._plant.levels_m.shape[1]
         start_m = tuple(settings[f"start_level{n}_m"] for n in range(1, count + 1))
         stop_m = tuple(settings[f"stop_level{n}_m"] for n in range(1, count + 1))
         check_levels(start_m, stop_m)
-        self._parameters.start_levels_m[:] = start_m
-        self._parameters.stop_levels_m[:] = stop_m
-        self._parameters.is_automatic[:] = [
-            settings[f"pump{i}_auto"] > 0 for i in range(1, len(self.station.pump) + 1)
-        ]
+        self._plant.levels_m[:] = start_m, stop_m
+        self._plant.is_automatic[:] = [settings[f"pump{i}_auto"] > 0 for i in range(1, len(self.station.pump) + 1)]
 
     def advance(self, seconds: int, *, truth: bool = True) -> Recording:
         """Simulate the next seconds.
@@ -121,18 +108,18 @@ class Simulation:
         recording : Recording
             One row a second.
         """
-        pumps = len(self.station.pump)
-        time_s = np.arange(self._second, self._second + seconds, dtype=np.float64)
-        forcing = healthy_forcing(self._inflow.take(seconds), pumps)
+        begin = self._plant.seconds
+        time_s = np.arange(begin, begin + seconds, dtype=np.float64)
+        forcing = healthy_forcing(self._inflow.take(seconds), len(self.station.pump))
+        for effect in self._effects:
+            effect.force(forcing, time_s)
         for fault in self.scenario.fault:
             fault.apply(forcing, time_s)
-        record = empty_record(pumps, seconds)
-        advance(self._parameters, self._state, forcing, self._sensor_rng, record)
-        stamps_ns = self._start_ns + NS_PER_S * np.arange(self._second, self._second + seconds)
-        self._second += seconds
+        record = self._plant.advance(forcing, self._sensor_rng)
+        stamps_ns = self._start_ns + NS_PER_S * np.arange(begin, begin + seconds)
         return Recording(
             time_ns=stamps_ns,
-            columns=_measured(record),
+            columns=_measured(record.measured, len(self.station.pump)),
             truth=self._truth(record, forcing, time_s) if truth else {},
         )
 
@@ -146,8 +133,9 @@ class Simulation:
                 system |= fault.is_active(time_s)
         truth: dict[str, npt.NDArray[Any]] = {
             "truth_state": _state_names(np.logical_or.reduce(pumps), system),
-            "truth_level_m": record.true_level_m,
+            "truth_level_m": record.station_truth[at.TRUE_LEVEL],
             "truth_inflow_m3h": forcing.inflow_m3h,
+            "truth_overflow_m3h": record.station_truth[at.TRUE_OVERFLOW],
             "truth_friction_factor": forcing.friction_factor,
             "truth_static_rise_m": forcing.static_rise_m,
         }
@@ -155,22 +143,19 @@ class Simulation:
             truth |= {
                 f"truth_pump{i + 1}_state": _state_names(pumps[i], system),
                 f"truth_pump{i + 1}_speed_factor": forcing.speed_factor[i],
-                f"truth_pump{i + 1}_flow_m3h": record.true_flow_m3h[i],
-                f"truth_pump{i + 1}_head_m": record.true_head_m[i],
+                f"truth_pump{i + 1}_flow_m3h": record.pump_truth[at.TRUE_FLOW, i],
+                f"truth_pump{i + 1}_head_m": record.pump_truth[at.TRUE_HEAD, i],
+                f"truth_pump{i + 1}_power_kw": record.pump_truth[at.TRUE_POWER, i],
             }
         return truth
 
 
-def _measured(record: Record) -> dict[str, Floats]:
-    columns = {"level_m": record.level_m, "inflow_m3h": record.inflow_m3h}
-    for i in range(record.frequency_hz.shape[0]):
-        columns |= {
-            f"pump{i + 1}_frequency_hz": record.frequency_hz[i],
-            f"pump{i + 1}_flow_m3h": record.flow_m3h[i],
-            f"pump{i + 1}_head_m": record.head_m[i],
-            f"pump{i + 1}_power_kw": record.power_kw[i],
-            f"pump{i + 1}_running": (record.frequency_hz[i] > 0).astype(np.float64),
-        }
+def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:
+    columns = {"level_m": measured[LEVEL], "inflow_m3h": measured[INFLOW]}
+    for i in range(pumps):
+        for quantity in PUMP_QUANTITIES:
+            columns[f"pump{i + 1}_{quantity}"] = measured[channels_of(quantity, pumps, i + 1)[0]]
+        columns[f"pump{i + 1}_running"] = (columns[f"pump{i + 1}_frequency_hz"] > 0).astype(np.float64)
     return columns
 
 

@@ -1,0 +1,140 @@
+"""Effects beyond the plain model, one file each. The registry is the union itself."""
+
+from typing import Annotated, Any, get_args
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from wetwell.protocols.errors import first_fault
+from wetwell.protocols.station import Station
+from wetwell.simulator.effects.air_pocket import AirPocket
+from wetwell.simulator.effects.channel_delay import ChannelDelay
+from wetwell.simulator.effects.check_valve_leak import CheckValveLeak
+from wetwell.simulator.effects.common_header import CommonHeader
+from wetwell.simulator.effects.control_delay import ControlDelay
+from wetwell.simulator.effects.effect import Effect
+from wetwell.simulator.effects.flow_low_cutoff import FlowLowCutoff
+from wetwell.simulator.effects.flow_meter_gain import FlowMeterGain
+from wetwell.simulator.effects.flow_meter_lag import FlowMeterLag
+from wetwell.simulator.effects.friction_bias import FrictionBias
+from wetwell.simulator.effects.head_sensor_offset import HeadSensorOffset
+from wetwell.simulator.effects.level_dependent_static_head import LevelDependentStaticHead
+from wetwell.simulator.effects.level_quantisation import LevelQuantisation
+from wetwell.simulator.effects.level_sensor_lag import LevelSensorLag
+from wetwell.simulator.effects.load_dependent_power import LoadDependentPower
+from wetwell.simulator.effects.motor_slip import MotorSlip
+from wetwell.simulator.effects.pump_wear import PumpWear
+from wetwell.simulator.effects.ragging import Ragging
+from wetwell.simulator.effects.ramp_shape import RampShape
+from wetwell.simulator.effects.report_by_exception import ReportByException
+from wetwell.simulator.effects.static_head_bias import StaticHeadBias
+from wetwell.simulator.effects.sump_area_profile import SumpAreaProfile
+from wetwell.simulator.effects.supply_voltage_variation import SupplyVoltageVariation
+from wetwell.simulator.effects.threshold_shift import ThresholdShift
+from wetwell.simulator.effects.unmetered_inflow import UnmeteredInflow
+from wetwell.simulator.effects.water_inertia import WaterInertia
+from wetwell.simulator.plant import PlantParameters, plant_parameters
+
+AnyEffect = Annotated[
+    AirPocket
+    | ChannelDelay
+    | CheckValveLeak
+    | CommonHeader
+    | ControlDelay
+    | FlowLowCutoff
+    | FlowMeterGain
+    | FlowMeterLag
+    | FrictionBias
+    | HeadSensorOffset
+    | LevelDependentStaticHead
+    | LevelQuantisation
+    | LevelSensorLag
+    | LoadDependentPower
+    | MotorSlip
+    | PumpWear
+    | Ragging
+    | RampShape
+    | ReportByException
+    | StaticHeadBias
+    | SumpAreaProfile
+    | SupplyVoltageVariation
+    | ThresholdShift
+    | UnmeteredInflow
+    | WaterInertia,
+    Field(discriminator="name"),
+]
+EFFECTS: dict[str, type[Effect]] = {
+    effect.model_fields["name"].default: effect for effect in get_args(get_args(AnyEffect)[0])
+}
+_ADAPTER: TypeAdapter[tuple[AnyEffect, ...]] = TypeAdapter(tuple[AnyEffect, ...])
+
+
+def effects_of(station: Station) -> tuple[Effect, ...]:
+    """Effects that a station file names, checked.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, a parameter breaks its rule, or a pump is not there; one line.
+    """
+    tables = [effect.model_dump() for effect in station.effect]
+    try:
+        effects = _ADAPTER.validate_python(tables)
+    except ValidationError as error:
+        raise ValueError(f"station '{station.name}': effect{first_fault(error)}") from error
+    for number, effect in enumerate(effects, start=1):
+        pump = getattr(effect, "pump", 0)
+        if pump > len(station.pump):
+            raise ValueError(
+                f"station '{station.name}': effect[{number}].pump: got {pump}, there are {len(station.pump)} pumps"
+            )
+    return effects
+
+
+def effective_parameters(station: Station) -> PlantParameters:
+    """Parameters of a station under its effects: each works on what those before it in the file left.
+
+    Of two that set the same thing (a lag, a delay, a deadband), the later counts; factors multiply, shifts add up.
+
+    Raises
+    ------
+    ValueError
+        As `effects_of`, or if an effect does not fit the station; one line.
+    """
+    parameters = plant_parameters(station)
+    for number, effect in enumerate(effects_of(station), start=1):
+        try:
+            parameters = effect.modify(parameters)
+        except ValueError as error:
+            raise ValueError(f"station '{station.name}': effect[{number}]: {error}") from error
+    return parameters
+
+
+def effect_table() -> list[dict[str, Any]]:
+    """Every effect as its class says: name, component, parameters and what it does.
+
+    Returns
+    -------
+    rows : list of dict
+        A parameter has a name, and of unit, low, high, choices, neutral and default what there is.
+    """
+    return [
+        {
+            "name": name,
+            "component": effect.component,
+            "parameters": _parameters(effect),
+            "summary": (effect.__doc__ or "").split("\n", 1)[0],
+        }
+        for name, effect in EFFECTS.items()
+    ]
+
+
+def _parameters(effect: type[Effect]) -> list[dict[str, Any]]:
+    keys = {"unit": "unit", "minimum": "low", "maximum": "high", "enum": "choices", "default": "default"}
+    properties = effect.model_json_schema()["properties"]
+    return [
+        {"name": name}
+        | {new: schema[old] for old, new in keys.items() if old in schema}
+        | ({"neutral": effect.neutral[name]} if name in effect.neutral else {})
+        for name, schema in properties.items()
+        if name != "name"
+    ]

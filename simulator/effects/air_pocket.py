@@ -1,0 +1,42 @@
+"""Air at a high point of the main."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import PlantParameters
+
+
+class AirPocket(Effect):
+    r"""Air gathers while the station idles, lifts the static head, and is purged while water flows.
+
+    $$\frac{da}{dt} = \frac{a_{\max} - a}{\tau_g} \text{ idle}, \qquad
+    \frac{da}{dt} = -\frac{a}{\tau_p} \text{ running}, \qquad H = H_s + a + k Q^2$$
+
+    At the beginning there is no air; mains of their own share one pocket.
+
+    Parameters
+    ----------
+    head_m : float
+        a_max; 0 is no effect. [m]
+    growth_s : float
+        τ_g. [s]
+    purge_s : float
+        τ_p. [s]
+
+    References
+    ----------
+    .. [1] After M. Escarameia, Investigating hydraulic removal of air from water pipelines, Water Management 2007.
+    """
+
+    component: ClassVar[Component] = "rising_main"
+    neutral: ClassVar[dict[str, float]] = {"head_m": 0.0}
+
+    name: Literal["air_pocket"] = "air_pocket"
+    head_m: Annotated[float, limits(0.0, 20.0, "m")]
+    growth_s: Annotated[float, limits(10.0, 1.0e5, "s")] = 1800.0
+    purge_s: Annotated[float, limits(5.0, 1.0e4, "s")] = 120.0
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Let air gather."""
+        return replace(parameters, air_head_m=self.head_m, air_growth_s=self.growth_s, air_purge_s=self.purge_s)

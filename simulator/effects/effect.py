@@ -1,0 +1,70 @@
+"""What every effect is: a frozen set of parameters that changes the plant's parameters, or works into the forcing."""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from wetwell.protocols.station import Table
+from wetwell.simulator.channels import Quantity, channels_of
+from wetwell.simulator.plant import Floats, Forcing, PlantParameters
+
+Component = Literal[
+    "sump",
+    "rising_main",
+    "pump",
+    "drive",
+    "controller",
+    "level_sensor",
+    "flow_meter",
+    "head_sensor",
+    "power_meter",
+    "telemetry",
+]
+
+PumpNumber = Annotated[int, Field(ge=0, le=32, description="pump, counted from 1; 0 for all pumps")]
+
+
+def limits(low: float, high: float, unit: str) -> Any:
+    """Field of a parameter with its range and unit."""
+    return Field(ge=low, le=high, allow_inf_nan=False, json_schema_extra={"unit": unit})
+
+
+class Effect(Table):
+    """Base of the effects: one component of the station that behaves otherwise than the plain model.
+
+    A subclass is one file: the equation and its source, parameters with range and unit, and `modify` or `force`.
+    `neutral` names the parameters that are its strength, with the values at which it changes nothing, bit for bit.
+    """
+
+    component: ClassVar[Component]
+    neutral: ClassVar[dict[str, float]]
+
+    name: str
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Parameters of the plant under this effect."""
+        return parameters
+
+    def force(self, forcing: Forcing, time_s: Floats) -> None:
+        """Work into the forcing of a block that begins at `time_s[0]`; for what changes with time."""
+
+
+def of_pumps(values: Floats, pump: int, value: float) -> Floats:
+    """(pumps,) values with that of one pump (from 1), or of all (0), replaced.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> of_pumps(np.zeros(3), 2, 5.0), of_pumps(np.zeros(2), 0, 1.0)
+    (array([0., 5., 0.]), array([1., 1.]))
+    """
+    replaced = values.copy()
+    replaced[pump - 1 if pump > 0 else slice(None)] = value
+    return replaced
+
+
+def of_channels(parameters: PlantParameters, row: str, quantity: Quantity, value: float) -> PlantParameters:
+    """Parameters with one property of the sensors of a quantity replaced, on all pumps."""
+    values = getattr(parameters.sensors, row).copy()
+    values[channels_of(quantity, parameters.nominal_frequency_hz.size)] = value
+    return parameters.with_sensors(parameters.sensors._replace(**{row: values}))

@@ -1,0 +1,32 @@
+"""Damped flow meters."""
+
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
+from wetwell.simulator.plant import PlantParameters
+
+
+class FlowMeterLag(Effect):
+    r"""Every pump's flow meter follows with a first-order lag.
+
+    $$\tau \frac{dy}{dt} = Q - y$$
+
+    Parameters
+    ----------
+    lag_s : float
+        τ; 0 is no effect. [s]
+
+    References
+    ----------
+    .. [1] After J. P. Bentley, Principles of Measurement Systems: first-order elements.
+    """
+
+    component: ClassVar[Component] = "flow_meter"
+    neutral: ClassVar[dict[str, float]] = {"lag_s": 0.0}
+
+    name: Literal["flow_meter_lag"] = "flow_meter_lag"
+    lag_s: Annotated[float, limits(0.0, 120.0, "s")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Damp the flows."""
+        return of_channels(parameters, "lag_s", "flow_m3h", self.lag_s)

@@ -1,0 +1,33 @@
+"""Friction of the rising main other than configured."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import PlantParameters
+
+
+class FrictionBias(Effect):
+    r"""The rising main is rougher, narrower or longer than the station file says; constant in time.
+
+    $$H = H_s + \phi\, k\, Q^2$$
+
+    Parameters
+    ----------
+    factor : float
+        φ; 1 is no effect. [1]
+
+    References
+    ----------
+    .. [1] After G. M. Jones et al., Pumping Station Design: head loss by Darcy and Weisbach; roughness with age.
+    """
+
+    component: ClassVar[Component] = "rising_main"
+    neutral: ClassVar[dict[str, float]] = {"factor": 1.0}
+
+    name: Literal["friction_bias"] = "friction_bias"
+    factor: Annotated[float, limits(0.2, 5.0, "1")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Scale the friction."""
+        return replace(parameters, friction_h2_m5=parameters.friction_h2_m5 * self.factor)

@@ -1,0 +1,32 @@
+"""A level in steps."""
+
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
+from wetwell.simulator.plant import PlantParameters
+
+
+class LevelQuantisation(Effect):
+    r"""The recorded level is rounded to a step; the controller sees the level as it is read.
+
+    $$y = q \left\lfloor \frac{L}{q} + \frac{1}{2} \right\rfloor$$
+
+    Parameters
+    ----------
+    quantum_m : float
+        q; 0 is no effect. [m]
+
+    References
+    ----------
+    .. [1] After B. Widrow, I. Kollár, Quantization Noise, Cambridge University Press.
+    """
+
+    component: ClassVar[Component] = "level_sensor"
+    neutral: ClassVar[dict[str, float]] = {"quantum_m": 0.0}
+
+    name: Literal["level_quantisation"] = "level_quantisation"
+    quantum_m: Annotated[float, limits(0.0, 0.5, "m")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Round the level."""
+        return of_channels(parameters, "quantum", "level_m", self.quantum_m)

@@ -1,0 +1,35 @@
+"""Slip of the motors."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import PlantParameters
+
+
+class MotorSlip(Effect):
+    r"""An asynchronous motor turns slower than its frequency asks for, in proportion to its torque.
+
+    $$N = N_c \left(1 - s\, \frac{M}{M_n}\right)$$
+
+    The torque is that of the second before. Electrical power follows the command.
+
+    Parameters
+    ----------
+    slip : float
+        s, at rated torque M_n; 0 is no effect. [1]
+
+    References
+    ----------
+    .. [1] After A. E. Fitzgerald et al., Electric Machinery: slip of induction machines at small load.
+    """
+
+    component: ClassVar[Component] = "drive"
+    neutral: ClassVar[dict[str, float]] = {"slip": 0.0}
+
+    name: Literal["motor_slip"] = "motor_slip"
+    slip: Annotated[float, limits(0.0, 0.15, "1")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Let the motors slip."""
+        return replace(parameters, slip=parameters.slip + self.slip)

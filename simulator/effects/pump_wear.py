@@ -1,0 +1,45 @@
+"""A worn pump."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+
+from wetwell.simulator.effects.effect import Component, Effect, PumpNumber, limits
+from wetwell.simulator.plant import PlantParameters
+
+
+class PumpWear(Effect):
+    r"""The curve of a worn pump is lower: its impeller gives less head, and water runs back through its wear rings.
+
+    $$H(Q, N) = (1 - w) \left(c_0 N^2 + c_1 N (Q + q N) + c_2 (Q + q N)^2\right)$$
+
+    Parameters
+    ----------
+    head_loss : float
+        w; 0 is none. [1]
+    leak_m3h : float
+        q, leakage at nominal speed; 0 is none. [m³/h]
+    pump : int
+        0 for all.
+
+    References
+    ----------
+    .. [1] After J. F. Gülich, Centrifugal Pumps, Springer: leakage losses at annular seals, effect of wear.
+    """
+
+    component: ClassVar[Component] = "pump"
+    neutral: ClassVar[dict[str, float]] = {"head_loss": 0.0, "leak_m3h": 0.0}
+
+    name: Literal["pump_wear"] = "pump_wear"
+    head_loss: Annotated[float, limits(0.0, 0.6, "1")] = 0.0
+    leak_m3h: Annotated[float, limits(0.0, 60.0, "m³/h")] = 0.0
+    pump: PumpNumber = 0
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Lower the curve and move it to the left."""
+        worn = slice(None) if self.pump == 0 else slice(self.pump - 1, self.pump)
+        curves, q = parameters.curves.copy(), self.leak_m3h
+        c0, c1, c2 = curves[worn].T
+        curves[worn] = (1.0 - self.head_loss) * np.array([c0 + (c1 + c2 * q) * q, c1 + 2.0 * c2 * q, c2]).T
+        return replace(parameters, curves=curves)

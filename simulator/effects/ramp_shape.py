@@ -1,0 +1,42 @@
+"""A ramp that is not linear."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import PlantParameters
+
+
+class RampShape(Effect):
+    r"""The shaft follows its command by another shape, and late.
+
+    $$\tau \frac{dN}{dt} = N_c^p - N, \qquad N_c = f / f_n$$
+
+    The recorded frequency is the command. At nominal speed the shape makes no difference.
+
+    Parameters
+    ----------
+    power : float
+        p; over 1 the ramp starts flat, under 1 steep. [1]
+    lag_s : float
+        τ; 0 is none. [s]
+
+    References
+    ----------
+    .. [1] After B. K. Bose, Modern Power Electronics and AC Drives: ramps and slip of drives in open loop.
+    """
+
+    component: ClassVar[Component] = "drive"
+    neutral: ClassVar[dict[str, float]] = {"power": 1.0, "lag_s": 0.0}
+
+    name: Literal["ramp_shape"] = "ramp_shape"
+    power: Annotated[float, limits(0.2, 5.0, "1")] = 1.0
+    lag_s: Annotated[float, limits(0.0, 15.0, "s")] = 0.0
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Bend the ramp."""
+        return replace(
+            parameters,
+            ramp_power=parameters.ramp_power * self.power,
+            speed_lag_s=parameters.speed_lag_s + self.lag_s,
+        )

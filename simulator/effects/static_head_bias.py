@@ -1,0 +1,33 @@
+"""Static head other than configured."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import PlantParameters
+
+
+class StaticHeadBias(Effect):
+    r"""The receiving water stands higher or lower than the station file says; constant in time.
+
+    $$H = H_s + \Delta H_s + k Q^2$$
+
+    Parameters
+    ----------
+    offset_m : float
+        ΔH_s; 0 is no effect. [m]
+
+    References
+    ----------
+    .. [1] After G. M. Jones et al., Pumping Station Design: static head and its changes.
+    """
+
+    component: ClassVar[Component] = "rising_main"
+    neutral: ClassVar[dict[str, float]] = {"offset_m": 0.0}
+
+    name: Literal["static_head_bias"] = "static_head_bias"
+    offset_m: Annotated[float, limits(-10.0, 20.0, "m")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Shift the static head."""
+        return replace(parameters, static_head_m=parameters.static_head_m + self.offset_m)

@@ -1,0 +1,48 @@
+"""Voltage of the supply."""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import Floats, Forcing
+
+
+class SupplyVoltageVariation(Effect):
+    r"""The voltage of the supply swings over the day, and faster; power follows it.
+
+    $$\frac{U}{U_n} = 1 + a_d \cos\left(2 \pi \frac{t - t_d}{24\,\text{h}}\right)
+    + a_f \sin\left(2 \pi \frac{t}{T_f}\right)$$
+
+    Time counts from the start of the scenario.
+
+    Parameters
+    ----------
+    daily_amplitude : float
+        a_d; 0 is none. [1]
+    daily_phase_h : float
+        t_d, hours from the start to the highest voltage. [h]
+    fast_amplitude : float
+        a_f; 0 is none. [1]
+    fast_period_s : float
+        T_f. [s]
+
+    References
+    ----------
+    .. [1] After EN 50160, Voltage characteristics of electricity supplied by public networks: slow and fast changes.
+    """
+
+    component: ClassVar[Component] = "drive"
+    neutral: ClassVar[dict[str, float]] = {"daily_amplitude": 0.0, "fast_amplitude": 0.0}
+
+    name: Literal["supply_voltage_variation"] = "supply_voltage_variation"
+    daily_amplitude: Annotated[float, limits(0.0, 0.2, "1")] = 0.0
+    daily_phase_h: Annotated[float, limits(0.0, 24.0, "h")] = 0.0
+    fast_amplitude: Annotated[float, limits(0.0, 0.2, "1")] = 0.0
+    fast_period_s: Annotated[float, limits(4.0, 2.0e4, "s")] = 300.0
+
+    def force(self, forcing: Forcing, time_s: Floats) -> None:
+        """Scale the voltage."""
+        daily = np.cos(2.0 * np.pi * (time_s / 3600.0 - self.daily_phase_h) / 24.0)
+        fast = np.sin(2.0 * np.pi * time_s / self.fast_period_s)
+        forcing.voltage_factor[:] *= 1.0 + self.daily_amplitude * daily + self.fast_amplitude * fast
