@@ -10,7 +10,7 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ import pyarrow.parquet
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.stamps import from_iso, to_iso_array
+from wetwell.protocols.whole_file import whole_file
 
 Floats = npt.NDArray[np.float64]
 
@@ -222,34 +223,52 @@ def write_recording(recording: Recording, path: Path) -> None:
     RecordingError
         If the file cannot be written or its ending is not one of `SUFFIXES`.
     """
+    with recording_writer(path) as write:
+        write(recording)
+
+
+@contextlib.contextmanager
+def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
+    """Write a recording block by block; the file appears whole at the end of the `with`, or not at all.
+
+    All blocks have the columns of the first. A block of Parquet is at least one row group.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be written or its ending is not one of `SUFFIXES`.
+    """
     suffix = _suffix(path)
-    time: Any = recording.time_ns
-    time = pa.array(time, pa.timestamp("ns", tz="UTC")) if suffix == ".parquet" else to_iso_array(time)
-    table = pa.table({"time": time, **recording.columns, **recording.truth})
-    partial = path.with_name(f".{path.name}.part")
     try:
-        with partial.open("wb") as file:
-            _write_table(table, file, suffix)
-        partial.replace(path)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
+        with whole_file(path) as file, contextlib.ExitStack() as stack:
+            write = _block_writer(file, suffix, stack)
+            yield lambda block: write(_table(block, suffix))
     except pa.ArrowException as error:
         raise RecordingError(f"{path}: cannot be written: {error}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink()
 
 
-def _write_table(table: pa.Table, file: io.BufferedIOBase, suffix: str) -> None:
-    if suffix == ".parquet":
-        pa.parquet.write_table(table, file, compression="zstd")
-    elif suffix == ".csv":
-        _write_csv(table, file)
-    else:
-        with gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0) as packed:
-            _write_csv(table, packed)
+def _table(recording: Recording, suffix: str) -> pa.Table:
+    time: Any = recording.time_ns
+    time = pa.array(time, pa.timestamp("ns", tz="UTC")) if suffix == ".parquet" else to_iso_array(time)
+    return pa.table({"time": time, **recording.columns, **recording.truth})
 
 
-def _write_csv(table: pa.Table, file: io.BufferedIOBase) -> None:
-    file.write(",".join(table.column_names).encode() + b"\n")
-    pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))
+def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitStack) -> Callable[[pa.Table], None]:
+    if suffix == ".csv.gz":
+        file = stack.enter_context(gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0))
+    parquet: Any = None
+    is_begun = False
+
+    def write(table: pa.Table) -> None:
+        nonlocal parquet, is_begun
+        if suffix == ".parquet":
+            if not is_begun:
+                parquet = stack.enter_context(pa.parquet.ParquetWriter(file, table.schema, compression="zstd"))
+            parquet.write_table(table)
+        else:
+            if not is_begun:
+                file.write(",".join(table.column_names).encode() + b"\n")
+            pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))
+        is_begun = True
+
+    return write

@@ -1,39 +1,51 @@
 """Batch work: a simulated recording, verdicts on a recording."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress, track
 
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages import Verdict
-from wetwell.protocols.recording import Recording, write_recording
+from wetwell.protocols.recording import Recording, recording_writer
 from wetwell.protocols.station import Station
+from wetwell.protocols.whole_file import whole_file
 from wetwell.simulator.simulation import Simulation
 
-CHUNK_S = 21_600
+CHUNK_S = 86_400
+"""Seconds that are simulated and written at once; bounds the memory, whatever the length of the recording."""
 
 
-def simulate(simulation: Simulation, seconds: int, out: Path) -> Recording:
-    """Simulate and write a recording with truth columns, with a progress bar on standard error."""
-    parts = []
+def simulate(simulation: Simulation, seconds: int, out: Path) -> int:
+    """Simulate and write a recording with truth columns, with a progress bar on standard error.
+
+    Returns
+    -------
+    rows : int
+        Rows of the recording, one a second.
+    """
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("simulating", total=seconds)
+        return write_simulated(simulation, seconds, out, lambda done: progress.update(task, completed=done))
+
+
+def write_simulated(
+    simulation: Simulation, seconds: int, out: Path, tell: Callable[[int], None] = lambda _: None
+) -> int:
+    """Simulate and write a recording with truth columns block by block; `tell` hears the seconds done.
+
+    Returns
+    -------
+    rows : int
+    """
+    with recording_writer(out) as write:
         while (left := seconds - simulation.seconds) > 0:
-            parts.append(simulation.advance(min(CHUNK_S, left)))
-            progress.update(task, completed=simulation.seconds)
-    recording = Recording(
-        time_ns=np.concatenate([part.time_ns for part in parts]),
-        columns={name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},
-        truth={name: np.concatenate([part.truth[name] for part in parts]) for name in parts[0].truth},
-    )
-    write_recording(recording, out)
-    return recording
+            write(simulation.advance(min(CHUNK_S, left)))
+            tell(simulation.seconds)
+    return seconds
 
 
 def detect(station: Station, recording: Recording, out: Path) -> dict[str, object]:
@@ -53,17 +65,10 @@ def detect(station: Station, recording: Recording, out: Path) -> dict[str, objec
     """
     detector = Detector(station.name, nominal_of(station))
     states: Counter[str] = Counter()
-    partial = out.with_name(f".{out.name}.part")
-    try:
-        with partial.open("wb") as file:
-            for verdict in _verdicts(detector, station, recording):
-                states[verdict.state] += 1
-                file.write(verdict.encode() + b"\n")
-        partial.replace(out)
-    except OSError as error:
-        raise RecordingError(f"{out}: cannot be written: {error.strerror or error}") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_file(out) as file:
+        for verdict in _verdicts(detector, station, recording):
+            states[verdict.state] += 1
+            file.write(verdict.encode() + b"\n")
     return {"verdicts": dict(states), "counts": detector.counts}
 
 

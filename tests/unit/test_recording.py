@@ -256,11 +256,11 @@ def test_missing_file_and_folder(tmp_path, suffix):
 
 @every_suffix
 def test_a_disk_that_fails_half_way_leaves_nothing(tmp_path, monkeypatch, suffix):
-    def half(table, file, *_rest):  # noqa: ARG001 - the arguments are the writer's
+    def half(file, *_rest):
         file.write(b"half of it")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(recording_module, "_write_table", half)
+    monkeypatch.setattr(recording_module, "_block_writer", half)
     with pytest.raises(RecordingError, match="cannot be written: No space left on device"):
         write_recording(small_recording(), tmp_path / f"r{suffix}")
     assert list(tmp_path.iterdir()) == []
@@ -275,11 +275,11 @@ def test_a_failed_write_keeps_the_file_that_was_there(tmp_path, monkeypatch, suf
     write_recording(small_recording(), path)
     before = path.read_bytes()
 
-    def half(table, file, *_rest):  # noqa: ARG001 - the arguments are the writer's
+    def half(file, *_rest):
         file.write(b"half of it")
         raise fault
 
-    monkeypatch.setattr(recording_module, "_write_table", half)
+    monkeypatch.setattr(recording_module, "_block_writer", half)
     with pytest.raises((RecordingError, KeyboardInterrupt)):
         write_recording(small_recording(), path)
     assert path.read_bytes() == before

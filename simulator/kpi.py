@@ -1,0 +1,223 @@
+r"""Energy, starts, run time and volume of a recording: the one place where these figures come from.
+
+A row holds until the next one. An interval longer than `max_gap_s` is a gap: it counts no energy, run time or volume;
+nor does the last row, as nobody knows how long it held. So the figures of two parts of a recording that share the row
+at which it was cut add up to those of the whole.
+
+$$E = \sum_i P_i\, \Delta t_i, \qquad V = \sum_i Q_i\, \Delta t_i, \qquad e = E / V$$
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.recording import Recording
+from wetwell.protocols.stamps import NS_PER_S
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+MIN_GAP_S = 10.0
+GAP_STEPS = 3.0
+"""Without `max_gap_s`, an interval of more than so many usual ones, and of more than `MIN_GAP_S`, is a gap."""
+
+_HOUR_S = 3600
+_DAY_S = 86_400
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kpis:
+    """Figures of a recording; hours and days are those of UTC, without a break from the first to the last.
+
+    A figure is NaN where the recording has not one value to make it from.
+
+    Attributes
+    ----------
+    hour_ns : (hours,) int64
+        Beginning of each hour since 1970. [ns]
+    day_ns : (days,) int64
+        Beginning of each day since 1970. [ns]
+    hourly_energy_kwh : (pumps, hours) array
+        [kWh]
+    daily_energy_kwh : (pumps, days) array
+        [kWh]
+    daily_volume_m3 : (pumps, days) array
+        Pumped volume, from the measured flow. [m³]
+    daily_run_h : (pumps, days) array
+        Run time. [h]
+    daily_starts : (pumps, days) int64
+        Starts; a pump that runs in the first row has not started.
+    daily_known_h : (days,) array
+        Time outside of gaps. [h]
+    """
+
+    hour_ns: Integers
+    day_ns: Integers
+    hourly_energy_kwh: Floats
+    daily_energy_kwh: Floats
+    daily_volume_m3: Floats
+    daily_run_h: Floats
+    daily_starts: Integers
+    daily_known_h: Floats
+
+    @property
+    def station_hourly_energy_kwh(self) -> Floats:
+        """(hours,) energy of all pumps. [kWh]."""
+        return np.asarray(self.hourly_energy_kwh.sum(axis=0))
+
+    @property
+    def cumulative_energy_kwh(self) -> Floats:
+        """(pumps, hours) energy since the beginning, at the end of each hour. [kWh]."""
+        return np.cumsum(self.hourly_energy_kwh, axis=1)
+
+    @property
+    def energy_kwh(self) -> Floats:
+        """(pumps,) energy. [kWh]."""
+        return np.asarray(self.daily_energy_kwh.sum(axis=1))
+
+    @property
+    def volume_m3(self) -> Floats:
+        """(pumps,) pumped volume. [m³]."""
+        return np.asarray(self.daily_volume_m3.sum(axis=1))
+
+    @property
+    def run_h(self) -> Floats:
+        """(pumps,) run time. [h]."""
+        return np.asarray(self.daily_run_h.sum(axis=1))
+
+    @property
+    def starts(self) -> Integers:
+        """(pumps,) starts."""
+        return np.asarray(self.daily_starts.sum(axis=1))
+
+    @property
+    def specific_energy_kwh_m3(self) -> Floats:
+        """(pumps,) energy for each pumped cubic metre; NaN where nothing was pumped. [kWh/m³]."""
+        return _ratio(self.energy_kwh, self.volume_m3)
+
+    @property
+    def station_specific_energy_kwh_m3(self) -> float:
+        """Energy of all pumps for each pumped cubic metre; NaN where nothing was pumped. [kWh/m³]."""
+        return float(_ratio(self.energy_kwh.sum(keepdims=True), self.volume_m3.sum(keepdims=True))[0])
+
+    @property
+    def duty_share(self) -> Floats:
+        """(pumps,) share of each pump in the run time of all, 0..1; NaN where none ran."""
+        return _ratio(self.run_h, np.full(self.run_h.size, self.run_h.sum()))
+
+
+def kpis(recording: Recording, max_gap_s: float | None = None) -> Kpis:
+    """Figures of a recording.
+
+    Rows may be late, doubled, missing or out of order: they are put in the order of their stamps, and the first of
+    those with the same stamp counts. A negative power or flow counts as none. A pump runs where its flag says so;
+    without flag, where its frequency is above zero; without both, it does not run, and keeps its state for the count
+    of starts.
+
+    Parameters
+    ----------
+    recording : Recording
+    max_gap_s : float, optional
+        Longest interval that is no gap, > 0. Default: `GAP_STEPS` times the median interval, at least
+        `MIN_GAP_S`. [s]
+
+    Returns
+    -------
+    kpis : Kpis
+
+    Raises
+    ------
+    ValueError
+        If `max_gap_s` is not positive.
+
+    Examples
+    --------
+    >>> def column(value):
+    ...     return np.full(3601, value)
+    >>> hour = Recording(
+    ...     time_ns=NS_PER_S * np.arange(3601),
+    ...     columns={"pump1_power_kw": column(9.0), "pump1_flow_m3h": column(180.0), "pump1_running": column(1.0)})
+    >>> figures = kpis(hour)
+    >>> figures.energy_kwh.round(6), figures.volume_m3.round(6), figures.run_h.round(6), figures.starts
+    (array([9.]), array([180.]), array([1.]), array([0]))
+    >>> round(figures.station_specific_energy_kwh_m3, 6)
+    0.05
+    """
+    if max_gap_s is not None and not max_gap_s > 0.0:
+        raise ValueError(f"max_gap_s must be positive, got {max_gap_s:g}")
+    stamps_ns, order = np.unique(recording.time_ns, return_index=True)
+    interval_ns = np.diff(stamps_ns, append=stamps_ns[-1:])
+    if max_gap_s is None:
+        usual_s = float(np.median(interval_ns[:-1])) / NS_PER_S if interval_ns.size > 1 else 0.0
+        max_gap_s = max(MIN_GAP_S, GAP_STEPS * usual_s)
+    held_ns = np.where(interval_ns <= max_gap_s * NS_PER_S, interval_ns, 0)
+    hour_ns, day_ns = _beginnings_ns(stamps_ns, _HOUR_S), _beginnings_ns(stamps_ns, _DAY_S)
+    hourly_kwh, daily_kwh, daily_m3, daily_h, daily_starts = [], [], [], [], []
+    for pump in range(1, recording.pumps + 1):
+        power_kw = recording.column(f"pump{pump}_power_kw")[order]
+        flow_m3h = recording.column(f"pump{pump}_flow_m3h")[order]
+        running = _running(recording, pump)[order]
+        hourly_kwh.append(_sums(power_kw, held_ns, stamps_ns, hour_ns, _HOUR_S))
+        daily_kwh.append(_sums(power_kw, held_ns, stamps_ns, day_ns, _DAY_S))
+        daily_m3.append(_sums(flow_m3h, held_ns, stamps_ns, day_ns, _DAY_S))
+        daily_h.append(_sums(running, held_ns, stamps_ns, day_ns, _DAY_S))
+        started_ns = stamps_ns[_starts(running)]
+        daily_starts.append(np.bincount((started_ns - day_ns[:1]) // (_DAY_S * NS_PER_S), minlength=day_ns.size))
+    pumps = recording.pumps
+    return Kpis(
+        hour_ns=hour_ns,
+        day_ns=day_ns,
+        hourly_energy_kwh=np.reshape(hourly_kwh, (pumps, hour_ns.size)),
+        daily_energy_kwh=np.reshape(daily_kwh, (pumps, day_ns.size)),
+        daily_volume_m3=np.reshape(daily_m3, (pumps, day_ns.size)),
+        daily_run_h=np.reshape(daily_h, (pumps, day_ns.size)),
+        daily_starts=np.reshape(np.array(daily_starts, dtype=np.int64), (pumps, day_ns.size)),
+        daily_known_h=_sums(np.ones(stamps_ns.size), held_ns, stamps_ns, day_ns, _DAY_S),
+    )
+
+
+def _ratio(amount: Floats, by: Floats) -> Floats:
+    known = by > 0.0
+    return np.where(known, amount / np.where(known, by, 1.0), np.nan)
+
+
+def _beginnings_ns(stamps_ns: Integers, period_s: int) -> Integers:
+    """Beginnings of the periods from that of the first stamp to that of the last."""
+    if stamps_ns.size == 0:
+        return np.empty(0, dtype=np.int64)
+    period_ns = period_s * NS_PER_S
+    return np.arange(stamps_ns[0] // period_ns, stamps_ns[-1] // period_ns + 1, dtype=np.int64) * period_ns
+
+
+def _running(recording: Recording, pump: int) -> Floats:
+    """1 running, 0 standing, NaN unknown."""
+    flag, frequency_hz = recording.column(f"pump{pump}_running"), recording.column(f"pump{pump}_frequency_hz")
+    state = np.where(np.isnan(flag), frequency_hz, flag)
+    return np.where(np.isnan(state), np.nan, state > 0.0)
+
+
+def _starts(running: Floats) -> npt.NDArray[np.int64]:
+    """Rows in which a pump is first seen to run after it was last seen to stand."""
+    known = np.flatnonzero(~np.isnan(running))
+    return known[1:][np.diff(running[known]) > 0.0]
+
+
+def _sums(rate_per_h: Floats, held_ns: Integers, stamps_ns: Integers, begin_ns: Integers, period_s: int) -> Floats:
+    """Integral of a rate over each period; an interval across a boundary is shared in proportion to time."""
+    known = np.isfinite(rate_per_h)
+    if not known.any():
+        return np.full(begin_ns.size, np.nan)
+    rate_per_ns = np.where(known, np.maximum(rate_per_h, 0.0), 0.0) / (3600.0 * NS_PER_S)
+    period_ns = period_s * NS_PER_S
+    since_ns = stamps_ns - begin_ns[0]
+    crosses = since_ns // period_ns != (since_ns + held_ns) // period_ns
+    whole = np.where(crosses, 0.0, rate_per_ns * held_ns)
+    sums: Floats = np.bincount(since_ns // period_ns, whole, minlength=begin_ns.size).astype(np.float64)
+    for row in np.flatnonzero(crosses):
+        at_ns, end_ns = int(since_ns[row]), int(since_ns[row] + held_ns[row])
+        while at_ns < end_ns:
+            next_ns = min((at_ns // period_ns + 1) * period_ns, end_ns)
+            sums[at_ns // period_ns] += rate_per_ns[row] * (next_ns - at_ns)
+            at_ns = next_ns
+    return sums
