@@ -46,6 +46,10 @@ ModbusOption = Annotated[
 WordOrderOption = Annotated[
     Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
 ]
+RecordingOption = Annotated[Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.")]
+PreparationOption = Annotated[
+    Path | None, typer.Option("--preparation", metavar="FILE", help="TOML file: scale, offset, max_gap_s.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -179,8 +183,8 @@ def simulate(
 
     plant = _plant(station, find_scenario(scenario), seed, DEFAULT_START_NS)
     length_s = plant.scenario.duration_s if days is None else _positive(days, "--days") * 86_400.0
-    recording = write(plant, max(round(length_s), 1), out)
-    summary = {"recording": str(out), "rows": len(recording), "station": plant.station.name, "seed": seed}
+    rows = write(plant, max(round(length_s), 1), out)
+    summary = {"recording": str(out), "rows": rows, "station": plant.station.name, "seed": seed}
     _print(summary, as_json=as_json)
 
 
@@ -204,6 +208,51 @@ def detect(
 
 
 @app.command()
+def prepare(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    preparation: PreparationOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Prepare a recording from the field: units, offsets, order, doubles; list its gaps."""
+    from wetwell.services.field_data import prepare_file
+
+    _print(prepare_file(recording, preparation, out), as_json=as_json)
+
+
+@app.command()
+def calibrate(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Station file that is written.")],
+    station: StationOption = "alpha",
+    preparation: PreparationOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a station file to a recording, with intervals; says what the recording cannot tell."""
+    from wetwell.services.field_data import calibrate_file
+    from wetwell.services.presets import find_station
+
+    _print(calibrate_file(find_station(station), recording, preparation, out), as_json=as_json)
+
+
+@app.command()
+def validate(
+    recording: RecordingOption,
+    station: StationOption = "alpha",
+    preparation: PreparationOption = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Simulated recording that is written.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run the simulator under the inflow of a recording and compare level, starts and run time."""
+    from wetwell.services.field_data import validate_file
+    from wetwell.services.presets import find_station
+
+    _print(validate_file(find_station(station), recording, preparation, out), as_json=as_json)
+
+
+@app.command()
 def convert(
     source: Annotated[Path, typer.Argument(help="File in a foreign form.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
@@ -219,6 +268,16 @@ def convert(
     _print({"recording": str(out), "rows": len(recording), "columns": sorted(recording.columns)}, as_json=as_json)
 
 
+@app.command()
+def kpi(recording: RecordingOption, as_json: JsonOption = False) -> None:
+    """Print energy, starts, run time and volume of a recording, by day and in total."""
+    from wetwell.protocols.recording import read_recording
+    from wetwell.services.terminal import kpi_table
+    from wetwell.simulator.kpi import kpis
+
+    _print(kpi_table(kpis(read_recording(recording)), with_hours=as_json), as_json=as_json)
+
+
 @app.command("modbus-map")
 def modbus_map(
     station: StationOption = "alpha",
@@ -230,6 +289,19 @@ def modbus_map(
 
     plant = find_station(station)
     typer.echo(register_csv(register_table(len(plant.pump), len(plant.control.start_levels_m))), nl=False)
+
+
+@app.command()
+def effects(*, as_json: JsonOption = False) -> None:
+    """List the effects that a station file may name, with their parameters."""
+    from wetwell.services.terminal import effect_lines
+    from wetwell.simulator.effects import effect_table
+
+    table = effect_table()
+    if as_json:
+        _print({"effects": table}, as_json=True)
+    else:
+        typer.echo(effect_lines(table))
 
 
 @station_app.command("check")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from wetwell.services.cli import main
+from wetwell.simulator.effects import EFFECTS
 
 STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-4]}]\n'
 
@@ -33,7 +34,12 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
         ),
         (
             ["simulate", "--out", "{tmp}/x.csv", "--station", "{effect}"],
-            "station 's': effect: got 'air_pocket', no effect is known to this version",
+            "{effect}: station 's': effect[1]: input tag 'worn_valve' found using 'name'",
+        ),
+        (["station", "check", "{effect}"], "{effect}: station 's': effect[1]: input tag 'worn_valve'"),
+        (
+            ["station", "check", "{levels}"],
+            "{levels}: station 's': effect[1]: threshold_shift: with start_m = -1.2, stop_m = 0: stop_levels_m[1]",
         ),
         (["detect", "--recording", "{tmp}/no.csv", "--out", "{tmp}/v"], "{tmp}/no.csv: cannot be read: No such file"),
         (["detect", "--recording", "{bad}", "--out", "{tmp}/v"], "{bad}: column 'pump1_flow_m3h', row 2: CSV conv"),
@@ -53,7 +59,8 @@ def test_an_error_is_one_line(
 ) -> None:
     files = {
         "station": STATION.replace("8.0", "-8.0"),
-        "effect": STATION + '[[effect]]\nname = "air_pocket"\n',
+        "effect": STATION + '[[effect]]\nname = "worn_valve"\n',
+        "levels": STATION + '[[effect]]\nname = "threshold_shift"\nstart_m = -1.2\n',
         "scenario": 'name = "wrong"\n[[fault]]\nkind = "blockage"\npump = 9\nstart_s = 1\nend_s = 2\n',
         "bad": "time,pump1_flow_m3h\n2025-01-01,1\n2025-01-01,abc\n",
         "settings": "[modbus]\nprot = 1\n",
@@ -96,6 +103,18 @@ def test_modbus_map_is_csv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     head, *rows = capsys.readouterr().out.splitlines()
     assert head == "name,table,address,count,type,unit,access,description"
     assert any(row.startswith("pump3_head_m,input,") for row in rows)
+
+
+def test_effects_lists_the_registry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(monkeypatch, "effects", "--json") == 0
+    rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)["effects"]}
+    assert list(rows) == list(EFFECTS)
+    assert rows["motor_slip"]["component"] == "drive"
+    assert rows["motor_slip"]["parameters"] == [
+        {"name": "slip", "unit": "1", "low": 0.0, "high": 0.15, "neutral": 0.0}
+    ]
+    assert run(monkeypatch, "effects") == 0
+    assert "motor_slip (drive)\n  An asynchronous motor" in capsys.readouterr().out
 
 
 def test_station_show_gives_the_duty_points(
