@@ -9,19 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.simulator import layout as at
-from wetwell.simulator.channels import FLOW, FREQUENCY, HEAD, INFLOW, LEVEL, POWER, pump_channel
-from wetwell.simulator.control import (
-    NOTHING,
-    SECONDS_PER_HOUR,
-    controlled_frequency_hz,
-    next_in_rotation,
-    wanted_change,
-)
-from wetwell.simulator.drive import next_frequency_hz, turned_ratio
+from wetwell.simulator.channels import FIRST_PUMP, INFLOW, LEVEL
+from wetwell.simulator.drive import turned_ratio
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
 from wetwell.simulator.jit import compiled
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
-from wetwell.simulator.sensors import delayed, sense, transmit
+from wetwell.simulator.sensors import delayed, sense
+from wetwell.simulator.supervision import drive, supervise
+from wetwell.simulator.telemetry import is_plain_telemetry, read_pumps, send, silence
 from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h
 
 Floats = npt.NDArray[np.float64]
@@ -62,19 +57,27 @@ def advance(
     command at second t shows as a frequency from second t + 1 on. Flows and heads are means over the second, which
     is the same as their value at its beginning where the water has no inertia.
 
+    `measured` and `pump_truth` are to come as zeros: a pump that stands leaves them so, and while all pumps stand and
+    no water moves nothing is computed for them. Most seconds of most stations are of this kind.
+
     The noise is drawn in a fixed order (level, inflow, then flow, head and power of each active pump), so that
     blocks of any length give the same numbers.
     """
     is_sensor_forced = sensor_force.shape[2] > 1
-    is_idle_quiet = not is_sensor_forced and _is_plain(sensor)
+    is_plain = not is_sensor_forced and is_plain_telemetry(sensor)
+    is_silent = False
     for second in range(station_force.shape[1]):
         level_m = level_at_volume_m(station_state[at.VOLUME], profile)
-        _turn_pumps(pump, pump_state, pump_force, second, station[at.RAMP_POWER], station[at.SPEED_LAG], curves)
         static_head_m = station[at.STATIC_HEAD] - station[at.LIFT_SLOPE] * (level_m - station[at.LIFT_REFERENCE])
         static_head_m += station_state[at.AIR] + station_force[at.STATIC_RISE, second]
         static_head_m = max(static_head_m, 0.0)
         friction_h2_m5 = station[at.FRICTION] * station_force[at.FRICTION_FACTOR, second]
-        _move_water(station, station_state, pump_state, curves, static_head_m, friction_h2_m5)
+        is_moving = _is_moving(pump_state)
+        if is_moving:
+            _turn_pumps(station, pump, pump_state, pump_force, second, curves)
+            _move_water(station, pump_state, curves, static_head_m, friction_h2_m5)
+        if station[at.AIR_HEAD] > 0.0:
+            _gather_air(station, station_state, pump_state)
         over_m3h = overflow_m3h(level_m, station[at.OVERFLOW_LEVEL], station[at.WEIR_WIDTH], profile)
         inflow_m3h = station_force[at.INFLOW_FORCE, second]
         back_m3h = _back_flow_m3h(station, pump, pump_state, pump_force, second, static_head_m, friction_h2_m5)
@@ -84,39 +87,45 @@ def advance(
             over_m3h,
             pump_state[at.MEAN_FLOW],
         )
-        _load_pumps(station, pump, pump_state, station_force[at.VOLTAGE_FACTOR, second], curves, second, pump_truth)
+        if is_moving:
+            voltage_factor = station_force[at.VOLTAGE_FACTOR, second]
+            _load_pumps(station, pump, pump_state, voltage_factor, curves, second, pump_truth)
         station_truth[at.TRUE_LEVEL, second] = level_m
         station_truth[at.TRUE_OVERFLOW, second] = over_m3h
 
         is_frozen = station_force[at.IS_PLC_FROZEN, second] > 0.0
         at_force = second if is_sensor_forced else 0
+        now_s = counters[at.SECOND]
         seen_level_m = sense(LEVEL, level_m, True, sensor, channel_state, sensor_force, at_force, rng)
-        _send(LEVEL, seen_level_m, is_frozen, counters[at.SECOND], sensor, channel_state, past, measured, second)
+        send(LEVEL, seen_level_m, is_frozen, now_s, sensor, channel_state, past, measured, second)
         reading = sense(INFLOW, inflow_m3h, True, sensor, channel_state, sensor_force, at_force, rng)
-        _send(INFLOW, reading, is_frozen, counters[at.SECOND], sensor, channel_state, past, measured, second)
-        for i in range(pump.shape[1]):
-            frequency_hz = pump_state[at.FREQUENCY_NOW, i]
-            is_active = frequency_hz > 0.0 or pump_state[at.MEAN_FLOW, i] > 0.0
-            channel = pump_channel(FREQUENCY, i)
-            if is_idle_quiet and not is_active and not is_frozen:
-                for k in range(channel, channel + 4):
-                    measured[k, second] = 0.0
-                    channel_state[at.LAST_READING, k] = 0.0
-                    channel_state[at.LAST_SENT, k] = 0.0
-                continue
-            _send(
-                channel, frequency_hz, is_frozen, counters[at.SECOND], sensor, channel_state, past, measured, second
+        send(INFLOW, reading, is_frozen, now_s, sensor, channel_state, past, measured, second)
+        may_rest = is_plain and not is_frozen
+        if is_moving or not may_rest:
+            read_pumps(
+                pump_state,
+                pump_truth,
+                is_frozen,
+                may_rest,
+                now_s,
+                sensor,
+                channel_state,
+                past,
+                sensor_force,
+                at_force,
+                rng,
+                measured,
+                second,
             )
-            for quantity, row in ((FLOW, at.TRUE_FLOW), (HEAD, at.TRUE_HEAD), (POWER, at.TRUE_POWER)):
-                channel = pump_channel(quantity, i)
-                value = pump_truth[row, i, second]
-                reading = sense(channel, value, is_active, sensor, channel_state, sensor_force, at_force, rng)
-                _send(channel, reading, is_frozen, counters[at.SECOND], sensor, channel_state, past, measured, second)
+            is_silent = False
+        elif not is_silent:
+            silence(channel_state, FIRST_PUMP, channel_state.shape[1])
+            is_silent = True
 
         if not is_frozen:
             if station[at.CONTROL_DELAY] > 0.0:
-                seen_level_m = delayed(level_history, seen_level_m, counters[at.SECOND], station[at.CONTROL_DELAY])
-            _supervise(
+                seen_level_m = delayed(level_history, seen_level_m, now_s, station[at.CONTROL_DELAY])
+            supervise(
                 station,
                 pump,
                 levels,
@@ -129,33 +138,32 @@ def advance(
                 counters,
                 seen_level_m,
             )
-        _drive(station, pump, pump_state, pump_force, second, station_state[at.WANTED_FREQUENCY])
+        drive(station, pump, pump_state, pump_force, second, station_state[at.WANTED_FREQUENCY])
         counters[at.SECOND] += 1
 
 
 @compiled
-def _is_plain(sensor: Floats) -> bool:
-    """Whether an idle pump's channels just read 0: nothing damped, delayed or held."""
-    for k in range(sensor.shape[1]):
-        if sensor[at.LAG, k] > 0.0 or sensor[at.DELAY, k] > 0.0 or sensor[at.DEADBAND, k] > 0.0:
-            return False
-    return True
+def _is_moving(pump_state: Floats) -> bool:
+    """Whether any pump is driven, turns, or has water moving in it, now or in the second before."""
+    for i in range(pump_state.shape[1]):
+        if (
+            pump_state[at.FREQUENCY_NOW, i] > 0.0
+            or pump_state[at.SHAFT_RATIO, i] > 0.0
+            or pump_state[at.FLOW_NOW, i] > 0.0
+            or pump_state[at.MEAN_FLOW, i] > 0.0
+        ):
+            return True
+    return False
 
 
 @compiled
 def _turn_pumps(
-    pump: Floats,
-    pump_state: Floats,
-    pump_force: Floats,
-    second: int,
-    ramp_power: float,
-    speed_lag_s: float,
-    curves: Floats,
+    station: Floats, pump: Floats, pump_state: Floats, pump_force: Floats, second: int, curves: Floats
 ) -> None:
     """Set the curve of each pump, and the speed that the water sees: command, ramp, slip, ragging, blockage."""
     for i in range(pump.shape[1]):
         commanded = pump_state[at.FREQUENCY_NOW, i] / pump[at.NOMINAL_FREQUENCY, i]
-        turned = turned_ratio(commanded, pump_state[at.SHAFT_RATIO, i], ramp_power, speed_lag_s)
+        turned = turned_ratio(commanded, pump_state[at.SHAFT_RATIO, i], station[at.RAMP_POWER], station[at.SPEED_LAG])
         pump_state[at.SHAFT_RATIO, i] = turned
         if turned <= 0.0:
             pump_state[at.SPEED_RATIO, i] = 0.0
@@ -176,20 +184,14 @@ def _turn_pumps(
 
 @compiled
 def _move_water(
-    station: Floats,
-    station_state: Floats,
-    pump_state: Floats,
-    curves: Floats,
-    static_head_m: float,
-    friction_h2_m5: float,
+    station: Floats, pump_state: Floats, curves: Floats, static_head_m: float, friction_h2_m5: float
 ) -> None:
-    """Set the flows after the second and their means over it; let the air at high points grow or be purged."""
+    """Set the flows after the second and their means over it."""
     inertia_m_m3h = station[at.INERTIA] / 3600.0 * INERTIA_STEPS
     steps = INERTIA_STEPS if inertia_m_m3h > 0.0 else 1
     speed_ratio = pump_state[at.SPEED_RATIO]
     flow_m3h = pump_state[at.FLOW_NOW]
     mean_m3h = pump_state[at.MEAN_FLOW]
-    total_m3h = 0.0
     for i in range(mean_m3h.size):
         mean_m3h[i] = 0.0
     for _ in range(steps):
@@ -205,12 +207,16 @@ def _move_water(
             individual_flows(curves, speed_ratio, static_head_m, friction_h2_m5, inertia_m_m3h, flow_m3h)
         for i in range(mean_m3h.size):
             mean_m3h[i] += flow_m3h[i] / steps
-            total_m3h += flow_m3h[i]
-    if station[at.AIR_HEAD] > 0.0:
-        if total_m3h > 0.0:
+
+
+@compiled
+def _gather_air(station: Floats, station_state: Floats, pump_state: Floats) -> None:
+    """Let the air at high points grow while no water moves, and be purged while some does."""
+    for i in range(pump_state.shape[1]):
+        if pump_state[at.MEAN_FLOW, i] > 0.0:
             station_state[at.AIR] -= station_state[at.AIR] / station[at.AIR_PURGE]
-        else:
-            station_state[at.AIR] += (station[at.AIR_HEAD] - station_state[at.AIR]) / station[at.AIR_GROWTH]
+            return
+    station_state[at.AIR] += (station[at.AIR_HEAD] - station_state[at.AIR]) / station[at.AIR_GROWTH]
 
 
 @compiled
@@ -252,11 +258,12 @@ def _load_pumps(
     for i in range(pump.shape[1]):
         flow_m3h = pump_state[at.MEAN_FLOW, i]
         shaft_ratio = pump_state[at.SHAFT_RATIO, i]
+        if shaft_ratio <= 0.0 and flow_m3h <= 0.0:
+            continue
         head_m = 0.0
         power_kw = 0.0
         if shaft_ratio > 0.0:  # a standing pump reads 0, also while the water still moves through it
             head_m = pump_head_m(curves[i, 0], curves[i, 1], curves[i, 2], pump_state[at.SPEED_RATIO, i], flow_m3h)
-        if shaft_ratio > 0.0:
             rated_shaft_kw = pump[at.RATED_HYDRAULIC, i] / station[at.PUMP_EFFICIENCY]
             shaft_kw = shaft_power_kw(
                 shaft_ratio, flow_m3h, pump[at.RATED_FLOW, i], rated_shaft_kw, station[at.SHUTOFF_POWER_SHARE]
@@ -278,141 +285,3 @@ def _load_pumps(
         pump_truth[at.TRUE_FLOW, i, second] = flow_m3h
         pump_truth[at.TRUE_HEAD, i, second] = head_m
         pump_truth[at.TRUE_POWER, i, second] = power_kw
-
-
-@compiled
-def _send(
-    channel: int,
-    reading: float,
-    is_frozen: bool,
-    now_s: int,
-    sensor: Floats,
-    channel_state: Floats,
-    past: Floats,
-    measured: Floats,
-    second: int,
-) -> None:
-    """Record the telemetry of a reading; a frozen PLC repeats what it has sent last."""
-    if not is_frozen or math.isnan(channel_state[at.LAST_SENT, channel]):
-        transmit(channel, reading, now_s, sensor, channel_state, past)
-    measured[channel, second] = channel_state[at.LAST_SENT, channel]
-
-
-@compiled
-def _supervise(
-    station: Floats,
-    pump: Floats,
-    levels: Floats,
-    station_state: Floats,
-    pump_state: Floats,
-    pump_force: Floats,
-    second: int,
-    started: Integers,
-    recent_starts: Integers,
-    counters: Integers,
-    level_m: float,
-) -> None:
-    """Let the controller command at most one start or stop; pumps that are off or tripped are released first."""
-    running = 0
-    for k in range(counters[at.RUNNING]):
-        i = started[k]
-        if pump[at.IS_AUTOMATIC, i] > 0.0 and pump_force[at.IS_TRIPPED, i, second] <= 0.0:
-            started[running] = i
-            running += 1
-        else:
-            pump_state[at.IS_COMMANDED, i] = 0.0
-            pump_state[at.DWELL_LEFT, i] = station[at.DWELL]
-    change = wanted_change(level_m, running, levels[at.START_LEVEL], levels[at.STOP_LEVEL])
-    if change > 0:
-        i = _next_pump(station, pump, pump_state, pump_force, second, recent_starts, counters)
-        if i != NOTHING:
-            pump_state[at.IS_COMMANDED, i] = 1.0
-            started[running] = i
-            running += 1
-            counters[at.TURN] = (i + 1) % pump.shape[1]
-    elif change < 0:
-        running -= 1
-        pump_state[at.IS_COMMANDED, started[running]] = 0.0
-        pump_state[at.DWELL_LEFT, started[running]] = station[at.DWELL]
-    counters[at.RUNNING] = running
-    if station[at.IS_PID] > 0.0:
-        _control_level(station, pump, station_state, running, started, level_m)
-
-
-@compiled
-def _next_pump(
-    station: Floats,
-    pump: Floats,
-    pump_state: Floats,
-    pump_force: Floats,
-    second: int,
-    recent_starts: Integers,
-    counters: Integers,
-) -> int:
-    """Pump that starts next, its start noted; -1 if none may."""
-    pumps = pump.shape[1]
-    limit = int(station[at.STARTS_PER_HOUR])
-    for i in range(pumps):
-        pump_state[at.IS_READY, i] = (
-            pump[at.IS_AUTOMATIC, i] > 0.0
-            and pump_force[at.IS_TRIPPED, i, second] <= 0.0
-            and pump_state[at.IS_COMMANDED, i] <= 0.0
-            and (limit == 0 or counters[at.SECOND] - recent_starts[i, limit - 1] >= SECONDS_PER_HOUR)
-        )
-    chosen = next_in_rotation(
-        int(station[at.ROTATION]), counters[at.TURN], pump_state[at.RUN_TIME], pump_state[at.IS_READY]
-    )
-    if chosen != NOTHING:
-        for k in range(recent_starts.shape[1] - 1, 0, -1):
-            recent_starts[chosen, k] = recent_starts[chosen, k - 1]
-        recent_starts[chosen, 0] = counters[at.SECOND]
-    return chosen
-
-
-@compiled
-def _control_level(
-    station: Floats, pump: Floats, station_state: Floats, running: int, started: Integers, level_m: float
-) -> None:
-    """Set the frequency that commanded pumps go to; the controller rests while no pump is commanded."""
-    if running == 0:
-        station_state[at.PID_SUM] = 0.0
-        station_state[at.PID_HAS_LAST] = 0.0
-        return
-    station_state[at.WANTED_FREQUENCY] = controlled_frequency_hz(
-        level_m,
-        station[at.PID_LEVEL],
-        station[at.PID_GAIN],
-        station[at.PID_INTEGRAL],
-        station[at.PID_DERIVATIVE],
-        station[at.MIN_FREQUENCY],
-        pump[at.NOMINAL_FREQUENCY, started[0]],
-        station_state[at.PID_SUM : at.PID_HAS_LAST + 1],
-    )
-
-
-@compiled
-def _drive(
-    station: Floats, pump: Floats, pump_state: Floats, pump_force: Floats, second: int, wanted_hz: float
-) -> None:
-    """Move each drive on by a second; a tripped drive loses its pump at once."""
-    for i in range(pump.shape[1]):
-        frequency_hz = pump_state[at.FREQUENCY_NOW, i]
-        is_commanded = pump_state[at.IS_COMMANDED, i] > 0.0
-        if frequency_hz <= 0.0 and not is_commanded:
-            continue
-        if frequency_hz > 0.0:
-            pump_state[at.RUN_TIME, i] += 1.0
-        if pump_force[at.IS_TRIPPED, i, second] > 0.0:
-            pump_state[at.FREQUENCY_NOW, i] = 0.0
-            continue
-        nominal_hz = pump[at.NOMINAL_FREQUENCY, i]
-        pump_state[at.FREQUENCY_NOW, i] = next_frequency_hz(
-            frequency_hz,
-            is_commanded,
-            nominal_hz / station[at.RAMP],
-            station[at.MIN_FREQUENCY],
-            min(wanted_hz, nominal_hz),
-            pump_state[at.DWELL_LEFT, i],
-        )
-        if not is_commanded and pump_state[at.FREQUENCY_NOW, i] <= station[at.MIN_FREQUENCY]:
-            pump_state[at.DWELL_LEFT, i] -= 1.0

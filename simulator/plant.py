@@ -15,7 +15,7 @@ from wetwell.simulator.channels import channels
 from wetwell.simulator.control import ROTATIONS
 from wetwell.simulator.kernel import advance
 from wetwell.simulator.power import hydraulic_power_kw
-from wetwell.simulator.sensors import MAX_DELAY_S, SensorParameters, sensor_parameters
+from wetwell.simulator.sensors import MAX_DELAY_S, SensorParameters, followed_share, sensor_parameters
 from wetwell.simulator.wet_well import level_at_volume_m, profile_of, volume_at_level_m3
 
 Floats = npt.NDArray[np.float64]
@@ -284,9 +284,9 @@ class Plant:
         """Advance by as many seconds as the forcing has."""
         pumps, seconds = self._pump.shape[1], forcing.inflow_m3h.size
         record = Record(
-            np.empty((channels(pumps), seconds)),
+            np.zeros((channels(pumps), seconds)),
             np.empty((at.STATION_TRUTHS, seconds)),
-            np.empty((at.PUMP_TRUTHS, pumps, seconds)),
+            np.zeros((at.PUMP_TRUTHS, pumps, seconds)),
         )
         advance(
             self._station,
@@ -367,4 +367,6 @@ def pack(parameters: PlantParameters) -> tuple[Floats, Floats, Floats]:
             p.is_automatic,
         ]
     )
-    return station, pump, np.array(p.sensors)
+    sensor = np.array(p.sensors)
+    sensor[at.FOLLOWED] = [followed_share(lag_s) for lag_s in p.sensors.lag_s]
+    return station, pump, sensor

@@ -59,6 +59,19 @@ def sensor_parameters(sensors: Sensors, pumps: int) -> SensorParameters:
     )
 
 
+def followed_share(lag_s: float) -> float:
+    r"""Share of a step that a first-order lag follows within a second.
+
+    $$1 - e^{-1 / \tau}$$
+
+    Examples
+    --------
+    >>> followed_share(0.0), round(followed_share(10.0), 4)
+    (1.0, 0.0952)
+    """
+    return 1.0 if lag_s <= 0.0 else 1.0 - math.exp(-1.0 / lag_s)
+
+
 @compiled
 def sense(
     channel: int,
@@ -75,12 +88,12 @@ def sense(
     A pump channel that is not active (its pump stands and no water moves) reads exactly 0, once its damping has run
     out. A stuck sensor repeats its last reading; its noise is drawn all the same, so that nothing else changes.
     """
-    lag_s = sensor[at.LAG, channel]
-    if lag_s > 0.0:
+    followed = sensor[at.FOLLOWED, channel]
+    if followed < 1.0:
         damped = channel_state[at.DAMPED, channel]
         if math.isnan(damped):
             damped = true_value
-        damped += (true_value - damped) * (1.0 - math.exp(-1.0 / lag_s))
+        damped += (true_value - damped) * followed
         channel_state[at.DAMPED, channel] = damped
         true_value = damped
         is_active = is_active or damped > RESTING

@@ -163,4 +163,6 @@ _STATES = np.array(["normal", "pump_fault", "system_fault", "pump_and_system_fau
 
 
 def _state_names(pump: npt.NDArray[np.bool_], system: npt.NDArray[np.bool_]) -> npt.NDArray[np.str_]:
-    return _STATES[pump + 2 * system.astype(np.int64)]
+    if not (pump.any() or system.any()):
+        return np.broadcast_to(_STATES[0], pump.shape)  # a healthy month takes the room of one row
+    return _STATES.take(pump + 2 * system.astype(np.int8))
