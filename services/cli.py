@@ -3,7 +3,7 @@
 import asyncio
 import re
 import sys
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
@@ -13,6 +13,8 @@ from wetwell.protocols.errors import ConfigError, WetwellError
 from wetwell.services.settings import LogSettings, Settings, load_settings
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from wetwell.simulator.scenario import Scenario
     from wetwell.simulator.simulation import Simulation
 
@@ -304,6 +306,22 @@ def effects(*, as_json: JsonOption = False) -> None:
         typer.echo(effect_lines(table))
 
 
+@app.command()
+def faults(*, as_json: JsonOption = False) -> None:
+    """List the faults that a scenario may name, with their parameters."""
+    from wetwell.simulator.faults import FAULTS
+
+    _print_parts("faults", FAULTS, as_json=as_json)
+
+
+@app.command()
+def inflows(*, as_json: JsonOption = False) -> None:
+    """List the inflow models that a scenario may name, with their parameters."""
+    from wetwell.simulator.inflow import INFLOWS
+
+    _print_parts("inflows", INFLOWS, as_json=as_json)
+
+
 @station_app.command("check")
 def station_check(file: Annotated[str, typer.Argument(help="Station file.")]) -> None:
     """Check a station file; says what is wrong with it, or nothing is."""
@@ -423,6 +441,16 @@ def _print(result: dict[str, object], *, as_json: bool) -> None:
     from wetwell.services.terminal import as_lines
 
     typer.echo(to_json(result) if as_json else as_lines(result))
+
+
+def _print_parts(name: str, parts: Mapping[str, "type[BaseModel]"], *, as_json: bool) -> None:
+    from wetwell.services.listing import part_lines, part_table
+
+    rows = part_table(parts)
+    if as_json:
+        _print({name: rows}, as_json=True)
+    else:
+        typer.echo(part_lines(rows))
 
 
 def main() -> NoReturn:

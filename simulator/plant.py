@@ -106,7 +106,8 @@ class Forcing:
     Inflow, friction, static head and voltage are (n,); factors and leaks of the pumps are (pumps, n). Factors are 1,
     rises and leaks 0 in health. `is_plc_frozen` stops the PLC's program: outputs and telemetry stay as they are. The
     sensor arrays are (channels, n), or (channels, 1) where no sensor is at fault: a bias in units of the channel, a
-    factor on its noise, and whether it is stuck (1) or not (0).
+    factor on its noise, and whether it is stuck (1) or not (0). Where one is at fault, `arrays` has at least two
+    columns for them, which tells the kernel so.
     """
 
     inflow_m3h: Floats
@@ -200,8 +201,9 @@ def healthy_forcing(inflow_m3h: Floats, pumps: int, *, with_sensors: bool = Fals
     station[[at.STATIC_RISE, at.IS_PLC_FROZEN]] = 0.0
     pump = np.ones((at.PUMP_FORCES, pumps, seconds))
     pump[[at.INTERNAL_LEAK, at.VALVE_LEAK_FORCE, at.IS_TRIPPED]] = 0.0
-    sensor = np.zeros((at.SENSOR_FORCES, channels(pumps), seconds if with_sensors else 1))
+    sensor = np.zeros((at.SENSOR_FORCES, channels(pumps), max(seconds, 2) if with_sensors else 1))
     sensor[at.NOISE_FACTOR] = 1.0
+    acting = slice(seconds if with_sensors else 1)
     return Forcing(
         inflow_m3h=station[at.INFLOW_FORCE],
         speed_factor=pump[at.SPEED_FACTOR],
@@ -213,9 +215,9 @@ def healthy_forcing(inflow_m3h: Floats, pumps: int, *, with_sensors: bool = Fals
         static_rise_m=station[at.STATIC_RISE],
         voltage_factor=station[at.VOLTAGE_FACTOR],
         is_plc_frozen=station[at.IS_PLC_FROZEN],
-        sensor_bias=sensor[at.SENSOR_BIAS],
-        sensor_noise_factor=sensor[at.NOISE_FACTOR],
-        is_sensor_stuck=sensor[at.IS_STUCK],
+        sensor_bias=sensor[at.SENSOR_BIAS, :, acting],
+        sensor_noise_factor=sensor[at.NOISE_FACTOR, :, acting],
+        is_sensor_stuck=sensor[at.IS_STUCK, :, acting],
         arrays=(station, pump, sensor),
     )
 

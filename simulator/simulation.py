@@ -1,6 +1,6 @@
 """A plant that runs a scenario: live seconds and batches of days by the same code."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,13 @@ from wetwell.protocols.station import Station, check_levels
 from wetwell.simulator import layout as at
 from wetwell.simulator.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
 from wetwell.simulator.effects import effective_parameters, effects_of
-from wetwell.simulator.faults.profile import PumpFault
+from wetwell.simulator.faults import Fault
+from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.plant import Forcing, Plant, Record, healthy_forcing
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
 
 Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 
 class Simulation:
@@ -42,9 +44,9 @@ class Simulation:
     def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
         self._effects = effects_of(station)
         for number, fault in enumerate(scenario.fault, start=1):
-            if isinstance(fault, PumpFault) and fault.pump > len(station.pump):
+            if (pump := _pump_of(fault)) > len(station.pump):
                 raise ValueError(
-                    f"scenario '{scenario.name}': fault[{number}].pump: got {fault.pump}, "
+                    f"scenario '{scenario.name}': fault[{number}].pump: got {pump}, "
                     f"station '{station.name}' has {len(station.pump)} pumps"
                 )
         inflow_rng, self._sensor_rng = np.random.default_rng(seed).spawn(2)
@@ -110,7 +112,11 @@ class Simulation:
         """
         begin = self._plant.seconds
         time_s = np.arange(begin, begin + seconds, dtype=np.float64)
-        forcing = healthy_forcing(self._inflow.take(seconds), len(self.station.pump))
+        forcing = healthy_forcing(
+            self._inflow.take(seconds),
+            len(self.station.pump),
+            with_sensors=any(isinstance(fault, SensorFault) for fault in self.scenario.fault),
+        )
         for effect in self._effects:
             effect.force(forcing, time_s)
         for fault in self.scenario.fault:
@@ -124,24 +130,29 @@ class Simulation:
         )
 
     def _truth(self, record: Record, forcing: Forcing, time_s: Floats) -> dict[str, npt.NDArray[Any]]:
-        system = np.zeros(time_s.size, dtype=np.bool_)
-        pumps = np.zeros((len(self.station.pump), time_s.size), dtype=np.bool_)
-        for fault in self.scenario.fault:
-            if isinstance(fault, PumpFault):
-                pumps[fault.pump - 1] |= fault.is_active(time_s)
-            else:
-                system |= fault.is_active(time_s)
+        """Truth columns; the state of a pump knows its own faults and those of the whole station."""
+        active = [fault.is_active(time_s) for fault in self.scenario.fault]
+        shares = [fault.share(time_s) for fault in self.scenario.fault]
+        concerned = [_pump_of(fault) for fault in self.scenario.fault]
+        kinds = [_KINDS.index(next(k for k in _KINDS if isinstance(fault, k))) for fault in self.scenario.fault]
         truth: dict[str, npt.NDArray[Any]] = {
-            "truth_state": _state_names(np.logical_or.reduce(pumps), system),
+            "truth_state": _state_names(kinds, active, time_s.size),
+            "truth_fault": _fault_names([fault.kind for fault in self.scenario.fault], active, time_s.size),
+            "truth_severity": _largest(shares, time_s.size),
             "truth_level_m": record.station_truth[at.TRUE_LEVEL],
             "truth_inflow_m3h": forcing.inflow_m3h,
             "truth_overflow_m3h": record.station_truth[at.TRUE_OVERFLOW],
             "truth_friction_factor": forcing.friction_factor,
             "truth_static_rise_m": forcing.static_rise_m,
         }
-        for i in range(pumps.shape[0]):
+        for i in range(len(self.station.pump)):
+            felt = [k for k, pump in enumerate(concerned) if pump in {0, i + 1}]
+            own = [shares[k] for k, pump in enumerate(concerned) if pump == i + 1]
             truth |= {
-                f"truth_pump{i + 1}_state": _state_names(pumps[i], system),
+                f"truth_pump{i + 1}_state": _state_names(
+                    [kinds[k] for k in felt], [active[k] for k in felt], time_s.size
+                ),
+                f"truth_pump{i + 1}_severity": _largest(own, time_s.size),
                 f"truth_pump{i + 1}_speed_factor": forcing.speed_factor[i],
                 f"truth_pump{i + 1}_flow_m3h": record.pump_truth[at.TRUE_FLOW, i],
                 f"truth_pump{i + 1}_head_m": record.pump_truth[at.TRUE_HEAD, i],
@@ -159,10 +170,44 @@ def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:
     return columns
 
 
-_STATES = np.array(["normal", "pump_fault", "system_fault", "pump_and_system_fault"])
+_KINDS = (PumpFault, SystemFault, SensorFault)
+_STATES = np.array(["normal", "pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault"])
+_SENSOR_FAULT = 4
 
 
-def _state_names(pump: npt.NDArray[np.bool_], system: npt.NDArray[np.bool_]) -> npt.NDArray[np.str_]:
-    if not (pump.any() or system.any()):
-        return np.broadcast_to(_STATES[0], pump.shape)  # a healthy month takes the room of one row
-    return _STATES.take(pump + 2 * system.astype(np.int8))
+def _pump_of(fault: Fault) -> int:
+    """Pump (from 1) that a fault is confined to; 0 where it concerns them all."""
+    return fault.pump if isinstance(fault, PumpFault | ChannelFault) else 0
+
+
+def _state_names(kinds: Sequence[int], active: Sequence[Flags], seconds: int) -> npt.NDArray[np.str_]:
+    """States by the faults that act, each of one of `_KINDS`; a pump or system fault counts more than a sensor's."""
+    if not any(flags.any() for flags in active):
+        return np.broadcast_to(_STATES[0], (seconds,))  # a healthy month takes the room of one row
+    acts = np.zeros((len(_KINDS), seconds), dtype=np.bool_)
+    for kind, flags in zip(kinds, active, strict=True):
+        acts[kind] |= flags
+    pump, system, sensor = acts
+    names: npt.NDArray[np.str_] = _STATES[np.where(pump | system, pump + 2 * system, _SENSOR_FAULT * sensor)]
+    return names
+
+
+def _fault_names(kinds: Sequence[str], active: Sequence[Flags], seconds: int) -> npt.NDArray[np.str_]:
+    """Kinds that act, each once, joined by "+"; empty where none does."""
+    if not any(flags.any() for flags in active):
+        return np.broadcast_to(np.array(""), (seconds,))
+    acts = {kind: np.zeros(seconds, dtype=np.bool_) for kind in kinds}
+    for kind, flags in zip(kinds, active, strict=True):
+        acts[kind] |= flags
+    changed = np.zeros(seconds, dtype=np.bool_)
+    changed[:1] = True
+    for flags in acts.values():
+        changed[1:] |= flags[1:] != flags[:-1]
+    begins = np.flatnonzero(changed)
+    names = ["+".join(kind for kind, flags in acts.items() if flags[begin]) for begin in begins]
+    return np.repeat(np.array(names), np.diff(begins, append=seconds))
+
+
+def _largest(shares: Sequence[Floats], seconds: int) -> Floats:
+    """Largest share in each second, 0 without any."""
+    return np.maximum.reduce(shares) if shares else np.broadcast_to(0.0, (seconds,))

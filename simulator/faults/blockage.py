@@ -1,6 +1,6 @@
 """Internal blockage of a pump."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -19,13 +19,15 @@ class Blockage(PumpFault):
     Parameters
     ----------
     speed_loss : float
-        β, share of the speed that is lost when the ramp is full, 0..1. [1]
+        β, share of the speed that is lost at full strength, 0..1. [1]
 
     References
     ----------
     .. [1] Eshkofti et al., Modeling and physics-enhanced fault detection in wastewater pump stations:
        pump internal blockage scenario (β = 0.4).
     """
+
+    neutral: ClassVar[dict[str, Any]] = {"speed_loss": 0.0}
 
     kind: Literal["blockage"] = "blockage"
     speed_loss: Annotated[float, Field(ge=0, lt=1)] = 0.4

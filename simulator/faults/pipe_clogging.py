@@ -1,6 +1,6 @@
 """Clogging of the rising main."""
 
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from wetwell.protocols.station import NonNegative
 from wetwell.simulator.faults.profile import Floats, SystemFault
@@ -17,15 +17,17 @@ class PipeClogging(SystemFault):
     Parameters
     ----------
     friction_rise : float
-        Δk, relative rise of the friction coefficient when the ramp is full. [1]
+        Δk, relative rise of the friction coefficient at full strength. [1]
     static_rise_m : float
-        ΔH_s, rise of the static head when the ramp is full. [m]
+        ΔH_s, rise of the static head at full strength. [m]
 
     References
     ----------
     .. [1] Eshkofti et al., Modeling and physics-enhanced fault detection in wastewater pump stations:
        pipe clogging scenario (Δk = 1, ΔH_s = 0.5 m).
     """
+
+    neutral: ClassVar[dict[str, Any]] = {"friction_rise": 0.0, "static_rise_m": 0.0}
 
     kind: Literal["pipe_clogging"] = "pipe_clogging"
     friction_rise: NonNegative = 1.0

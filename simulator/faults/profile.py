@@ -1,33 +1,53 @@
-"""How a fault grows, and what becomes of it."""
+"""How a fault comes and goes, and what it concerns."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from wetwell.protocols.station import NonNegative, Table
+from wetwell.protocols.station import NonNegative, Positive, Table
+from wetwell.simulator.channels import Quantity, channels_of
+from wetwell.simulator.plant import Forcing
 
 Floats = npt.NDArray[np.float64]
 
+SensedQuantity = Literal["level_m", "inflow_m3h", "flow_m3h", "head_m", "power_kw"]
+"""Quantities that a sensor measures; the frequency is what the drive itself reports."""
 
-class Ramp(Table):
-    r"""A fault that grows linearly, then holds or is cleared.
+STATION_QUANTITIES = ("level_m", "inflow_m3h")
 
-    $$r(t) = 0 \text{ before } t_0,\quad \frac{t - t_0}{t_1 - t_0} \text{ up to } t_1,\quad
-    \text{then } 1 \text{ (hold) or } 0 \text{ (clear)}$$
+
+class Profile(Table):
+    r"""Share r(t) of the full fault over time; nothing before the start.
+
+    $$r_\text{ramp} = \min\Bigl(1, \frac{t - t_0}{t_1 - t_0}\Bigr), \qquad r_\text{step} = 1, \qquad
+    r_\text{intermittent} = \mathbb{1}[(t - t_0) \bmod T < d\,T]$$
+
+    After $t_1$ it stays as it is (hold; an intermittent fault goes on coming and going) or is 0 (clear).
 
     Parameters
     ----------
     start_s, end_s : float
         t0 and t1, since the start of the scenario. [s]
     after : "hold" or "clear"
-        What becomes of the fault after the ramp.
+        What becomes of the fault after the end.
+    shape : "ramp", "step" or "intermittent"
+    period_s : float
+        T, of an intermittent fault. [s]
+    duty : float
+        d, share of the period in which an intermittent fault is there. [1]
     """
+
+    neutral: ClassVar[dict[str, Any]]
+    """Parameters that are the strength of a fault, with the values at which it changes nothing, bit for bit."""
 
     start_s: NonNegative
     end_s: NonNegative
     after: Literal["hold", "clear"] = "hold"
+    shape: Literal["ramp", "step", "intermittent"] = "ramp"
+    period_s: Positive = 3600.0
+    duty: Annotated[float, Field(ge=0, le=1)] = 0.5
 
     @model_validator(mode="after")
     def _check_order(self) -> Self:
@@ -37,20 +57,48 @@ class Ramp(Table):
 
     def share(self, time_s: Floats) -> Floats:
         """Share r(t) of the full fault, (n,) in 0..1, at (n,) seconds since the start of the scenario."""
+        if self.shape != "ramp":
+            return self.is_active(time_s).astype(np.float64)
         share = np.clip((time_s - self.start_s) / (self.end_s - self.start_s), 0.0, 1.0)
         return np.where(self.is_active(time_s), share, 0.0)
 
     def is_active(self, time_s: Floats) -> npt.NDArray[np.bool_]:
         """(n,) flags of the seconds in which the fault acts."""
         active: npt.NDArray[np.bool_] = time_s >= self.start_s
-        return active if self.after == "hold" else active & (time_s <= self.end_s)
+        if self.after == "clear":
+            active &= time_s <= self.end_s
+        if self.shape == "intermittent":
+            active &= np.mod(time_s - self.start_s, self.period_s) < self.duty * self.period_s
+        return active
 
 
-class PumpFault(Ramp):
+class PumpFault(Profile):
     """A fault of one pump, counted from 1."""
 
     pump: Annotated[int, Field(ge=1)]
 
 
-class SystemFault(Ramp):
+class SystemFault(Profile):
     """A fault of the rising main, felt by all pumps."""
+
+
+class SensorFault(Profile):
+    """A fault of a sensor, of a channel of the telemetry or of the PLC: the water flows as it should."""
+
+
+class ChannelFault(SensorFault):
+    """A fault of the sensors of one quantity: of one pump, counted from 1, or of all (0); 0 for level and inflow."""
+
+    channel: SensedQuantity
+    pump: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _check_pump(self) -> Self:
+        if self.channel in STATION_QUANTITIES and self.pump > 0:
+            raise ValueError(f"pump must be 0 for channel '{self.channel}' of the station, got {self.pump}")
+        return self
+
+    def rows(self, forcing: Forcing) -> list[int]:
+        """Rows of the faulty channels in the sensor arrays of a forcing."""
+        quantity: Quantity = self.channel
+        return channels_of(quantity, forcing.speed_factor.shape[0], self.pump or None)

@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,14 +11,24 @@ from pydantic import ValidationError
 
 from wetwell.protocols.errors import first_fault
 from wetwell.protocols.station import load_toml
+from wetwell.simulator.channels import FIRST_PUMP
 from wetwell.simulator.faults import FAULTS
-from wetwell.simulator.faults.profile import PumpFault, Ramp
+from wetwell.simulator.faults.profile import Profile, SensorFault, SystemFault
 from wetwell.simulator.inflow import INFLOWS
 from wetwell.simulator.plant import healthy_forcing
 from wetwell.simulator.scenario import Scenario
 
 REGISTERED = [*FAULTS.items(), *INFLOWS.items()]
-NEEDED = {"pump": 2, "start_s": 20.0, "end_s": 60.0, "time_s": [0.0, 30.0, 45.0], "flow_m3h": [3.0, 0.0, 1e-7]}
+NEEDED = {
+    "pump": 2,
+    "start_s": 20.0,
+    "end_s": 60.0,
+    "channel": "flow_m3h",
+    "bias": 3.0,
+    "bias_per_hour": 90.0,
+    "time_s": [0.0, 30.0, 45.0],
+    "flow_m3h": [3.0, 0.0, 1e-7],
+}
 EXPLAINED = {"recorded"}
 """Parts that are a lookup, not an equation."""
 
@@ -40,8 +51,11 @@ def in_toml(value):
 
 
 def test_registries_are_not_empty():
-    assert set(FAULTS) >= {"blockage", "pipe_clogging"}
-    assert set(INFLOWS) >= {"empirical", "diurnal", "recorded"}
+    pump_faults = {"blockage", "impeller_wear", "wear_ring_leakage", "ragging", "check_valve_leak", "drive_trip"}
+    system_faults = {"pipe_clogging", "partly_closed_valve", "air_pocket"}
+    sensor_faults = {"sensor_stuck", "sensor_drift", "sensor_bias", "sensor_noise", "frozen_plc"}
+    assert set(FAULTS) == pump_faults | system_faults | sensor_faults
+    assert set(INFLOWS) == {"empirical", "diurnal", "recorded", "catchment"}
 
 
 @every_part
@@ -93,7 +107,7 @@ def test_docstring_has_equation_parameters_and_reference(kind, part):
         assert text.count("$$") >= 2
         assert "References\n" in text
     assert "Parameters\n" in text
-    for name in set(part.model_fields) - set(Ramp.model_fields) - {"kind", "pump"}:
+    for name in set(part.model_fields) - set(Profile.model_fields) - {"kind", "pump"}:
         assert name in text, f"{kind}: parameter {name} is not described"
 
 
@@ -111,15 +125,17 @@ def test_scenario_survives_toml(kind, part, tmp_path: Path):
     assert table["fault" if kind in FAULTS else "inflow"]
 
 
+def have_same_bytes(one, other):
+    return [array.tobytes() for array in one.arrays] == [array.tobytes() for array in other.arrays]
+
+
 @every_fault
 def test_fault_of_zero_strength_is_identity(part):
-    strengths = set(part.model_fields) - set(Ramp.model_fields) - set(PumpFault.model_fields) - {"kind"}
-    nothing = part(**needed(part), **dict.fromkeys(strengths, 0.0))
-    forcing, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3) for _ in range(2))
+    assert set(part.neutral) <= set(part.model_fields)
+    nothing = part(**(needed(part) | part.neutral))
+    forcing, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(2))
     nothing.apply(forcing, np.arange(100.0))
-    assert all(
-        left.tobytes() == right.tobytes() for left, right in zip(forcing.arrays, untouched.arrays, strict=True)
-    )
+    assert have_same_bytes(forcing, untouched)
 
 
 def part_of(forcing, first, last):
@@ -128,19 +144,47 @@ def part_of(forcing, first, last):
     return replace(forcing, **{name: array[..., first:last] for name, array in views.items()})
 
 
-@every_fault
-def test_fault_acts_only_in_its_time_and_in_any_blocks(part):
-    fault = part(**(needed(part) | {"after": "clear"}))
+SHAPED = [
+    pytest.param(part, shape, after, id=f"{kind}-{shape}-{after}")
+    for kind, part in FAULTS.items()
+    for shape in get_args(part.model_fields["shape"].annotation)
+    for after in ("hold", "clear")
+]
+
+
+@pytest.mark.parametrize(("part", "shape", "after"), SHAPED)
+def test_fault_acts_only_in_its_time_and_in_any_blocks(part, shape, after):
+    fault = part(**(needed(part) | {"shape": shape, "after": after, "period_s": 7.0, "duty": 0.4}))
     time_s = np.arange(100.0)
     whole, parts, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(3))
     fault.apply(whole, time_s)
     for first, last in ((0, 1), (1, 37), (37, 37), (37, 100)):
         fault.apply(part_of(parts, first, last), time_s[first:last])
-    assert all(left.tobytes() == right.tobytes() for left, right in zip(whole.arrays, parts.arrays, strict=True))
+    assert have_same_bytes(whole, parts)
     changed = np.zeros(100, dtype=bool)
     for left, right in zip(whole.arrays, untouched.arrays, strict=True):
         changed |= (left != right).reshape(-1, 100).any(axis=0)
-    assert np.flatnonzero(changed).tolist() == list(range(21, 61))
+    acts = {
+        "ramp": range(21, 100),
+        "step": range(20, 100),
+        "intermittent": [second for second in range(20, 100) if (second - 20) % 7 < 0.4 * 7],
+    }[shape]
+    assert np.flatnonzero(changed).tolist() == [second for second in acts if after == "hold" or second <= 60]
+
+
+@every_fault
+def test_fault_concerns_its_pump_only(part):
+    """Of pump arrays and pump channels; a fault of the whole station has no pump."""
+    if "pump" not in part.model_fields:
+        assert issubclass(part, SystemFault | SensorFault)
+        return
+    forcing, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(2))
+    part(**(needed(part) | {"pump": 2})).apply(forcing, np.arange(100.0))
+    for i in (0, 2):
+        assert (forcing.arrays[1][:, i] == untouched.arrays[1][:, i]).all()
+        rows = slice(FIRST_PUMP + 4 * i, FIRST_PUMP + 4 * i + 4)
+        assert (forcing.arrays[2][:, rows] == untouched.arrays[2][:, rows]).all()
+    assert (forcing.arrays[0] == untouched.arrays[0]).all()
 
 
 @every_fault
@@ -183,6 +227,10 @@ def test_inflow_is_finite_never_negative_and_a_function_of_its_seed(part):
         ({"kind": "empirical", "quantiles": [[0, -1], [1, 1]]}, "got -1"),
         ({"kind": "empirical", "surges": {"duration_s": 0}}, "surges.duration_s: got 0"),
         ({"kind": "diurnal", "period_s": 0}, "period_s: got 0"),
+        ({"kind": "catchment", "hours": [1.0] * 23}, "at least 24 items"),
+        ({"kind": "catchment", "hours": [0.0] * 24}, "hours: at least one must be above 0"),
+        ({"kind": "catchment", "first_weekday": 0}, "first_weekday: got 0"),
+        ({"kind": "catchment", "storm_shape": 0.5}, "storm_shape: got 0.5"),
         ({"kind": "recorded", "time_s": [], "flow_m3h": []}, "at least one"),
         ({"kind": "recorded", "time_s": [0, 1], "flow_m3h": [1]}, "as many times as flows"),
         ({"kind": "recorded", "time_s": [[0, 1]], "flow_m3h": [[1, 1]]}, "as many times as flows"),
@@ -214,6 +262,17 @@ def test_bad_inflows_are_refused_in_one_line(table, rule):
         ({"kind": "blockage", "pump": 1, "start_s": 0, "end_s": 1, "speed_loss": 1}, "speed_loss: got 1"),
         ({"kind": "blockage", "pump": 1, "start_s": 0, "end_s": 1, "after": "stay"}, "after: got 'stay'"),
         ({"kind": "pipe_clogging", "start_s": 0, "end_s": float("inf")}, "end_s: got inf"),
+        ({"kind": "pipe_clogging", "start_s": 0, "end_s": 1, "shape": "saw"}, "shape: got 'saw'"),
+        ({"kind": "pipe_clogging", "start_s": 0, "end_s": 1, "period_s": 0}, "period_s: got 0"),
+        ({"kind": "pipe_clogging", "start_s": 0, "end_s": 1, "duty": 1.1}, "duty: got 1.1"),
+        ({"kind": "partly_closed_valve", "start_s": 0, "end_s": 1, "opening": 0}, "opening: got 0"),
+        ({"kind": "frozen_plc", "start_s": 0, "end_s": 1, "shape": "ramp"}, "shape: got 'ramp'"),
+        ({"kind": "sensor_bias", "start_s": 0, "end_s": 1, "channel": "flow_m3h"}, "bias: missing"),
+        ({"kind": "sensor_stuck", "start_s": 0, "end_s": 1, "channel": "frequency_hz"}, "channel: got 'freq"),
+        (
+            {"kind": "sensor_stuck", "start_s": 0, "end_s": 1, "channel": "level_m", "pump": 1},
+            "pump must be 0 for channel 'level_m' of the station, got 1",
+        ),
         ({"kind": "pipe_clogging", "start_s": 0, "end_s": 1, "friction_rise": -0.1}, "friction_rise: got -0.1"),
     ],
 )

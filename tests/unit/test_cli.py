@@ -8,6 +8,8 @@ import pytest
 
 from wetwell.services.cli import main
 from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.faults import FAULTS
+from wetwell.simulator.inflow import INFLOWS
 
 STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-4]}]\n'
 
@@ -115,6 +117,22 @@ def test_effects_lists_the_registry(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     ]
     assert run(monkeypatch, "effects") == 0
     assert "motor_slip (drive)\n  An asynchronous motor" in capsys.readouterr().out
+
+
+def test_faults_and_inflows_list_their_registries(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, "faults", "--json") == 0
+    rows = {row["kind"]: row for row in json.loads(capsys.readouterr().out)["faults"]}
+    assert list(rows) == list(FAULTS)
+    assert rows["impeller_wear"]["parameters"][-1] == {"name": "head_loss", "default": 0.15, "range": ">= 0, < 1"}
+    assert rows["drive_trip"]["summary"].startswith("Thermal or earth-fault protection")
+    assert run(monkeypatch, "inflows", "--json") == 0
+    assert [row["kind"] for row in json.loads(capsys.readouterr().out)["inflows"]] == list(INFLOWS)
+    assert run(monkeypatch, "faults") == 0
+    assert "  shape: step (step, intermittent)\n" in capsys.readouterr().out
+    assert run(monkeypatch, "inflows") == 0
+    assert "  time_s: must be given\n" in capsys.readouterr().out
 
 
 def test_station_show_gives_the_duty_points(

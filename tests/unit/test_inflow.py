@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from wetwell.simulator.inflow.catchment import HOURS, CatchmentInflow
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.empirical import PAPER_QUANTILES, EmpiricalInflow
 from wetwell.simulator.inflow.recorded import RecordedInflow
@@ -130,9 +131,67 @@ def test_recorded_series_faster_than_a_second_is_sampled():
     assert taken(inflow, 5).tolist() == [1, 3, 1, 3, 1]
 
 
+def test_catchment_default_has_about_the_quantiles_of_the_paper():
+    """0.016 and 0.032 m³/s within 10 %, over eight weeks; 0.040 within 15 %, as few storms make it."""
+    flow_m3h = taken(CatchmentInflow(), 56 * 86_400)[::20]
+    for probability, flow_m3s, tolerance in ((0.5, 0.016, 0.1), (0.95, 0.032, 0.1), (0.99, 0.040, 0.15)):
+        assert np.quantile(flow_m3h, probability) == pytest.approx(3600 * flow_m3s, rel=tolerance)
+
+
+def test_dry_catchment_meets_its_hours_and_is_smooth():
+    inflow = CatchmentInflow(mean_m3h=50, noise_m3h=0, storms_per_day=0, weekend_factor=1.2, first_weekday=5)
+    flow_m3h = taken(inflow, 8 * 86_400)
+    day_m3h = 50 * np.array(HOURS) / np.mean(HOURS)
+    by_hour_m3h = flow_m3h[::3600].reshape(8, 24)
+    for day, factor in enumerate([1.0, 1.2, 1.2, 1.0, 1.0, 1.0, 1.0, 1.0]):
+        np.testing.assert_allclose(by_hour_m3h[day], factor * day_m3h, rtol=1e-12)
+    assert flow_m3h[4 * 86_400 : 5 * 86_400].mean() == pytest.approx(50, rel=1e-3)
+    # An hour changes by 36 m³/h at most; a spline is nowhere more than twice as steep, and its slope does not jump.
+    assert np.abs(np.diff(flow_m3h)).max() < 2 * 36 / 3600
+    assert np.abs(np.diff(flow_m3h, 2)).max() < 1e-4
+
+
+def test_catchment_noise_is_stationary_with_its_deviation_and_correlation():
+    """Correlation time of 20 s in 400 000 s: 10 000 independent values, five standard errors."""
+    inflow = CatchmentInflow(
+        mean_m3h=500, hours=(1.0,) * 24, weekend_factor=1, noise_m3h=8, correlation_s=20, storms_per_day=0
+    )
+    noise_m3h = taken(inflow, 400_000) - 500
+    assert noise_m3h.mean() == pytest.approx(0, abs=5 * 8 / math.sqrt(10_000))
+    assert noise_m3h.std() == pytest.approx(8, rel=5 / math.sqrt(20_000))
+    for lag_s in (1, 20, 40):
+        correlation = np.corrcoef(noise_m3h[lag_s:], noise_m3h[:-lag_s])[0, 1]
+        assert correlation == pytest.approx(math.exp(-lag_s / 20), abs=0.05)
+    first_m3h = [taken(inflow, 1, seed)[0] - 500 for seed in range(400)]
+    assert np.std(first_m3h) == pytest.approx(8, rel=5 / math.sqrt(800))
+
+
+def test_storms_have_their_number_shape_and_volume():
+    """Volume of a storm: peak · t_p · n! e^n / n^(n+1), the gamma integral; Poisson and exponential together."""
+    inflow = CatchmentInflow(
+        mean_m3h=0, noise_m3h=0, storms_per_day=200, storm_peak_m3h=40, storm_time_to_peak_s=60, storm_shape=3
+    )
+    flow_m3h = taken(inflow, 20 * 86_400)
+    expected = 200 * 20
+    volume = 40 * 60 * 6 * math.exp(3) / 3**4
+    # A sum of N exponential volumes, N Poisson: variance 2 N volume².
+    assert flow_m3h.sum() == pytest.approx(expected * volume, rel=5 * math.sqrt(2 / expected))
+    rare = CatchmentInflow(mean_m3h=0, noise_m3h=0, storms_per_day=1, storm_time_to_peak_s=600, storm_shape=3)
+    flow_m3h = taken(rare, 3 * 86_400)
+    begin = int(np.flatnonzero(flow_m3h)[0])
+    peak = begin + int(np.argmax(flow_m3h[begin : begin + 3000]))
+    assert peak - begin == pytest.approx(600, abs=2)
+    age = np.arange(3000) / 600
+    np.testing.assert_allclose(
+        flow_m3h[begin : begin + 3000] / flow_m3h[peak], age**3 * np.exp(3 * (1 - age)), atol=6e-3
+    )
+
+
 @pytest.mark.parametrize("seconds", [0, 1])
 @pytest.mark.parametrize(
-    "inflow", [EmpiricalInflow(), DiurnalInflow(), RecordedInflow(time_s=[0], flow_m3h=[1])], ids=lambda i: i.kind
+    "inflow",
+    [EmpiricalInflow(), DiurnalInflow(), CatchmentInflow(), RecordedInflow(time_s=[0], flow_m3h=[1])],
+    ids=lambda i: i.kind,
 )
 def test_short_blocks(inflow, seconds):
     assert taken(inflow, seconds).shape == (seconds,)

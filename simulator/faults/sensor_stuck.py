@@ -1,0 +1,36 @@
+"""Sensor that is stuck."""
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from wetwell.simulator.faults.profile import ChannelFault, Floats
+from wetwell.simulator.plant import Forcing
+
+
+class SensorStuck(ChannelFault):
+    r"""A sensor repeats its last reading, without noise; the controller acts on a stuck level as on a true one.
+
+    $$y(t) = y(t_0 - 1\,\text{s}) \text{ while } r(t) = 1$$
+
+    Parameters
+    ----------
+    channel : "level_m", "inflow_m3h", "flow_m3h", "head_m" or "power_kw"
+    pump : int
+        0 for all pumps, and for level and inflow.
+    shape : "step" or "intermittent"
+
+    References
+    ----------
+    .. [1] After R. Isermann, Fault-Diagnosis Systems, Springer: faults of sensors.
+    """
+
+    neutral: ClassVar[dict[str, Any]] = {"shape": "intermittent", "duty": 0.0}
+
+    kind: Literal["sensor_stuck"] = "sensor_stuck"
+    shape: Literal["step", "intermittent"] = "step"
+
+    def apply(self, forcing: Forcing, time_s: Floats) -> None:
+        """Hold the readings in a block that begins at `time_s[0]`."""
+        rows = self.rows(forcing)
+        forcing.is_sensor_stuck[rows] = np.maximum(forcing.is_sensor_stuck[rows], self.share(time_s))
