@@ -1,11 +1,12 @@
 """The command `wetwell`: parses and calls, nothing else."""
 
 import asyncio
+import os
 import re
 import sys
 from collections.abc import Coroutine, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, cast
 
 import typer
 
@@ -268,6 +269,40 @@ def convert(
     recording = IMPORTERS[form](source)
     write_recording(recording, out)
     _print({"recording": str(out), "rows": len(recording), "columns": sorted(recording.columns)}, as_json=as_json)
+
+
+@app.command()
+def dataset(
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, help="Number of recordings.")] = 100,
+    seed: SeedOption = 1,
+    station: Annotated[
+        list[str] | None, typer.Option("--station", metavar="FILE", help="Base station; may be given again.")
+    ] = None,
+    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    form: Annotated[
+        Literal["parquet", "csv.gz"], typer.Option("--format", help="Form of the recordings.")
+    ] = "parquet",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    check: Annotated[
+        Path | None, typer.Option("--check", metavar="DIR", help="Make nothing: verify the checksums of a dataset.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a balanced, labelled set of recordings over sampled stations and faults; run again to resume."""
+    from wetwell.services.dataset import check_dataset, make_dataset, plan_of
+    from wetwell.services.presets import find_station
+
+    if (out is None) == (check is None):
+        raise ConfigError("dataset: give either --out DIR or --check DIR")
+    if check is not None:
+        return _print(check_dataset(check), as_json=as_json)
+    bases = [find_station(name) for name in station or ["alpha"]]
+    plan = plan_of(bases, seed, count, _positive(days, "--days"), form)
+    processes = min(workers or os.cpu_count() or 1, count)
+    return _print(make_dataset(plan, cast("Path", out), processes), as_json=as_json)
 
 
 @app.command()

@@ -1,0 +1,354 @@
+"""A labelled set of recordings on disk: made in parallel, resumable, the same bytes for the same seed.
+
+Each item is three files: the recording, its station file, its scenario file. `manifest.json` names them all, with
+their checksums, and appears when all are there; until then `manifest.part.jsonl` remembers which are done.
+"""
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import multiprocessing
+import os
+import signal
+import threading
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from importlib.metadata import version
+from itertools import islice
+from pathlib import Path
+from typing import Any, Literal
+
+import tomli_w
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
+from wetwell.protocols.station import Station, Table
+from wetwell.protocols.whole_file import whole_file
+from wetwell.services.batch import write_simulated
+from wetwell.simulator.dataset import Item, item_of, labels
+from wetwell.simulator.simulation import Simulation
+
+SCHEMA = "wetwell.dataset/1"
+MANIFEST = "manifest.json"
+JOURNAL = "manifest.part.jsonl"
+FILES = ("file", "station_file", "scenario_file")
+_AHEAD = 4  # items in the queue for each worker
+
+Form = Literal["parquet", "csv.gz"]
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What a set is made from; all but the count decides what item k is.
+
+    Attributes
+    ----------
+    bases : tuple of Station
+    seed, count : int
+    length_s : int
+        Of each recording. [s]
+    form : "parquet" or "csv.gz"
+    """
+
+    bases: tuple[Station, ...]
+    seed: int
+    count: int
+    length_s: int
+    form: Form
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """The plan as the manifest says it, without the count."""
+        return {
+            "schema": SCHEMA,
+            "version": version("wetwell"),
+            "seed": self.seed,
+            "length_s": self.length_s,
+            "format": self.form,
+            "base_stations": [_plain(base) for base in self.bases],
+        }
+
+
+def make_dataset(plan: Plan, folder: Path, workers: int) -> dict[str, object]:
+    """Make a set, or what is missing of it, with a progress bar on standard error.
+
+    Returns
+    -------
+    summary : dict
+        Items, how many were there already, items by class, rows.
+
+    Raises
+    ------
+    ConfigError
+        If the folder holds another set, another run works in it, or no item can be sampled.
+    RecordingError
+        If a file cannot be written.
+    KeyboardInterrupt
+        On Ctrl-C; what is whole stays.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    with _journal(folder) as journal:
+        known = _known_entries(plan, folder)
+        for partial in folder.glob(".*.part"):
+            partial.unlink(missing_ok=True)
+        journal.seek(0)
+        journal.truncate()
+        for line in (plan.header, *known.values()):
+            journal.write(_line(line))
+        journal.flush()
+        entries: dict[int, Entry] = {}
+        kept = 0
+        for entry, was_kept in _made(plan, folder, workers, known):
+            entries[entry["number"]] = entry
+            kept += was_kept
+            if not was_kept:
+                journal.write(_line(entry))
+                journal.flush()
+        items = [entries[number] for number in range(plan.count)]
+        classes = Counter(item["class"] for item in items)
+        manifest = plan.header | {
+            "count": plan.count,
+            "classes": {label: classes[label] for label in labels() if classes[label]},
+            "items": items,
+        }
+        with whole_file(folder / MANIFEST) as file:
+            file.write(json.dumps(manifest, indent=1).encode() + b"\n")
+        (folder / JOURNAL).unlink()
+    rows = sum(item["rows"] for item in items)
+    return {"dataset": str(folder), "items": len(items), "kept": kept, "rows": rows, "classes": manifest["classes"]}
+
+
+def check_dataset(folder: Path) -> dict[str, object]:
+    """Compare every file of a set with its checksum.
+
+    Raises
+    ------
+    RecordingError
+        If there is no manifest, or a file is missing or changed; names the first and counts the rest.
+    """
+    manifest = _read_manifest(folder / MANIFEST)
+    faults: list[str] = []
+    items = manifest["items"]
+    try:
+        for item in items:
+            for key in FILES:
+                name = str(item[key])
+                path = folder / name
+                if Path(name).name != name:
+                    faults.append(f"{folder / MANIFEST}: '{name}' is not a file of this folder")
+                elif not path.is_file():
+                    faults.append(f"{path}: is missing")
+                elif _sha256(path) != item["sha256"][key]:
+                    faults.append(f"{path}: is not what the manifest says, its SHA-256 differs")
+    except (KeyError, TypeError) as error:
+        raise RecordingError(f"{folder / MANIFEST}: is not a manifest of '{SCHEMA}': {error}") from error
+    if faults:
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        raise RecordingError(f"{faults[0]}{more}")
+    return {
+        "dataset": str(folder),
+        "items": len(items),
+        "files": len(FILES) * len(items),
+        "state": "as the manifest says",
+    }
+
+
+def _plain(table: Table) -> dict[str, Any]:
+    """A table as TOML and JSON can hold it."""
+    plain: dict[str, Any] = table.model_dump(mode="json", exclude_none=True)
+    return plain
+
+
+def _line(value: dict[str, Any]) -> str:
+    return json.dumps(value) + "\n"
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def _journal(folder: Path) -> Iterator[Any]:
+    """The journal, locked against a second run."""
+    path = folder / JOURNAL
+    try:
+        with path.open("a+", encoding="utf-8") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise ConfigError(f"{folder}: another run makes this dataset") from None
+            yield file
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        manifest = json.loads(path.read_bytes())
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise RecordingError(f"{path}: is not JSON: {error}") from error
+    if (
+        not isinstance(manifest, dict)
+        or manifest.get("schema") != SCHEMA
+        or not isinstance(manifest.get("items"), list)
+    ):
+        raise RecordingError(f"{path}: is not a manifest of '{SCHEMA}'")
+    return manifest
+
+
+def _known_entries(plan: Plan, folder: Path) -> dict[int, Entry]:
+    """Entries of an earlier run by number, if it was of this plan and version.
+
+    Raises
+    ------
+    ConfigError
+        If the folder holds a set of another plan.
+    """
+    known: dict[int, Entry] = {}
+    if (folder / MANIFEST).exists():
+        manifest = _read_manifest(folder / MANIFEST)
+        if _is_same(manifest, plan, folder):
+            known |= {item["number"]: item for item in manifest["items"]}
+    lines = []
+    for text in (folder / JOURNAL).read_text(encoding="utf-8").splitlines():
+        with contextlib.suppress(ValueError):  # the last line of a run that was killed
+            lines.append(json.loads(text))
+    if lines and _is_same(lines[0], plan, folder):
+        known |= {item["number"]: item for item in lines[1:]}
+    return known
+
+
+def _is_same(header: dict[str, Any], plan: Plan, folder: Path) -> bool:
+    for key, value in plan.header.items():
+        if key != "version" and header.get(key) != value:
+            raise ConfigError(f"{folder}: holds a dataset with another {key.replace('_', ' ')}; take another folder")
+    return bool(header["version"] == plan.header["version"])
+
+
+def _made(plan: Plan, folder: Path, workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
+    """Yield each entry and whether it was there already, in the order in which they get done."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("dataset", total=plan.count)
+        run = _one_by_one if workers == 1 else _in_parallel
+        for result in run(plan, folder, workers, known):
+            progress.advance(task)
+            yield result
+
+
+def _one_by_one(plan: Plan, folder: Path, _workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
+    for number in range(plan.count):
+        yield _make(plan, folder, number, known.get(number))
+
+
+def _in_parallel(plan: Plan, folder: Path, workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
+    numbers = iter(range(plan.count))
+    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_parent)
+    try:
+        waiting: set[Future[tuple[Entry, bool]]] = set()
+        while True:
+            with _held_signals():  # the workers inherit it: Ctrl-C is this process's alone
+                for number in islice(numbers, _AHEAD * workers - len(waiting)):
+                    waiting.add(pool.submit(_make, plan, folder, number, known.get(number)))
+            if not waiting:
+                return
+            done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
+    except BrokenProcessPool as error:
+        raise WetwellError("a worker of the dataset was killed (out of memory?); run again to resume") from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that started it is gone, even killed."""
+    parent = multiprocessing.parent_process()
+
+    def follow() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _held_signals() -> Iterator[None]:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _make(plan: Plan, folder: Path, number: int, known: Entry | None) -> tuple[Entry, bool]:
+    """Entry of one item, and whether its files were there already."""
+    try:
+        item = item_of(plan.bases, plan.seed, number, plan.length_s)
+        simulation = Simulation(item.station, item.scenario, item.seed)
+    except ValueError as error:
+        raise ConfigError(f"item {number}: {error}") from error
+    entry = _entry(item, plan)
+    if known is not None and _is_whole(folder, entry, known):
+        return known, True
+    _write_toml(folder / entry["station_file"], item.station)
+    _write_toml(folder / entry["scenario_file"], item.scenario)
+    write_simulated(simulation, plan.length_s, folder / entry["file"])
+    return entry | {"sha256": {key: _sha256(folder / entry[key]) for key in FILES}}, False
+
+
+def _entry(item: Item, plan: Plan) -> Entry:
+    stem = f"{item.number:06}"
+    return {
+        "number": item.number,
+        "file": f"{stem}.{plan.form}",
+        "station_file": f"{stem}.station.toml",
+        "scenario_file": f"{stem}.scenario.toml",
+        "class": item.label,
+        "kinds": [fault.kind for fault in item.scenario.fault],
+        "seed": item.seed,
+        "rows": plan.length_s,
+        "station": _plain(item.station),
+        "scenario": _plain(item.scenario),
+    }
+
+
+def _is_whole(folder: Path, entry: Entry, known: Entry) -> bool:
+    sums = known.get("sha256", {})
+    return known == entry | {"sha256": sums} and all(
+        (folder / entry[key]).is_file() and _sha256(folder / entry[key]) == sums.get(key) for key in FILES
+    )
+
+
+def _write_toml(path: Path, table: Table) -> None:
+    with whole_file(path) as file:
+        tomli_w.dump(_plain(table), file)
+
+
+def plan_of(bases: Sequence[Station], seed: int, count: int, days: float, form: Form) -> Plan:
+    """Plan of a set, checked by sampling its first item.
+
+    Raises
+    ------
+    ConfigError
+        If no item can be made of it.
+    """
+    plan = Plan(bases=tuple(bases), seed=seed, count=count, length_s=round(days * 86_400), form=form)
+    try:
+        item_of(plan.bases, seed, 0, plan.length_s)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    return plan
