@@ -11,6 +11,7 @@ from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.recording import read_recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import Station, load_station, load_toml
+from wetwell.simulator.duty import check_operable
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.scenario import Scenario
 
@@ -30,13 +31,13 @@ def find_station(name_or_path: str) -> Station:
     Raises
     ------
     ConfigError
-        If there is none, its file breaks a rule, or one of its effects does.
+        If there is none, its file breaks a rule, one of its effects does, or it cannot be operated.
     """
     with as_file(_PLANT / "stations") as folder:
         path = _find(name_or_path, folder, "station")
         station = load_station(path)
     try:
-        effective_parameters(station)
+        check_operable(station.name, effective_parameters(station))
     except ValueError as error:
         raise ConfigError(f"{path}: {error}") from error
     return station

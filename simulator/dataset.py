@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from wetwell.protocols.station import Control, EffectTable, Pump, Station
+from wetwell.simulator.duty import check_operable
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import STATION_QUANTITIES, Profile, PumpFault, SensorFault, SystemFault
@@ -170,7 +171,7 @@ def _station(base: Station, number: int, rng: np.random.Generator) -> Station:
     for _ in range(_TRIES):
         try:
             station = Station.model_validate(_station_table(base, number, rng))
-            effective_parameters(station)
+            check_operable(station.name, effective_parameters(station))
         except ValueError:  # also pydantic's
             continue
         if _capacity_m3h(station) > 0.0:

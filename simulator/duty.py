@@ -7,8 +7,45 @@ import numpy as np
 from wetwell.protocols.curve_fit import fit_error_m
 from wetwell.protocols.station import Pump, Station
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.plant import PlantParameters, plant_parameters
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw
+
+MIN_EXCESS = 0.01
+"""Share by which a shut-off head must exceed the lift: what lies nearer is within the tolerance of any datasheet."""
+
+
+def check_operable(station: str, parameters: PlantParameters) -> None:
+    """Refuse a plant that could be simulated but not operated; its effects count.
+
+    Raises
+    ------
+    ValueError
+        If a stop level lies under the floor, the overflow not over the first start level, or the shut-off head of a
+        pump in service at nominal speed does not exceed the static head at the last start level by `MIN_EXCESS`: it
+        would turn and move no water. One line.
+    """
+    start_m, stop_m, crest_m = parameters.start_levels_m, parameters.stop_levels_m, parameters.overflow_level_m
+    place = f"station '{station}'"
+    if stop_m[0] < 0.0:
+        raise ValueError(
+            f"{place}: control.stop_levels_m[1] = {stop_m[0]:g} lies under the floor: the pump would never stop"
+        )
+    if crest_m <= start_m[0]:
+        raise ValueError(
+            f"{place}: sump.overflow_level_m: got {crest_m:g}, must lie over control.start_levels_m[1] = "
+            f"{start_m[0]:g}, or the wet well overflows before a pump starts"
+        )
+    rise_m = parameters.lift_slope * (start_m[-1] - parameters.lift_reference_m)
+    static_head_m = max(parameters.static_head_m - rise_m, 0.0)
+    for number, (shutoff_m, automatic) in enumerate(
+        zip(parameters.curves[:, 0], parameters.is_automatic, strict=True), start=1
+    ):
+        if automatic and shutoff_m <= static_head_m * (1.0 + MIN_EXCESS):
+            raise ValueError(
+                f"{place}: pump[{number}]: curve does not meet the system curve: shut-off head {shutoff_m:g} m must "
+                f"exceed the static head of {static_head_m:g} m, effects included, by {MIN_EXCESS:.0%}, or no water "
+                "flows"
+            )
 
 
 def duty_table(station: Station) -> dict[str, object]:

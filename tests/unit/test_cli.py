@@ -80,6 +80,74 @@ def test_an_error_is_one_line(
     assert sorted(tmp_path.iterdir()) == before
 
 
+FLAT = STATION.replace("36.0", "20.0") + "rising_main.static_head_m = "
+NO_DUTY = "station 's': pump[1]: curve does not meet the system curve: shut-off head"
+BAD_STATIONS = {
+    "no lift left": (FLAT + "20.0", "pump[1]: shut-off head 20 m must exceed rising_main.static_head_m = 20 m"),
+    "hardly any lift left": (
+        FLAT + "19.9",
+        f"{NO_DUTY} 20 m must exceed the static head of 19.9 m, effects included, by 1%",
+    ),
+    "no lift left by an effect": (
+        FLAT + '15.0\n[[effect]]\nname = "static_head_bias"\noffset_m = 6.0',
+        f"{NO_DUTY} 20 m must exceed the static head of 21 m, effects included",
+    ),
+    "no lift left by wear": (
+        FLAT + '13.0\n[[effect]]\nname = "pump_wear"\nhead_loss = 0.4',
+        f"{NO_DUTY} 12 m must exceed the static head of 13 m",
+    ),
+    "stop at start": (
+        STATION + "control = {start_levels_m = [1.0], stop_levels_m = [1.0]}",
+        "control: stop_levels_m[1] = 1 must lie under start_levels_m[1] = 1",
+    ),
+    "stop under the floor": (
+        STATION + "control = {start_levels_m = [1.0], stop_levels_m = [-0.1]}",
+        "station 's': control.stop_levels_m[1] = -0.1 lies under the floor: the pump would never stop",
+    ),
+    "overflow at start": (
+        STATION + "sump.overflow_level_m = 1.6",
+        "station 's': sump.overflow_level_m: got 1.6, must lie over control.start_levels_m[1] = 1.6, or the wet well",
+    ),
+    "area falls to zero": (
+        STATION + "sump.profile = [[0.0, 8.0], [2.0, 0.0]]",
+        "sump.profile[2][2]: got 0.0, input should be greater than 0",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), BAD_STATIONS.values(), ids=BAD_STATIONS)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["station", "check", "{station}"],
+        ["station", "show", "{station}"],
+        ["simulate", "--out", "{tmp}/x.csv", "--station", "{station}"],
+        ["dataset", "--out", "{tmp}/set", "--station", "{station}"],
+        ["up", "--station", "{station}"],
+        ["simulator", "--station", "{station}"],
+        ["plc", "--station", "{station}"],
+        ["detector", "--station", "{station}"],
+        ["validate", "--recording", "{tmp}/none.csv", "--station", "{station}"],
+    ],
+    ids=" ".join,
+)
+def test_a_station_that_cannot_work_is_refused_at_every_start(
+    command: list[str],
+    text: str,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    station = tmp_path / "station.toml"
+    station.write_text(text)
+    assert run(monkeypatch, *(argument.format(station=station, tmp=tmp_path) for argument in command)) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"wetwell: {station}: ")
+    assert said in line
+    assert list(tmp_path.iterdir()) == [station]
+
+
 def test_wrong_flags_end_with_2(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(monkeypatch, "simulate", "--nosuch") == 2
     assert "--nosuch" in capsys.readouterr().err

@@ -140,6 +140,30 @@ BAD_FILES = {
     ),
     "levels fall": (changed("[1.6, 1.8, 2.0]", "[1.6, 1.5, 2.0]"), "must not fall from one pump to the next"),
     "level NaN": (changed("[1.6, 1.8, 2.0]", "[1.6, nan, 2.0]"), "control.start_levels_m[2]: got nan"),
+    "start under stop": (
+        changed("[1.6, 1.8, 2.0]", "[0.4, 1.8, 2.0]"),
+        "control: stop_levels_m[1] = 0.5 must lie under start_levels_m[1] = 0.4",
+    ),
+    "last start equals its stop": (
+        changed("[0.5, 0.8, 1.0]", "[0.5, 0.8, 2.0]"),
+        "control: stop_levels_m[3] = 2 must lie under start_levels_m[3] = 2",
+    ),
+    "profile area zero": (
+        changed("area_m2 = 8.0", "area_m2 = 8.0\nprofile = [[0.0, 0.0], [1.0, 8.0]]"),
+        "sump.profile[1][2]: got 0.0, input should be greater than 0",
+    ),
+    "profile area falls to zero": (
+        changed("area_m2 = 8.0", "area_m2 = 8.0\nprofile = [[0.0, 8.0], [1.0, 4.0], [2.0, 0.0]]"),
+        "sump.profile[3][2]: got 0.0, input should be greater than 0",
+    ),
+    "profile area falls under zero": (
+        changed("area_m2 = 8.0", "area_m2 = 8.0\nprofile = [[0.0, 8.0], [2.0, -1.0]]"),
+        "sump.profile[2][2]: got -1.0, input should be greater than 0",
+    ),
+    "profile levels double": (
+        changed("area_m2 = 8.0", "area_m2 = 8.0\nprofile = [[0.0, 8.0], [1.0, 4.0], [1.0, 5.0]]"),
+        "sump: profile: levels must rise from 0, got [0.0, 1.0, 1.0]",
+    ),
     "unequal numbers of levels": (
         changed("[1.6, 1.8, 2.0]", "[1.6, 1.8]"),
         "control: as many stop_levels_m as start_levels_m are needed, got 3 and 2",
