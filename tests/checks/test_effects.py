@@ -141,6 +141,11 @@ def test_docs_have_a_row_that_names_component_and_parameters(name, effect):
         assert f"`{field}`" in row
 
 
+def test_docs_name_no_effect_that_is_not_registered():
+    rows = [line for line in DOCS.read_text(encoding="utf-8").splitlines() if line.startswith("| `")]
+    assert [row.split("`")[1] for row in rows] == list(EFFECTS)
+
+
 @every_effect
 def test_zero_strength_changes_no_bit(name, effect, alpha, plain):
     if not effect.neutral:

@@ -13,7 +13,7 @@ from wetwell.protocols.errors import first_fault
 from wetwell.protocols.station import load_toml
 from wetwell.simulator.channels import FIRST_PUMP
 from wetwell.simulator.faults import FAULTS
-from wetwell.simulator.faults.profile import Profile, SensorFault, SystemFault
+from wetwell.simulator.faults.profile import Profile, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.inflow import INFLOWS
 from wetwell.simulator.plant import healthy_forcing
 from wetwell.simulator.scenario import Scenario
@@ -29,6 +29,7 @@ NEEDED = {
     "time_s": [0.0, 30.0, 45.0],
     "flow_m3h": [3.0, 0.0, 1e-7],
 }
+DOCS = Path(__file__).parents[2] / "docs"
 EXPLAINED = {"recorded"}
 """Parts that are a lookup, not an equation."""
 
@@ -61,6 +62,33 @@ def test_registries_are_not_empty():
 @every_part
 def test_kind_is_the_registry_key(kind, part):
     assert part(**needed(part)).kind == kind
+
+
+def rows_of(page):
+    """Rows of the tables of a page whose first cell is a name."""
+    lines = (DOCS / page).read_text(encoding="utf-8").splitlines()
+    return [line for line in lines if line.startswith("| `") and line.count("|") >= 4]
+
+
+@every_part
+def test_docs_have_a_row_that_names_every_parameter(kind, part):
+    (row,) = [line for line in rows_of("faults.md" if kind in FAULTS else "inflows.md") if f"| `{kind}` |" in line]
+    for name in set(part.model_fields) - set(Profile.model_fields) - {"kind"}:
+        assert f"`{name}`" in row
+    if kind in FAULTS:
+        concerns = "pump" if issubclass(part, PumpFault) else "system" if issubclass(part, SystemFault) else "sensor"
+        assert f"| {concerns} |" in row
+    for name, field in part.model_fields.items():
+        if isinstance(field.default, int | float) and name not in {"pump", "duty"}:
+            inherited = Profile.model_fields.get(name)
+            if inherited is None or inherited.default != field.default:
+                assert f"{field.default:g}" in row, f"{kind}: default of {name} is not {field.default:g} in the docs"
+
+
+@pytest.mark.parametrize(("page", "registry"), [("faults.md", FAULTS), ("inflows.md", INFLOWS)])
+def test_docs_name_no_kind_that_is_not_registered(page, registry):
+    common = {"start_s", "after", "shape", "period_s"}
+    assert {row.split("`")[1] for row in rows_of(page)} - common == set(registry)
 
 
 @every_part

@@ -1,6 +1,7 @@
 """Sets on disk: the same bytes from one process and from two, resumed, interrupted, checked."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -97,6 +98,24 @@ def test_the_manifest_rebuilds_every_file(monkeypatch, folder, made) -> None:
         assert set(recording.truth["truth_state"]) - {"normal"} <= {item["class"], "pump_fault", "system_fault"}
         assert (item["class"] == "normal") == (set(recording.truth["truth_state"]) == {"normal"})
         assert item["class"] in recording.truth["truth_state"]
+
+
+def test_the_example_of_the_docs(monkeypatch, tmp_path, capsys) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "datasets.md").read_text(encoding="utf-8")
+    shell, python = (re.findall(rf"```{form}\n(.*?)```", text, flags=re.DOTALL) for form in ("sh", "python"))
+    monkeypatch.chdir(tmp_path)
+    commands = [line.split() for line in shell[0].splitlines()]
+    assert [command[:2] for command in commands] == [["wetwell", "dataset"]] * 2
+    for command in commands:
+        assert run(monkeypatch, *command[1:]) == 0
+    assert "items: 10" in capsys.readouterr().out
+    exec(python[0], {})  # noqa: S102 - the text of our own docs
+    manifest = json.loads((tmp_path / "pumps" / "manifest.json").read_text())
+    (row,) = [line for line in text.splitlines() if line.startswith("| `manifest.json`")]
+    for key in manifest:
+        assert key in row or key in {"items", "classes"}
+    names = {path.name for path in (tmp_path / "pumps").iterdir()}
+    assert {"000001.parquet", "000001.station.toml", "000001.scenario.toml", "manifest.json"} <= names
 
 
 def test_the_check_finds_a_changed_byte(monkeypatch, folder, capsys) -> None:
