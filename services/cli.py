@@ -246,13 +246,16 @@ def validate(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Simulated recording that is written.")
     ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Page with plots that is written; needs no network.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run the simulator under the inflow of a recording and compare level, starts and run time."""
     from wetwell.services.field_data import validate_file
     from wetwell.services.presets import find_station
 
-    _print(validate_file(find_station(station), recording, preparation, out), as_json=as_json)
+    _print(validate_file(find_station(station), recording, preparation, out, html), as_json=as_json)
 
 
 @app.command()

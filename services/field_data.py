@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import tomli_w
 from pydantic import ValidationError
 
@@ -11,6 +13,7 @@ from wetwell.protocols.recording import Recording, read_recording, write_recordi
 from wetwell.protocols.stamps import to_iso
 from wetwell.protocols.station import Station, load_toml
 from wetwell.protocols.whole_file import whole_file
+from wetwell.services.validation_report import validation_page
 from wetwell.sim2real.calibration import calibrate, with_estimates
 from wetwell.sim2real.preparation import Preparation, PreparationReport, prepare
 from wetwell.sim2real.validation import validate
@@ -81,13 +84,15 @@ def calibrate_file(station: Station, recording: Path, preparation: Path | None, 
     }
 
 
-def validate_file(station: Station, recording: Path, preparation: Path | None, out: Path | None) -> dict[str, Any]:
-    """Compare the free-running simulator with a recording; write the simulated recording where asked.
+def validate_file(
+    station: Station, recording: Path, preparation: Path | None, out: Path | None, html: Path | None = None
+) -> dict[str, Any]:
+    """Compare the free-running simulator with a recording; write the simulated recording and a page where asked.
 
     Raises
     ------
     RecordingError
-        If the recording cannot be used.
+        If the recording cannot be used, or a file cannot be written.
     """
     rows, _ = prepared(recording, preparation)
     try:
@@ -96,6 +101,9 @@ def validate_file(station: Station, recording: Path, preparation: Path | None, o
         raise RecordingError(f"{recording}: {error}") from error
     if out is not None:
         write_recording(simulated, out)
+    if html is not None:
+        with whole_file(html) as file:
+            file.write(validation_page(station, rows, simulated, result).encode())
     days = [
         {
             "day": day,
@@ -108,7 +116,17 @@ def validate_file(station: Station, recording: Path, preparation: Path | None, o
         for row, day in enumerate(result.days)
         for pump in range(len(station.pump))
     ]
-    return {"level_nmae": round(result.level_nmae, 5), "inflow": result.inflow, "days": days}
+    return {
+        "level_nmae": round(result.level_nmae, 5),
+        "starts_nmae": _rounded(result.starts_nmae),
+        "run_h_nmae": _rounded(result.run_h_nmae),
+        "inflow": result.inflow,
+        "days": days,
+    }
+
+
+def _rounded(values: npt.NDArray[np.float64]) -> list[float | None]:
+    return [round(value, 5) if np.isfinite(value) else None for value in values.tolist()]
 
 
 def write_station(station: Station, out: Path) -> None:

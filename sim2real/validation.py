@@ -41,6 +41,16 @@ class Validation:
     starts: npt.NDArray[np.int64]
     run_h: Floats
 
+    @property
+    def starts_nmae(self) -> Floats:
+        """(pumps,) sum over the days of the absolute difference of starts, over the sum of the measured ones."""
+        return _normalised(self.starts.astype(np.float64))
+
+    @property
+    def run_h_nmae(self) -> Floats:
+        """(pumps,) the same of the run time."""
+        return _normalised(self.run_h)
+
 
 def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[Validation, Recording]:
     """Comparison, and the simulated recording on the seconds of the measured one.
@@ -101,3 +111,10 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
         ),
         simulated,
     )
+
+
+def _normalised(figures: Floats) -> Floats:
+    """(pumps,) error of (2, days, pumps) measured and simulated figures; NaN where nothing was measured."""
+    measured = figures[0].sum(axis=0)
+    error = np.abs(figures[1] - figures[0]).sum(axis=0)
+    return np.asarray(np.where(measured > 0.0, error / np.where(measured > 0.0, measured, 1.0), np.nan))

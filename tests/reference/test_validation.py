@@ -1,14 +1,18 @@
 """Free-running comparison of a simulator with a recording."""
 
+from xml.etree import ElementTree as ET
+
 import numpy as np
 import pytest
 
-from wetwell.protocols.recording import Recording
+from wetwell.protocols.recording import Recording, write_recording
+from wetwell.services.field_data import validate_file
 from wetwell.services.presets import find_scenario
-from wetwell.sim2real.validation import validate
+from wetwell.sim2real.validation import Validation, validate
 from wetwell.simulator.simulation import Simulation
 
 DAY_S = 86_400
+SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +29,35 @@ def test_the_right_station_under_the_measured_inflow_agrees_in_starts_and_run_ti
     assert result.level_nmae < 0.1
     assert len(simulated) == len(recording)
     assert result.starts[0].sum() > 60
+
+
+def test_errors_of_days_are_sums_of_differences_over_the_measured_sum():
+    result = Validation(
+        inflow="measured",
+        level_nmae=0.1,
+        days=("2025-01-01", "2025-01-02"),
+        starts=np.array([[[10, 0], [30, 0]], [[12, 1], [28, 0]]]),
+        run_h=np.array([[[2.0, 0.0], [2.0, 0.0]], [[1.0, 0.0], [2.0, 0.0]]]),
+    )
+    np.testing.assert_allclose(result.starts_nmae, [0.1, np.nan])
+    np.testing.assert_allclose(result.run_h_nmae, [0.25, np.nan])
+
+
+def test_the_page_draws_both_levels_and_every_pump(alpha, recording, tmp_path):
+    source, out = tmp_path / "day.parquet", tmp_path / "page.html"
+    write_recording(recording, source)
+    printed = validate_file(alpha, source, None, None, out)
+    assert printed["level_nmae"] < 0.1
+    assert len(printed["starts_nmae"]) == 3
+    root = ET.fromstring(out.read_text(encoding="utf-8").removeprefix("<!DOCTYPE html>\n"))  # noqa: S314
+    titles = [chart.find(f"{SVG}title").text for chart in root.iter(f"{SVG}svg")]
+    pumps = [f"Pump {pump}: {what}" for what in ("starts", "run time") for pump in (1, 2, 3)]
+    assert titles == ["Level", "Level, the first six hours", *pumps]
+    level = next(root.iter(f"{SVG}svg"))
+    assert [path.get("d", "").count("L") > 500 for path in level.iter(f"{SVG}path")] == [True, True]
+    cells = [cell.text for cell in root.iter("td")]
+    assert cells[:2] == ["level, over its range", f"{printed['level_nmae']:.2%}"]
+    assert len(cells) == 2 * 7
 
 
 def test_without_a_measured_inflow_it_is_inferred(alpha, recording):
