@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from wetwell.protocols.curve_fit import fit_pump_curve
+from wetwell.protocols.curve_fit import fit_error_m, fit_pump_curve
 from wetwell.protocols.errors import ConfigError, first_fault
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -18,6 +18,9 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(gt=0, le=1)]
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 """A station's name is a chunk of a Zenoh key and of a file name."""
+
+MAX_MISFIT = 0.1
+"""Root mean square distance of datasheet points from their curve over its shut-off head, at the most."""
 
 
 def check_levels(start_levels_m: tuple[float, ...], stop_levels_m: tuple[float, ...]) -> None:
@@ -82,6 +85,12 @@ class Pump(Table):
             raise ValueError(f"curve: shut-off head c0 must be positive, got {c0:g} m")
         if c1 > 0 or c2 > 0 or c1 + c2 == 0:
             raise ValueError(f"curve: head must fall with flow (c1 <= 0, c2 <= 0), got c1 = {c1:g}, c2 = {c2:g}")
+        misfit_m = fit_error_m(self.points, self.coefficients) if self.points else 0.0
+        if misfit_m > MAX_MISFIT * c0:
+            raise ValueError(
+                f"points: the best falling curve misses them by {misfit_m:.3g} m, more than {MAX_MISFIT:.0%} of its "
+                f"shut-off head of {c0:.3g} m; is a point [flow_m3h, head_m], and does the head fall?"
+            )
         return self
 
     @cached_property

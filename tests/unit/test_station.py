@@ -204,6 +204,10 @@ BAD_FILES = {
         changed("[[0.0, 36.0], [100.0, 32.3337], [200.0, 26.0008]]", "[[0, 9], [1, 10], [2, 12]]"),
         "pump[2]: curve: head must fall with flow",
     ),
+    "points that fall and rise": (
+        changed("[[0.0, 36.0], [100.0, 32.3337], [200.0, 26.0008]]", "[[0, 36], [100, 10], [200, 30]]"),
+        "pump[2]: points: the best falling curve misses them by 10.8 m, more than 10% of its",
+    ),
     "negative flow in points": (changed("[[0.0, 36.0]", "[[-1.0, 36.0]"), "pump[2].points[1][1]: got -1.0"),
     "wrong layout": (
         changed('"common"', '"shared"'),
