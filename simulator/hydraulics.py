@@ -88,7 +88,8 @@ def flow_at_head_m3h(
     if lift_m <= 0.0 or (speed_ratio <= 0.0 and inertia_m_m3h <= 0.0):
         return 0.0
     b = inertia_m_m3h - c1 * speed_ratio
-    return 2.0 * lift_m / (b + math.sqrt(b * b - 4.0 * c2 * lift_m))
+    divisor = b + math.sqrt(b * b - 4.0 * c2 * lift_m)
+    return 2.0 * lift_m / divisor if divisor > 0.0 else 0.0  # 0 / 0 where the lift underflows
 
 
 @compiled

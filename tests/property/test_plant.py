@@ -211,6 +211,7 @@ def test_flow_at_head_inverts_the_curve(curve, speed_ratio, share):
     st.one_of(st.just(0.0), numbers(1e-9, 1.0)),
 )
 @example([((30.0, 0.0, -1e-3), 1.0), ((15.0, 0.0, -1e-3), 1.0)], 2.0, 6e-4)
+@example([((1.0, -0.0, -4e-4), 1.0), ((1.0, -0.0, -2.5e-5), 1.56e-160)], 0.0, 1.0)
 def test_header_balances_and_shares_one_head(pumps, static_head_m, friction_h2_m5):
     """Each pump meets the header's head, or is behind a closed check valve because it cannot reach it."""
     flow_m3h = np.zeros(len(pumps))
