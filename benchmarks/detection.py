@@ -1,141 +1,117 @@
-"""Quality of the detector on simulated stations: one JSON object on standard output.
+"""Quality of the detector and its baselines on simulated stations: one JSON object on standard output.
 
-    python benchmarks/detection.py --seeds 10 --first-seed 1000
+    python benchmarks/detection.py --seeds 20 --first-seed 1000
+    python benchmarks/detection.py --seeds 2 --only nominal --detectors wetwell,paper_f_shift
 
-Seeds below 100 are for looking while the detector is changed; figures are told of seeds from 1000 on.
+Seeds below 100 are for looking while a detector is changed; figures are told of seeds from 1000 on.
 """
 
 import argparse
 import importlib.metadata
 import json
 import os
-import time
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, SupportsFloat
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.detector.scoring import (
-    FalseAlarms,
-    ScoredRun,
-    detection_delay_s,
-    false_alarms,
-    macro_f1,
-    poisson_interval,
-    precision_and_recall,
-    scored_runs,
-)
-from wetwell.protocols.messages import State, Verdict
+from wetwell.protocols.recording import Recording
 from wetwell.protocols.station import Station
+from wetwell.services.backtest import SimulatedRecording, detector_names, run_backtest
 from wetwell.services.presets import find_scenario, find_station
+from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.blockage import Blockage
 from wetwell.simulator.faults.pipe_clogging import PipeClogging
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.surges import Surges
 from wetwell.simulator.scenario import Scenario
-from wetwell.simulator.simulation import Simulation
 
-CHUNK_S = 3600
-FAULTS: tuple[State, ...] = ("pump_fault", "system_fault")
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What one seed gave."""
-
-    runs: list[ScoredRun]
-    alarms: FalseAlarms
-    delays_s: dict[State, float | None]
-    samples: int
-    judging_s: float
+DAY_S = 86_400
+LEARNING_S = DAY_S / 4
 
 
-def configurations() -> dict[str, tuple[Station, Scenario]]:
-    """Stations and scenarios by name."""
-    station, paper = find_station("alpha"), find_scenario("paper")
-    noisy = station.sensors.model_copy(update={"flow_noise": 0.03, "head_noise": 0.03})
-    common = station.rising_main.model_copy(update={"layout": "common"})
-    small = (
-        Blockage(pump=1, speed_loss=0.05, start_s=33_600, end_s=42_600, after="clear"),
-        PipeClogging(friction_rise=0.25, start_s=126_400, end_s=148_000, after="clear"),
+@dataclass(frozen=True, slots=True)
+class BiasedRecording(SimulatedRecording):
+    """The flow meters of all pumps are wrong by up to 1 %, in a sine of a day."""
+
+    def load(self) -> Recording:
+        """Simulate, then bend the measured flows."""
+        recording = SimulatedRecording.load(self)
+        factor = 1.0 + 0.01 * np.sin(2.0 * np.pi * np.arange(len(recording)) / DAY_S)
+        columns = {
+            name: values * factor if name.endswith("_flow_m3h") else values
+            for name, values in recording.columns.items()
+        }
+        return replace(recording, columns=columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """Stations and scenarios of one row of the table."""
+
+    station: Station
+    scenario: Scenario
+    kind: type[SimulatedRecording] = SimulatedRecording
+    learning_s: float = LEARNING_S
+
+
+def configurations() -> dict[str, Configuration]:
+    """Rows of the table by name."""
+    alpha, paper, nominal = find_station("alpha"), find_scenario("paper"), find_scenario("nominal")
+    wet = paper.model_copy(update={"inflow": DiurnalInflow(surges=Surges(flow_m3h=80.0))})
+    small = faults(paper, blockage(33_600, 0.05), clogging(0.25))
+    both = faults(
+        paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=148_000, after="clear"), clogging(0.25)
     )
-    wet = DiurnalInflow(surges=Surges(flow_m3h=80.0))
+    later = faults(paper, blockage(90_000, 0.4), *paper.fault[1:])
+    correlated = with_sensors(alpha, correlation=0.95)
     return {
-        "paper": (station, paper),
-        "pump 5 % of speed, friction +25 %": (station, paper.model_copy(update={"fault": small})),
-        "3 % noise": (station.model_copy(update={"sensors": noisy}), paper),
-        "common header, two and three pumps on at times": (
-            station.model_copy(update={"rising_main": common}),
-            paper.model_copy(update={"inflow": wet}),
+        "paper": Configuration(alpha, paper),
+        "pump 5 % of speed, friction +25 %": Configuration(alpha, small),
+        "3 % noise": Configuration(with_sensors(alpha, flow_noise=0.03, head_noise=0.03), paper),
+        "static head follows the level": Configuration(
+            altered(alpha, effect=[{"name": "level_dependent_static_head", "slope": 1.0}]), paper
         ),
-        "nominal": (station, find_scenario("nominal")),
+        "common header, two and three pumps on at times": Configuration(
+            altered(alpha, rising_main=alpha.rising_main.model_dump() | {"layout": "common"}), wet
+        ),
+        "noise AR(1) 0.95": Configuration(correlated, paper),
+        "flow meters ±1 % over the day": Configuration(alpha, later, BiasedRecording, DAY_S),
+        "both at once, 10 % of speed and friction +25 %": Configuration(alpha, both),
+        "nominal": Configuration(alpha, nominal),
+        "nominal, noise AR(1) 0.95, flow meters ±1 % over the day": Configuration(
+            correlated, nominal, BiasedRecording, DAY_S
+        ),
     }
 
 
-def outcome(name: str, seed: int) -> Outcome:
-    """Simulate one seed of a configuration, judge it, then score it."""
-    station, scenario = configurations()[name]
-    recording = Simulation(station, scenario, seed).advance(int(scenario.duration_s))
-    detector = Detector(station.name, nominal_of(station))
-    stream = recording.samples(station.name)
-    verdicts: list[Verdict] = []
-    judging_s = 0.0
-    for _ in range(0, len(recording), CHUNK_S):
-        chunk = [sample for sample, _ in zip(stream, range(CHUNK_S), strict=False)]
-        started_s = time.perf_counter()
-        for sample in chunk:
-            verdicts.extend(detector.update(sample))
-        judging_s += time.perf_counter() - started_s
-    verdicts.extend(detector.finish())
-    return Outcome(
-        runs=scored_runs(verdicts, recording),
-        alarms=false_alarms(verdicts, recording),
-        delays_s={state: detection_delay_s(verdicts, recording, state) for state in FAULTS},
-        samples=len(recording),
-        judging_s=judging_s,
-    )
+def blockage(start_s: float, speed_loss: float) -> Blockage:
+    return Blockage(pump=1, speed_loss=speed_loss, start_s=start_s, end_s=start_s + 9000.0, after="clear")
 
 
-def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Figures of one configuration over its seeds."""
-    scores = [macro_f1(one.runs) for one in outcomes]
-    runs = [run for one in outcomes for run in one.runs]
-    count = sum(one.alarms.count for one in outcomes)
-    days = sum(one.alarms.station_days for one in outcomes)
-    states = sorted({run.truth for run in runs})
-    delays_s = {state: [one.delays_s[state] for one in outcomes] for state in FAULTS if state in states}
-    return {
-        "macro_f1": {"mean": _rounded(np.mean(scores)), "quantile_5": _rounded(np.quantile(scores, 0.05))},
-        "states": {
-            state: dict(zip(("precision", "recall"), map(_rounded, precision_and_recall(runs, state)), strict=True))
-            for state in states
-        },
-        "false_alarms": {
-            "count": count,
-            "station_days": _rounded(days),
-            "per_station_day": _rounded(count / days),
-            "interval_95": [_rounded(limit) for limit in poisson_interval(count, days)],
-        },
-        "detection_delay_s": {
-            state: {
-                "median": float(np.median([np.inf if delay is None else delay for delay in delays])),
-                "missed": delays.count(None),
-            }
-            for state, delays in delays_s.items()
-        },
-        "abstention_share": _rounded(sum(run.told == "unknown" for run in runs) / len(runs)),
-        "runs": len(runs),
-        "station_samples_per_s": round(sum(one.samples for one in outcomes) / sum(one.judging_s for one in outcomes)),
-    }
+def clogging(friction_rise: float) -> PipeClogging:
+    return PipeClogging(friction_rise=friction_rise, start_s=126_400, end_s=148_000, after="clear")
 
 
-def _rounded(value: SupportsFloat) -> float:
-    return round(float(value), 4)
+def faults(scenario: Scenario, *given: Fault) -> Scenario:
+    return scenario.model_copy(update={"fault": given})
+
+
+def with_sensors(station: Station, **changes: float) -> Station:
+    return altered(station, sensors=station.sensors.model_dump() | changes)
+
+
+def altered(station: Station, **changes: Any) -> Station:
+    return Station.model_validate(station.model_dump(exclude_none=True) | changes)
+
+
+def figures(configuration: Configuration, seeds: range, detectors: list[str], processes: int) -> Mapping[str, Any]:
+    """Figures of each detector on one row."""
+    sources = [configuration.kind(configuration.station, configuration.scenario, seed) for seed in seeds]
+    result = run_backtest(sources, detectors, processes, configuration.learning_s)
+    return {"learning_h": result["learning_h"], "detectors": result["detectors"]}
 
 
 def main() -> None:
@@ -143,10 +119,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds")
     parser.add_argument("--first-seed", type=int, default=1000)
     parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument("--detectors", default="all", help="names with commas between")
+    parser.add_argument("--only", action="append", choices=list(configurations()), help="one row; may be given again")
     arguments = parser.parse_args()
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
-    with ProcessPoolExecutor(arguments.processes) as pool:
-        figures = {name: summary(list(pool.map(partial(outcome, name), seeds))) for name in configurations()}
+    detectors = detector_names(arguments.detectors)
+    rows = {name: row for name, row in configurations().items() if name in (arguments.only or configurations())}
     about = {
         "benchmark": "detection",
         "version": importlib.metadata.version("wetwell"),
@@ -154,7 +132,11 @@ def main() -> None:
         "cores": os.cpu_count(),
         "processes": arguments.processes,
     }
-    print(json.dumps(about | {"configurations": figures}, indent=2))
+    done = {}
+    for name, row in rows.items():
+        print(name, file=sys.stderr)
+        done[name] = figures(row, seeds, detectors, arguments.processes)
+    print(json.dumps(about | {"configurations": done}, indent=2))
 
 
 if __name__ == "__main__":

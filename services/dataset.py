@@ -8,28 +8,21 @@ import contextlib
 import fcntl
 import hashlib
 import json
-import multiprocessing
-import os
-import signal
-import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
-from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
 import tomli_w
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
+from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.station import Station, Table
 from wetwell.protocols.whole_file import whole_file
 from wetwell.services.batch import write_simulated
+from wetwell.services.parallel import work_through
 from wetwell.simulator.dataset import Item, item_of, labels
 from wetwell.simulator.simulation import Simulation
 
@@ -37,7 +30,6 @@ SCHEMA = "wetwell.dataset/1"
 MANIFEST = "manifest.json"
 JOURNAL = "manifest.part.jsonl"
 FILES = ("file", "station_file", "scenario_file")
-_AHEAD = 4  # items in the queue for each worker
 
 Form = Literal["parquet", "csv.gz"]
 Entry = dict[str, Any]
@@ -135,7 +127,7 @@ def check_dataset(folder: Path) -> dict[str, object]:
     RecordingError
         If there is no manifest, or a file is missing or changed; names the first and counts the rest.
     """
-    manifest = _read_manifest(folder / MANIFEST)
+    manifest = read_manifest(folder / MANIFEST)
     faults: list[str] = []
     items = manifest["items"]
     try:
@@ -192,7 +184,14 @@ def _journal(folder: Path) -> Iterator[Any]:
         raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def _read_manifest(path: Path) -> dict[str, Any]:
+def read_manifest(path: Path) -> dict[str, Any]:
+    """What the manifest of a dataset says.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be read or is none.
+    """
     try:
         manifest = json.loads(path.read_bytes())
     except OSError as error:
@@ -218,7 +217,7 @@ def _known_entries(plan: Plan, folder: Path) -> dict[int, Entry]:
     """
     known: dict[int, Entry] = {}
     if (folder / MANIFEST).exists():
-        manifest = _read_manifest(folder / MANIFEST)
+        manifest = read_manifest(folder / MANIFEST)
         if _is_same(manifest, plan, folder):
             known |= {item["number"]: item for item in manifest["items"]}
     lines = []
@@ -239,63 +238,13 @@ def _is_same(header: dict[str, Any], plan: Plan, folder: Path) -> bool:
 
 def _made(plan: Plan, folder: Path, workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
     """Yield each entry and whether it was there already, in the order in which they get done."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("dataset", total=plan.count)
-        run = _one_by_one if workers == 1 else _in_parallel
-        for result in run(plan, folder, workers, known):
-            progress.advance(task)
-            yield result
+    tasks = ((number, known.get(number)) for number in range(plan.count))
+    return work_through(partial(_make, plan, folder), tasks, plan.count, workers, "dataset")
 
 
-def _one_by_one(plan: Plan, folder: Path, _workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
-    for number in range(plan.count):
-        yield _make(plan, folder, number, known.get(number))
-
-
-def _in_parallel(plan: Plan, folder: Path, workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
-    numbers = iter(range(plan.count))
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_parent)
-    try:
-        waiting: set[Future[tuple[Entry, bool]]] = set()
-        while True:
-            with _held_signals():  # the workers inherit it: Ctrl-C is this process's alone
-                for number in islice(numbers, _AHEAD * workers - len(waiting)):
-                    waiting.add(pool.submit(_make, plan, folder, number, known.get(number)))
-            if not waiting:
-                return
-            done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in done:
-                yield future.result()
-    except BrokenProcessPool as error:
-        raise WetwellError("a worker of the dataset was killed (out of memory?); run again to resume") from error
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _end_with_parent() -> None:
-    """End this worker when the process that started it is gone, even killed."""
-    parent = multiprocessing.parent_process()
-
-    def follow() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
-
-
-@contextlib.contextmanager
-def _held_signals() -> Iterator[None]:
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _make(plan: Plan, folder: Path, number: int, known: Entry | None) -> tuple[Entry, bool]:
-    """Entry of one item, and whether its files were there already."""
+def _make(plan: Plan, folder: Path, task: tuple[int, Entry | None]) -> tuple[Entry, bool]:
+    """Entry of one item, and whether its files were there already; a task is its number and what is known of it."""
+    number, known = task
     try:
         item = item_of(plan.bases, plan.seed, number, plan.length_s)
         simulation = Simulation(item.station, item.scenario, item.seed)
