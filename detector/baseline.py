@@ -1,4 +1,4 @@
-"""The baseline: where the residuals of a healthy pump lie, and how they scatter. Learnt, checked, then fixed."""
+"""The baseline: what a healthy pump shows at any operating point, and how it scatters. Learnt, then fixed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,17 +6,50 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.runs import Run
+from wetwell.detector.runs import Segments
 
 Floats = npt.NDArray[np.float64]
+Curve = tuple[float, float, float]
 
 MIN_RUNS = 4
 MIN_SEGMENTS = 2
-FLOOR_SHARE = 0.002
+FLOOR_SHARE = 0.001
 """Smallest standard deviation of a run's mean, as a share of the shut-off head: slow sensor bias."""
-DRIFT_SIGMAS = 5.0
-SIBLING_SHARE = 0.1
-"""Pumps with the same curve may differ by this share of their shut-off head."""
+SLOPE_SHARE = 0.1
+"""Standard deviation of the datasheet's slopes, as a share of each."""
+LEVEL_SLOPE = 0.6
+"""Standard deviation of what a metre of level does to a residual, before anything is seen. [m/m]"""
+SPREAD_SHARE = 0.01
+"""Operating points that lie closer together than this share of the flow say nothing of slopes."""
+MAX_CORRELATION = 0.95
+OUTLIER_SIGMAS = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Model:
+    r"""A residual as a function of the operating point, with what is not known of it.
+
+    $$r = \beta_0 + \sum_j \beta_j (x_j - x_{j0}), \qquad \beta \sim N(\hat\beta, V)$$
+
+    Attributes
+    ----------
+    origin : (p,) array
+        x0: where it was learnt.
+    slope_prior : (p,) array
+        Prior variances of the slopes.
+    mean, covariance : (p + 1,), (p + 1, p + 1) arrays
+        Of the offset and the slopes.
+    """
+
+    origin: Floats
+    slope_prior: Floats
+    mean: Floats
+    covariance: Floats
+
+    def at(self, point: Floats) -> tuple[float, float]:
+        """Residual at an operating point (p,), and the variance of that. [m, m²]."""
+        basis = np.concatenate(([1.0], point - self.origin))
+        return float(basis @ self.mean), float(basis @ self.covariance @ basis)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,111 +58,246 @@ class Baseline:
 
     Attributes
     ----------
-    offset_m : (2,) array
-        Median of the level residuals (r_p, r_s). [m]
+    pump, system : Model
+        r_p over (Q/N, (Q/N)², level) and r_s over (Q_tot², level). [m]
+    duty_fit, duty_total_fit : (2,) arrays
+        Intercept and slope that turn flows by the datasheet into those that were measured: Q/N, Q_tot. [m³/h, 1]
+    flow_scatter : float
+        Twice the standard deviation of the measured flow from that line between runs, as a share of it.
+    level_m : float
+        Mean level while the pump ran steadily; NaN where no level was measured. [m]
     segment_covariance : (2, 2) array
         Covariance of segment means within a run, times `correlation_factor`. [m²]
     correlation_factor : float
         Growth of the variance of a run's mean by correlation between its segments.
-    run_variance : (2,) array
-        Variance of run means that the scatter within runs does not explain, floor included. [m²]
-    flow_m3h, total_m3h : float
-        Median of Q/N and of the total flow: where the offset was learnt. [m³/h]
+    run_covariance : (2, 2) array
+        Covariance of run means that the scatter within runs does not explain, floor included. [m²]
     """
 
-    offset_m: Floats
+    pump: Model
+    system: Model
+    duty_fit: Floats
+    duty_total_fit: Floats
+    flow_scatter: float
+    level_m: float
     segment_covariance: Floats
     correlation_factor: float
-    run_variance: Floats
-    flow_m3h: float
-    total_m3h: float
+    run_covariance: Floats
 
-    def with_noise_of(self, run: Run, weight: float) -> "Baseline":
-        """The baseline with its scatter moved towards that of a normal run; the offset never moves."""
-        if len(run.segments) < 3:
+    @property
+    def offset_m(self) -> Floats:
+        """(2,) residuals where they were learnt."""
+        return np.array([self.pump.mean[0], self.system.mean[0]])
+
+    @property
+    def flow_m3h(self) -> float:
+        """Q/N where it was learnt."""
+        return float(self.pump.origin[0])
+
+    @property
+    def total_m3h(self) -> float:
+        """Flow of the main where it was learnt."""
+        return float(np.sqrt(self.system.origin[0]))
+
+    def shifts(self, segments: Segments) -> Floats:
+        """(m, 2) distance of segments from what the baseline expects at their operating points. [m]."""
+        level_m = self._levels(segments.level_m)
+        pump = _pump_points(segments.flow_m3h, level_m) - self.pump.origin
+        system = _system_points(segments.total_m3h, level_m) - self.system.origin
+        expected = (pump @ self.pump.mean[1:], system @ self.system.mean[1:])
+        shifts: Floats = segments.residual_m - self.offset_m - np.column_stack(expected)
+        return shifts
+
+    def deviations(self, runs: Sequence[Segments]) -> Floats:
+        """(runs, 2) distance of the means of healthy runs from what is expected at the datasheet's flows. [m]."""
+        level_m = self.level_m if np.isfinite(self.level_m) else 0.0
+        slopes = np.array([self.pump.mean[-1], self.system.mean[-1]])
+        at_level = np.full(len(runs), level_m)
+        flow_m3h = self.duty_fit[0] + self.duty_fit[1] * _means(runs, "duty_m3h")
+        total_m3h = self.duty_total_fit[0] + self.duty_total_fit[1] * _means(runs, "duty_total_m3h")
+        means = np.array([_without_level(run, slopes, self.level_m).mean(axis=0) for run in runs])
+        expected = (
+            _expected(self.pump, _pump_points(flow_m3h, at_level)),
+            _expected(self.system, _system_points(total_m3h, at_level)),
+        )
+        deviations: Floats = means - np.column_stack(expected)
+        return deviations
+
+    def explained_flows(self, segments: Segments) -> tuple[float, float]:
+        """Q/N and Q_tot that the running pumps and their speeds explain, without any fault. [m³/h]."""
+        return (
+            float(self.duty_fit @ (1.0, np.median(segments.duty_m3h))),
+            float(self.duty_total_fit @ (1.0, np.median(segments.duty_total_m3h))),
+        )
+
+    def variances(self, flow_m3h: float, total_m3h: float, level_m: float) -> Floats:
+        """(2,) variances of what is expected at an operating point. [m²]."""
+        level = self._levels(np.array([level_m]))
+        return np.array(
+            [
+                self.pump.at(_pump_points(np.array([flow_m3h]), level)[0])[1],
+                self.system.at(_system_points(np.array([total_m3h]), level)[0])[1],
+            ]
+        )
+
+    def with_noise_of(self, segments: Segments, weight: float) -> "Baseline":
+        """The baseline with its scatter moved towards that of a normal run; what it expects never moves."""
+        if len(segments) < 3:
             return self
-        recent = np.cov(run.segments, rowvar=False) * self.correlation_factor
+        recent = np.cov(segments.residual_m, rowvar=False) * self.correlation_factor
         limit = 4.0 * np.trace(self.segment_covariance)
         recent *= min(1.0, limit / max(float(np.trace(recent)), 1e-300))
         return replace(self, segment_covariance=(1.0 - weight) * self.segment_covariance + weight * recent)
 
+    def _levels(self, level_m: Floats) -> Floats:
+        return np.where(np.isnan(level_m), self.level_m if np.isfinite(self.level_m) else 0.0, level_m)
 
-def learn(runs: Sequence[Run], shutoff_head_m: float) -> Baseline:
-    """Baseline from the fault-free runs of one pump, at least `MIN_RUNS` with `MIN_SEGMENTS` segments each."""
-    means = np.array([run.segments.mean(axis=0) for run in runs])
-    counts = np.array([len(run.segments) for run in runs])
-    centred = np.concatenate([run.segments - mean for run, mean in zip(runs, means, strict=True)])
-    freedom = max(len(centred) - len(runs), 1)
-    factor = _correlation_factor(runs)
-    within = centred.T @ centred / freedom * factor
-    unexplained = means.var(axis=0, ddof=1) - np.diag(within) * np.mean(1.0 / counts)
-    floor = (FLOOR_SHARE * shutoff_head_m) ** 2
-    flow = np.concatenate([run.flow_m3h / run.speed_ratio for run in runs])
-    total = np.concatenate([run.total_flow_m3h for run in runs])
+
+def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Baseline:
+    """Baseline from the fault-free runs of one pump, at least `MIN_RUNS` with `MIN_SEGMENTS` segments each.
+
+    The slopes start from those of the datasheet and move as far as the data ask for. The flows that stand for the
+    operating point are those that the datasheet says for the running pumps and their speeds, fitted to the measured
+    ones: the noise of the flow meter would bend the slopes towards zero (errors in variables).
+    """
+    floor = (FLOOR_SHARE * curve[0]) ** 2
+    level_m = float(np.nanmean(levels)) if np.isfinite(levels := _joined(runs, "level_m")).any() else np.nan
+    level_slopes = _level_slopes(runs)
+    centred = [_without_level(run, level_slopes, level_m) for run in runs]
+    factor = _correlation_factor(centred)
+    deviations = np.concatenate([part - part.mean(axis=0) for part in centred])
+    within = deviations.T @ deviations / max(len(deviations) - len(runs), 1) * factor
+    means = np.array([part.mean(axis=0) for part in centred])
+    counts = np.array([len(run) for run in runs])
+    duty_fit, flow_m3h = _fitted(runs, "duty_m3h", "flow_m3h")
+    duty_total_fit, total_m3h = _fitted(runs, "duty_total_m3h", "total_m3h")
+    level_variance = np.diag(within) / max(_level_weight(runs), 1e-300)
+    at_level = np.full(len(runs), level_m if np.isfinite(level_m) else 0.0)
+    pump_points, system_points = _pump_points(flow_m3h, at_level), _system_points(total_m3h, at_level)
+    pump_prior = SLOPE_SHARE**2 * np.array([curve[1] ** 2, curve[2] ** 2])
+    system_prior = np.array([(SLOPE_SHARE * friction_h2_m5) ** 2])
+    run_covariance = np.eye(2) * floor
+    weights = np.ones(len(runs))
+    for _ in range(3):
+        variance = (np.diag(within)[None, :] / counts[:, None] + np.diag(run_covariance)) / weights[:, None]
+        pump = _fit(pump_points, means[:, 0], variance[:, 0], pump_prior, level_slopes[0], level_variance[0])
+        system = _fit(system_points, means[:, 1], variance[:, 1], system_prior, level_slopes[1], level_variance[1])
+        left = means - np.column_stack([_expected(pump, pump_points), _expected(system, system_points)])
+        sigmas = np.abs(left) / np.sqrt(variance * weights[:, None])
+        weights = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(sigmas.max(axis=1), 1e-12))
+        scatter = (left * weights[:, None]).T @ (left * weights[:, None]) / (weights.sum() - 1.0)
+        run_covariance = _positive(scatter - within * np.mean(1.0 / counts)) + np.eye(2) * floor
     return Baseline(
-        offset_m=np.median(np.concatenate([run.segments for run in runs]), axis=0),
+        pump=pump,
+        system=system,
+        duty_fit=duty_fit,
+        duty_total_fit=duty_total_fit,
+        flow_scatter=2.0 * float(np.std(_means(runs, "flow_m3h") - flow_m3h)) / max(float(flow_m3h.mean()), 1e-9),
+        level_m=level_m,
         segment_covariance=within,
         correlation_factor=factor,
-        run_variance=np.maximum(unexplained, 0.0) + floor,
-        flow_m3h=float(np.median(flow)),
-        total_m3h=float(np.median(total)),
+        run_covariance=run_covariance,
     )
 
 
-def _correlation_factor(runs: Sequence[Run]) -> float:
-    """Growth of the variance of a run's mean by correlation between its segments: (1 + ρ)/(1 − ρ), ρ in 0..0.9."""
-    products = squares = 0.0
+def _pump_points(flow_m3h: Floats, level_m: Floats) -> Floats:
+    return np.column_stack([flow_m3h, flow_m3h**2, level_m])
+
+
+def _system_points(total_m3h: Floats, level_m: Floats) -> Floats:
+    return np.column_stack([total_m3h**2, level_m])
+
+
+def _joined(runs: Sequence[Segments], name: str) -> Floats:
+    return np.concatenate([getattr(run, name) for run in runs])
+
+
+def _means(runs: Sequence[Segments], name: str) -> Floats:
+    return np.array([np.mean(getattr(run, name)) for run in runs])
+
+
+def _level_weight(runs: Sequence[Segments]) -> float:
+    """Sum of squares of the level about its mean in each run. [m²]."""
+    return float(sum(np.nansum((run.level_m - _mean(run.level_m)) ** 2) for run in runs))
+
+
+def _level_slopes(runs: Sequence[Segments]) -> Floats:
+    """(2,) change of the residuals with the level within runs, drawn towards 0 by its prior. [m/m]."""
+    products, noise = np.zeros(2), np.zeros(2)
     for run in runs:
-        centred = run.segments - run.segments.mean(axis=0)
+        residual_m = run.residual_m - run.residual_m.mean(axis=0)
+        level_m = np.nan_to_num(run.level_m - _mean(run.level_m))
+        products += level_m @ residual_m
+        noise += np.sum(residual_m**2, axis=0)
+    noise /= max(sum(len(run) - 1 for run in runs), 1)
+    slopes: Floats = products / (_level_weight(runs) + noise / LEVEL_SLOPE**2)
+    return slopes
+
+
+def _without_level(run: Segments, slopes: Floats, level_m: float) -> Floats:
+    """Residuals of a run as they would be at one level; as they are where the level is not known."""
+    return run.residual_m - np.outer(np.nan_to_num(run.level_m - level_m), slopes)
+
+
+def _mean(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else np.nan
+
+
+def _fitted(runs: Sequence[Segments], duty: str, measured: str) -> tuple[Floats, Floats]:
+    """Line from the datasheet's flow to the measured one, and the (runs,) flows on that line."""
+    by_datasheet, by_meter = _means(runs, duty), _means(runs, measured)
+    deviation = by_datasheet - by_datasheet.mean()
+    if np.sqrt(np.mean(deviation**2)) > SPREAD_SHARE * max(by_datasheet.mean(), 1e-9):
+        slope = float(deviation @ by_meter / (deviation @ deviation))
+    else:
+        slope = 1.0
+    fit = np.array([by_meter.mean() - slope * by_datasheet.mean(), slope])
+    return fit, fit[0] + fit[1] * by_datasheet
+
+
+def _fit(
+    points: Floats, values: Floats, variance: Floats, slope_prior: Floats, level_slope: float, level_variance: float
+) -> Model:
+    """Bayesian regression on all but the level, of which the slope is known from within the runs."""
+    origin = points.mean(axis=0)
+    basis = np.column_stack([np.ones(len(points)), (points - origin)[:, :-1]])
+    weighted = basis / variance[:, None]
+    precision = basis.T @ weighted
+    precision[1:, 1:] += np.diag(1.0 / np.maximum(slope_prior, 1e-300))
+    scale = np.sqrt(np.diag(precision))
+    covariance = np.linalg.inv(precision / np.outer(scale, scale)) / np.outer(scale, scale)
+    mean = covariance @ (weighted.T @ values)
+    slopes = len(mean)
+    full = np.zeros((slopes + 1, slopes + 1))
+    full[:slopes, :slopes] = covariance
+    full[-1, -1] = min(level_variance, LEVEL_SLOPE**2)
+    return Model(
+        origin=origin,
+        slope_prior=np.append(slope_prior, LEVEL_SLOPE**2),
+        mean=np.append(mean, level_slope),
+        covariance=full,
+    )
+
+
+def _expected(model: Model, points: Floats) -> Floats:
+    expected: Floats = model.mean[0] + (points - model.origin) @ model.mean[1:]
+    return expected
+
+
+def _positive(covariance: Floats) -> Floats:
+    """The nearest covariance without negative variances."""
+    values, vectors = np.linalg.eigh(covariance)
+    nearest: Floats = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return nearest
+
+
+def _correlation_factor(parts: Sequence[Floats]) -> float:
+    """Growth of the variance of a run's mean by correlation between its segments: (1 + ρ)/(1 − ρ), ρ >= 0."""
+    products = squares = 0.0
+    for part in parts:
+        centred = part - part.mean(axis=0)
         products += float(np.sum(centred[1:] * centred[:-1]))
         squares += float(np.sum(centred**2))
-    correlation = min(max(products / squares, 0.0), 0.9) if squares > 0.0 else 0.0
+    correlation = min(max(products / squares, 0.0), MAX_CORRELATION) if squares > 0.0 else 0.0
     return (1.0 + correlation) / (1.0 - correlation)
-
-
-def objection(runs: Sequence[Run], shutoff_head_m: float) -> str | None:
-    """Why these runs cannot serve as a baseline, or None: the residuals must not have moved while it was learnt.
-
-    The runs are split in two at every place; the means of the two parts must agree within `DRIFT_SIGMAS`.
-    """
-    means = np.array([run.segments.mean(axis=0) for run in runs])
-    baseline = learn(runs, shutoff_head_m)
-    floor = (FLOOR_SHARE * shutoff_head_m) ** 2
-    segments = np.mean([len(run.segments) for run in runs])
-    variance = np.diag(baseline.segment_covariance) / segments + floor
-    for split in range(1, len(runs)):
-        shift_m = means[split:].mean(axis=0) - means[:split].mean(axis=0)
-        deviation_m = np.sqrt(variance * (1.0 / split + 1.0 / (len(runs) - split)))
-        worst = int(np.argmax(np.abs(shift_m) / deviation_m))
-        if abs(shift_m[worst]) > DRIFT_SIGMAS * deviation_m[worst]:
-            curve = ("pump", "system")[worst]
-            return f"the {curve} curve moved by {shift_m[worst]:+.2f} m while it was learnt"
-    return None
-
-
-def sibling_objection(
-    pump: int, offsets_m: Sequence[float | None], curves: Sequence[tuple[float, float, float]]
-) -> str | None:
-    """Why a pump cannot be healthy if its siblings are, or None.
-
-    Parameters
-    ----------
-    pump : int
-        From 0.
-    offsets_m : sequence
-        Mean of r_p of each pump in learning, None where it is not known. [m]
-    curves : sequence
-        Curves of the pumps; only pumps with the same curve are compared.
-    """
-    own_m = offsets_m[pump]
-    siblings_m = [
-        offset_m
-        for other, offset_m in enumerate(offsets_m)
-        if other != pump and offset_m is not None and curves[other] == curves[pump]
-    ]
-    if own_m is None or not siblings_m:
-        return None
-    gap_m = own_m - float(np.median(siblings_m))
-    if abs(gap_m) <= SIBLING_SHARE * curves[pump][0]:
-        return None
-    return f"its curve lies {gap_m:+.1f} m from that of its siblings, so that one of them is not healthy"

@@ -1,4 +1,4 @@
-"""The figures in a verdict: both methods of the paper, on one run."""
+"""The figures in a verdict: both methods of the paper, and what the verdict rests on."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from wetwell.detector.bootstrap import block_bootstrap_interval
 from wetwell.detector.curve_drift import pump_curve_f_test, system_curve_f_test
 from wetwell.detector.f_test import FTest
 from wetwell.detector.nominal import Nominal
+from wetwell.detector.observation import COMPONENTS, Observation
 from wetwell.detector.residuals import Array
 from wetwell.detector.runs import SEGMENT_SAMPLES, Run
 from wetwell.detector.tangent import attribution_index, tangent_residuals
@@ -45,7 +46,7 @@ def run_evidence(run: Run, nominal: Nominal, rng: np.random.Generator) -> dict[s
 
 
 def index_figures(pump_m: Array, system_m: Array, rng: np.random.Generator) -> dict[str, Any]:
-    """Attribution index of residuals and its 95 % interval, as a message carries them."""
+    """Attribution index of residuals and its 95 % interval, as a message carries it."""
     low, high = block_bootstrap_interval(
         pump_m,
         system_m,
@@ -55,6 +56,21 @@ def index_figures(pump_m: Array, system_m: Array, rng: np.random.Generator) -> d
         rng=rng,
     )
     return {"value": round(attribution_index(pump_m, system_m), 4), "interval": [round(low, 4), round(high, 4)]}
+
+
+def shift_evidence(observation: Observation) -> dict[str, Any]:
+    """How far each component of an observation lies from the baseline, and which signals that rests on."""
+    known = {
+        name: (mean, sigmas)
+        for name, mean, sigmas in zip(COMPONENTS, observation.mean, observation.sigmas, strict=True)
+        if np.isfinite(sigmas)
+    }
+    signals = ["flow", "head", "frequency", *(name for name in ("drawdown", "power") if name in known)]
+    return {
+        "shift_m": {name: round(float(known[name][0]), 4) for name in ("pump", "system")},
+        "shift_sigmas": {name: round(float(sigmas), 2) for name, (_, sigmas) in known.items()},
+        "signals": signals,
+    }
 
 
 def f_test_figures(test: FTest) -> dict[str, float]:

@@ -2,10 +2,11 @@
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from wetwell.detector.nominal import Nominal
-from wetwell.protocols.messages import PumpReading, Sample
+from wetwell.protocols.readings import PumpReadings, Readings
 from wetwell.protocols.stamps import NS_PER_S
 
 NAN = math.nan
@@ -39,6 +40,7 @@ class Frame(NamedTuple):
     time_ns: int
     gap_s: float
     level_m: float
+    inflow_m3h: float
     pumps: tuple[PumpFrame, ...]
 
 
@@ -72,7 +74,7 @@ class Gate:
         ]
         self.counts: Counter[str] = Counter()
 
-    def update(self, sample: Sample) -> Frame | None:
+    def update(self, sample: Readings) -> Frame | None:
         """Frame of a sample, or None where it is dropped."""
         self.counts["samples"] += 1
         gap_s = self._gap_s(sample.time, sample.seq)
@@ -83,34 +85,39 @@ class Gate:
             self.counts["gaps"] += 1
         if sample.quality == "bad":
             self.counts["bad_quality"] += 1
-            return Frame(sample.time, gap_s, NAN, tuple(_NOTHING for _ in self._ranges))
+            return Frame(sample.time, gap_s, NAN, NAN, tuple(_NOTHING for _ in self._ranges))
         if len(sample.pumps) != len(self._ranges):
             self.counts["wrong_pump_count"] += 1
         return Frame(
             sample.time,
             gap_s,
             self._checked(sample.level_m, LEVEL_RANGE_M),
+            NAN if sample.inflow_m3h is None or not math.isfinite(sample.inflow_m3h) else sample.inflow_m3h,
             self._pump_frames(sample.pumps),
         )
 
-    def _pump_frames(self, readings: tuple[PumpReading, ...]) -> tuple[PumpFrame, ...]:
-        checked = self._checked
-        frames = [
-            PumpFrame(
-                checked(reading.frequency_hz, frequency_range),
-                checked(reading.flow_m3h, flow_range),
-                checked(reading.head_m, head_range),
-                checked(reading.power_kw, POWER_RANGE_KW),
-                reading.running,
-            )
-            for reading, (frequency_range, flow_range, head_range) in zip(readings, self._ranges, strict=False)
-        ]
+    def _pump_frames(self, readings: Sequence[PumpReadings]) -> tuple[PumpFrame, ...]:
+        frames = []
+        for reading, (frequency_range, flow_range, head_range) in zip(readings, self._ranges, strict=False):
+            frequency_hz, flow_m3h = reading.frequency_hz, reading.flow_m3h
+            head_m, power_kw = reading.head_m, reading.power_kw
+            if frequency_hz is None or not frequency_range[0] <= frequency_hz <= frequency_range[1]:
+                frequency_hz = self._refused(frequency_hz)
+            if flow_m3h is None or not flow_range[0] <= flow_m3h <= flow_range[1]:
+                flow_m3h = self._refused(flow_m3h)
+            if head_m is None or not head_range[0] <= head_m <= head_range[1]:
+                head_m = self._refused(head_m)
+            if power_kw is None or not POWER_RANGE_KW[0] <= power_kw <= POWER_RANGE_KW[1]:
+                power_kw = self._refused(power_kw)
+            frames.append(PumpFrame(frequency_hz, flow_m3h, head_m, power_kw, reading.running))
         frames += [_NOTHING] * (len(self._ranges) - len(frames))
         return tuple(frames)
 
     def _checked(self, value: float | None, limits: Range) -> float:
-        if value is not None and limits[0] <= value <= limits[1]:
-            return value
+        return value if value is not None and limits[0] <= value <= limits[1] else self._refused(value)
+
+    def _refused(self, value: float | None) -> float:
+        """Count a value that is absent or cannot be; it becomes NaN."""
         is_missing = value is None or not math.isfinite(value)
         self.counts["missing_values" if is_missing else "out_of_range_values"] += 1
         return NAN

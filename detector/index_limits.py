@@ -7,7 +7,7 @@ import numpy as np
 
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.evidence import index_figures
-from wetwell.detector.runs import Run
+from wetwell.detector.runs import Segments
 from wetwell.detector.tangent import attribution_index
 
 RUNS = 50
@@ -32,9 +32,9 @@ class IndexLimits:
     def __init__(self) -> None:
         self._healthy: deque[float] = deque(maxlen=RUNS)
 
-    def add(self, run: Run, baseline: Baseline) -> None:
+    def add(self, segments: Segments, baseline: Baseline) -> None:
         """Take a normal run into account."""
-        self._healthy.append(attribution_index(*(run.segments - baseline.offset_m).T))
+        self._healthy.append(attribution_index(*baseline.shifts(segments).T))
 
     def limits(self) -> tuple[float, float]:
         """(system below, pump above)."""
@@ -43,9 +43,9 @@ class IndexLimits:
         low, high = np.quantile(np.array(self._healthy), [OUTER_SHARE, 1.0 - OUTER_SHARE])
         return min(float(low), SYSTEM_BELOW), max(float(high), PUMP_ABOVE)
 
-    def figures(self, run: Run, baseline: Baseline, rng: np.random.Generator) -> dict[str, Any]:
+    def figures(self, segments: Segments, baseline: Baseline, rng: np.random.Generator) -> dict[str, Any]:
         """Index, its interval, the limits, and what the index alone says: "pump", "system" or nothing."""
-        pump_m, system_m = (run.segments - baseline.offset_m).T
+        pump_m, system_m = baseline.shifts(segments).T
         figures = index_figures(pump_m, system_m, rng)
         low, high = self.limits()
         below, above = figures["interval"][1] < low, figures["interval"][0] > high

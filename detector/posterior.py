@@ -1,133 +1,164 @@
-"""Which state explains a run: normal, pump, system, or both."""
+"""Which state explains a run: normal, pump, system, both, or a meter that is wrong."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import logsumexp, ndtr
 
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import Run
+from wetwell.detector.observation import DRAWDOWN, POWER, PUMP, SYSTEM, Observation
 from wetwell.protocols.messages import State
 
 Floats = npt.NDArray[np.float64]
 
 STATES: tuple[State, ...] = ("normal", "pump_fault", "system_fault", "pump_and_system_fault")
 FAULTS = STATES[1:]
-_AFFECTED = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], dtype=float)
 
-PRIOR = np.array([0.90, 0.045, 0.045, 0.01])
-CHANGE_PER_RUN = 0.05
-SLOPE_SHARE = 0.2
-"""Standard deviation of the datasheet's slopes, as a share of each."""
-HEALTHY_FLOW_SHARE = 0.01
-"""How far level, speed and meter move the flow of a healthy pump, as a share of it."""
+NORMAL, PUMP_FAULT, SYSTEM_FAULT, BOTH, FLOW_METER, HEAD_SENSOR = range(6)
+"""Hypotheses."""
+
+SCALES = (1.0, 10.0, 0.02)
+"""Faults of the usual size, broken machines, and faults that have just begun, as factors of the variances."""
 PUMP_SHIFT_SHARE = 0.15
 SYSTEM_SHIFT_SHARE = 0.3
 SYSTEM_SHIFT_M = 1.0
+FLOW_METER_ERROR = 0.1
+HEAD_SENSOR_SHARE = 0.1
+POWER_SHIFT = 0.15
+LOAD_SHARE = 0.5
+"""Of pumps whose power follows the load, so that a fault shifts it, or whose power meter drifts in health."""
+DISTURBED_DRAWDOWN = 0.5
+DISTURBED_SHARE = 0.05
+"""Of runs in which inflow or supply disturb drawdown or power, so that they say nothing."""
+LOSING_SHARE = 0.95
+"""Of pump faults: the curve falls. A pump that gets better has been cleaned, or was not healthy when learnt."""
+RISING_SHARE = 0.9
+"""Of system faults: the main takes more head. One that takes less may have burst."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shift:
-    """How far a run lies from the baseline.
+class Scales:
+    """Standard deviations of what faults bring: shifts of both curves, and of the measured head. [m]."""
+
+    pump_m: float
+    system_m: float
+    head_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weighed:
+    """What a run says.
 
     Attributes
     ----------
-    mean_m : (2,) array
-        Shift of (r_p, r_s). [m]
-    covariance : (2, 2) array
-        Of that mean if nothing has changed: noise, floor, and what the datasheet's slopes may be wrong by over the
-        way that the flow of a healthy pump goes. [m²]
-    slope_variance : (2,) array
-        More of it where a fault has moved the flow: what the slopes may be wrong by over the rest of the way. [m²]
+    probability : (6,) array
+        Of the hypotheses; sums to one.
+    shift_m, deviation_m : (2,) arrays
+        Estimates of the shifts of (r_p, r_s) if both may have moved, and their standard deviations. [m]
+    flow_error, head_error_m : float
+        Estimates under the hypothesis that this meter is wrong. [1, m]
     """
 
-    mean_m: Floats
-    covariance: Floats
-    slope_variance: Floats
-
-    @property
-    def sigmas(self) -> Floats:
-        """(2,) shift over its standard deviation."""
-        return self.mean_m / np.sqrt(np.diag(self.covariance))
+    probability: Floats
+    shift_m: Floats
+    deviation_m: Floats
+    flow_error: float
+    head_error_m: float
 
 
-def shift_of(run: Run, baseline: Baseline, curve: tuple[float, float, float], friction_h2_m5: float) -> Shift:
-    """Shift of a run with at least one segment.
+def _ways(
+    observation: Observation, scales: Scales, known: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+    """(w,) hypothesis, (w,) logarithm of its share in that, (w, 4, 4) covariance of the shift, of each way to shift.
 
-    The median over its segments, whose variance is π/2 times that of the mean: a run in which something comes or goes
-    is told by its longer part, and a burst within it does not tell.
+    The first way of each hypothesis is the one at full scale.
     """
-    flow_m3h = float(np.median(run.flow_m3h / run.speed_ratio))
-    total_m3h = float(np.median(run.total_flow_m3h))
-    slope_variance = SLOPE_SHARE**2 * np.array(
-        [
-            (curve[1] * (flow_m3h - baseline.flow_m3h)) ** 2 + (curve[2] * (flow_m3h**2 - baseline.flow_m3h**2)) ** 2,
-            (friction_h2_m5 * (total_m3h**2 - baseline.total_m3h**2)) ** 2,
+    tau_p, tau_s = scales.pump_m**2, scales.system_m**2
+    v_p, v_s = observation.slope_variance
+    flow, head = (np.outer(direction, direction) for direction in (observation.flow_meter, observation.head_sensor))
+    causes = [(NORMAL, np.zeros((4, 4)))]
+    for scale in SCALES:
+        causes += [
+            (PUMP_FAULT, np.diag([scale * tau_p, v_s, 0.0, 0.0])),
+            (SYSTEM_FAULT, np.diag([v_p, scale * tau_s, 0.0, 0.0])),
+            (BOTH, np.diag([scale * tau_p + v_p, scale * tau_s + v_s, 0.0, 0.0])),
+            (FLOW_METER, scale * FLOW_METER_ERROR**2 * flow),
+            (HEAD_SENSOR, scale * scales.head_m**2 * head),
         ]
-    )
-    healthy_variance = slope_variance * _healthy_share(flow_m3h, total_m3h, baseline) ** 2
-    return Shift(
-        mean_m=np.median(run.segments, axis=0) - baseline.offset_m,
-        covariance=baseline.segment_covariance * (np.pi / 2.0 / len(run.segments))
-        + np.diag(baseline.run_variance + healthy_variance),
-        slope_variance=slope_variance - healthy_variance,
-    )
+    ways = []
+    for hypothesis, matrix in causes:
+        log_scale = 0.0 if hypothesis == NORMAL else -np.log(len(SCALES))
+        followed = DISTURBED_SHARE if hypothesis in (FLOW_METER, HEAD_SENSOR) else LOAD_SHARE
+        for drawdown in (0.0, DISTURBED_DRAWDOWN**2) if known[DRAWDOWN] else (0.0,):
+            for power in (0.0, POWER_SHIFT**2) if known[POWER] else (0.0,):
+                share = (DISTURBED_SHARE if drawdown else 1.0 - DISTURBED_SHARE) if known[DRAWDOWN] else 1.0
+                share *= (followed if power else 1.0 - followed) if known[POWER] else 1.0
+                ways.append((hypothesis, log_scale + np.log(share), matrix + np.diag([0.0, 0.0, drawdown, power])))
+    hypotheses, log_shares, matrices = zip(*ways, strict=True)
+    return np.array(hypotheses), np.array(log_shares), np.array(matrices)
 
 
-def _healthy_share(flow_m3h: float, total_m3h: float, baseline: Baseline) -> float:
-    """Share of the way of the flow from the baseline that the other pumps on the main, or no fault, explain."""
-    others_m3h = (total_m3h - flow_m3h) - (baseline.total_m3h - baseline.flow_m3h)
-    explained_m3h = abs(others_m3h) + HEALTHY_FLOW_SHARE * baseline.flow_m3h
-    moved_m3h = max(abs(flow_m3h - baseline.flow_m3h), abs(total_m3h - baseline.total_m3h))
-    return min(1.0, explained_m3h / moved_m3h) if moved_m3h > 0.0 else 1.0
-
-
-def shift_scales_m(nominal: Nominal, pump: int, baseline: Baseline) -> Floats:
-    """(2,) standard deviations of the shifts that faults bring, before anything is seen. [m]."""
-    return np.array(
-        [
-            PUMP_SHIFT_SHARE * nominal.curves[pump][0],
-            SYSTEM_SHIFT_SHARE * nominal.friction_h2_m5 * baseline.total_m3h**2 + SYSTEM_SHIFT_M,
-        ]
+def fault_scales(nominal: Nominal, pump: int, baseline: Baseline) -> Scales:
+    """Scales for a pump (from 0)."""
+    shutoff_m = nominal.curves[pump][0]
+    return Scales(
+        pump_m=PUMP_SHIFT_SHARE * shutoff_m,
+        system_m=SYSTEM_SHIFT_SHARE * nominal.friction_h2_m5 * baseline.total_m3h**2 + SYSTEM_SHIFT_M,
+        head_m=HEAD_SENSOR_SHARE * shutoff_m,
     )
 
 
-def posterior(shift: Shift, scales_m: Floats, prior: Floats) -> Floats:
-    r"""Probability of each of `STATES` after a run.
+def weigh(observation: Observation, scales: Scales, prior: Floats) -> Weighed:
+    r"""Probability of each hypothesis after a run.
 
-    $$P(s \mid r) \propto P(s)\; N(r;\ 0,\ C + D_s), \qquad
-    D_s = \mathrm{diag}(a_p \tau_p^2 + a_s v_p,\ a_s \tau_s^2 + a_p v_s)$$
+    $$P(h \mid y) \propto P(h)\; N(y;\ 0,\ C + D_h)\; S_h, \qquad
+    D_{fault} = \mathrm{diag}(a_p \tau_p^2 + a_s v_p,\ a_s \tau_s^2 + a_p v_s,\ 0,\ \tau_P^2 \text{ or } 0),
+    \qquad D_{meter} = \tau_m^2\, d\, d^T$$
 
-    where a says which of the two curves state s moves, τ how far faults move them, and v what the slope of each curve
-    may be wrong by: a pump fault moves the flow along the system curve, a system fault along the pump curve.
+    where a says which of the two curves a fault moves, τ how far, v what the slope of each curve may be wrong by (a
+    pump fault moves the flow along the system curve, a system fault along the pump curve), d how a wrong meter moves
+    all components, and S how usual the sign of the shift is. Each τ stands for large and for small shifts,
+    weighed alike. The power may follow the load or not, or drift: it tells a wrong meter from a fault, but no fault
+    from health. In a few runs the drawdown is disturbed by something else and says nothing. Components that are not
+    known are left out.
 
     Parameters
     ----------
-    shift : Shift
-        r, C and v.
-    scales_m : (2,) array
-        τ. [m]
-    prior : (4,) array
-        P(s).
-
-    Returns
-    -------
-    probability : (4,) array
-        Sums to one.
+    observation : Observation
+        y, C, v and d.
+    scales : Scales
+        τ.
+    prior : (6,) array
+        P(h).
     """
-    log_weight = np.log(prior)
-    for state, affected in enumerate(_AFFECTED):
-        moved = affected * scales_m**2 + affected[::-1] * shift.slope_variance
-        covariance = shift.covariance + np.diag(moved)
-        _, log_determinant = np.linalg.slogdet(covariance)
-        distance = shift.mean_m @ np.linalg.solve(covariance, shift.mean_m)
-        log_weight[state] -= 0.5 * (log_determinant + distance)
+    known = np.isfinite(observation.mean) & np.isfinite(np.diag(observation.covariance))
+    mean = observation.mean[known]
+    tau_p, tau_s = scales.pump_m**2, scales.system_m**2
+    hypotheses, log_share, spread = _ways(observation, scales, known)
+    every = spread[:, known][:, :, known] + observation.covariance[np.ix_(known, known)]
+    _, log_determinant = np.linalg.slogdet(every)
+    inverse = np.linalg.inv(every)
+    log_each = log_share - 0.5 * (log_determinant + np.einsum("i,hij,j->h", mean, inverse, mean))
+    each = range(HEAD_SENSOR + 1)
+    log_likelihood = np.array([logsumexp(log_each[hypotheses == hypothesis]) for hypothesis in each])
+    inverse = inverse[[int(np.argmax(hypotheses == hypothesis)) for hypothesis in each]]
+    rows = [int(np.flatnonzero(np.flatnonzero(known) == component)[0]) for component in (PUMP, SYSTEM)]
+    estimates = np.array([tau_p, tau_s]) * (inverse[BOTH] @ mean)[rows]
+    variances = np.array([tau_p, tau_s]) - np.array([tau_p, tau_s]) ** 2 * np.diag(inverse[BOTH])[rows]
+    deviations = np.sqrt(np.maximum(variances, 1e-300))
+    is_losing, is_rising = ndtr(-estimates[PUMP] / deviations[PUMP]), ndtr(estimates[SYSTEM] / deviations[SYSTEM])
+    usual_pump = 2.0 * (LOSING_SHARE * is_losing + (1.0 - LOSING_SHARE) * (1.0 - is_losing))
+    usual_system = 2.0 * (RISING_SHARE * is_rising + (1.0 - RISING_SHARE) * (1.0 - is_rising))
+    log_weight = np.log(prior) + log_likelihood
+    log_weight[[PUMP_FAULT, BOTH]] += np.log(usual_pump)
+    log_weight[[SYSTEM_FAULT, BOTH]] += np.log(usual_system)
     weight = np.exp(log_weight - log_weight.max())
-    probability: Floats = weight / weight.sum()
-    return probability
-
-
-def prior_of_next_run(probability: Floats) -> Floats:
-    """Prior of the next run: the last posterior, mixed with how faults come and go between runs."""
-    return (1.0 - CHANGE_PER_RUN) * probability + CHANGE_PER_RUN * PRIOR
+    return Weighed(
+        probability=weight / weight.sum(),
+        shift_m=estimates,
+        deviation_m=deviations,
+        flow_error=float(FLOW_METER_ERROR**2 * observation.flow_meter[known] @ inverse[FLOW_METER] @ mean),
+        head_error_m=float(scales.head_m**2 * observation.head_sensor[known] @ inverse[HEAD_SENSOR] @ mean),
+    )

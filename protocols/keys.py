@@ -13,6 +13,11 @@ def verdict_key(station: str, pump: int | str = "*") -> str:
     return f"{ROOT}/{station}/verdict/{pump}"
 
 
+def order_key(station: str) -> str:
+    """Key of the orders of operators to the detector of a station."""
+    return f"{ROOT}/{station}/order/detector"
+
+
 def status_key(station: str, service: str) -> str:
     """Key of the health figures of one service of a station."""
     return f"{ROOT}/{station}/status/{service}"

@@ -1,4 +1,4 @@
-"""Messages on the bus: sample, verdict, status. JSON with `schema`, times in ISO 8601 UTC."""
+"""Messages on the bus: sample, verdict, order, status. JSON with `schema`, times in ISO 8601 UTC."""
 
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
@@ -112,6 +112,18 @@ class Verdict(Message):
     evidence: dict[str, Any]
     onset: Stamp | None = None
     window: tuple[Stamp, Stamp]
+
+
+class Order(Message):
+    """An act of an operator on the detector of a station; the verdict that follows carries its `id` as evidence."""
+
+    schema_name: Literal["wetwell.order/1"] = Field("wetwell.order/1", alias="schema")
+    id: str = Field(min_length=1, max_length=64)
+    time: Stamp
+    station: str
+    pump: int = Field(ge=1)
+    act: Literal["rebaseline", "revert"]
+    by: str = Field(min_length=1, max_length=64)
 
 
 class Status(Message):

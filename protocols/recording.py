@@ -12,6 +12,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ import pyarrow.parquet
 
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages import PumpReading, Sample
+from wetwell.protocols.readings import PumpRow, Row
 from wetwell.protocols.stamps import from_iso, to_iso_array
 from wetwell.protocols.whole_file import whole_file
 
@@ -87,6 +89,24 @@ class Recording:
                 inflow_m3h=inflow_m3h,
                 pumps=tuple(_reading(pump, row) for pump in pump_values),
             )
+
+    def rows(self) -> Iterator[Row]:
+        """Yield the rows as they are, without the checks of a message."""
+        pumps = [
+            zip(
+                *(self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES[:-1]),
+                map(_flag, self.column(f"pump{i}_{PUMP_QUANTITIES[-1]}").tolist()),
+                strict=True,
+            )
+            for i in range(1, self.pumps + 1)
+        ]
+        station = (self.column(name).tolist() for name in STATION_COLUMNS)
+        of_pumps = zip(*(map(PumpRow._make, pump) for pump in pumps), strict=True)
+        return map(Row, count(), self.time_ns.tolist(), *station, of_pumps)
+
+
+def _flag(number: float) -> bool | None:
+    return number > 0 if number == number else None  # noqa: PLR0124 - the quickest test for NaN
 
 
 def _value(number: float) -> float | None:

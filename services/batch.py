@@ -66,15 +66,15 @@ def detect(station: Station, recording: Recording, out: Path) -> dict[str, objec
     detector = Detector(station.name, nominal_of(station))
     states: Counter[str] = Counter()
     with whole_file(out) as file:
-        for verdict in _verdicts(detector, station, recording):
+        for verdict in _verdicts(detector, recording):
             states[verdict.state] += 1
             file.write(verdict.encode() + b"\n")
     return {"verdicts": dict(states), "counts": detector.counts}
 
 
-def _verdicts(detector: Detector, station: Station, recording: Recording) -> Iterator[Verdict]:
+def _verdicts(detector: Detector, recording: Recording) -> Iterator[Verdict]:
     samples = track(
-        recording.samples(station.name),
+        recording.rows(),
         total=len(recording),
         description="judging",
         console=Console(stderr=True),

@@ -133,14 +133,46 @@ def plc(
     )
 
 
-@app.command()
-def detector(station: StationOption = "alpha", zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
+detector_app = typer.Typer(invoke_without_command=True)
+app.add_typer(detector_app, name="detector")
+
+
+@detector_app.callback()
+def detector(
+    context: typer.Context,
+    station: StationOption = "alpha",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+) -> None:
     """Judge the samples of a station on Zenoh and publish verdicts."""
+    if context.invoked_subcommand is not None:
+        return
     from wetwell.services.detector import serve_detector
     from wetwell.services.presets import find_station
 
     settings = _settings(config, zenoh)
     _run(settings, serve_detector(settings, find_station(station)))
+
+
+@detector_app.command()
+def rebaseline(
+    pump: Annotated[int, typer.Option(min=1, help="Pump, from 1.")],
+    by: Annotated[str, typer.Option(help="Who orders it; kept in the log and in the verdict.")],
+    station: StationOption = "alpha",
+    revert: Annotated[bool, typer.Option("--revert", help="Take the baseline back that was put aside last.")] = False,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Order a running detector to learn a pump anew, after a repair; what it knew is put aside."""
+    from wetwell.services.orders import send_order
+    from wetwell.services.presets import find_station
+
+    name = find_station(station).name
+    settings = _settings(config, zenoh)
+    verdict = asyncio.run(send_order(settings, name, pump, "revert" if revert else "rebaseline", by))
+    answer = {"station": name, "pump": pump, "state": verdict.state, "reason": verdict.evidence.get("reason")}
+    _print(answer | {"baseline": verdict.evidence.get("baseline")}, as_json=as_json)
 
 
 @app.command()
@@ -208,6 +240,46 @@ def detect(
     for name in rows.ignored:
         typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
     _print(judge(plant, rows, out), as_json=as_json)
+
+
+@app.command()
+def backtest(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for backtest.json and backtest.html.")],
+    station: StationOption = "alpha",
+    recording: Annotated[
+        list[Path] | None, typer.Option("--recording", metavar="FILE", help="With truth columns; may be given again.")
+    ] = None,
+    scenario: Annotated[
+        list[str] | None, typer.Option("--scenario", metavar="NAME", help="To simulate; may be given again.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds of each scenario.")] = 1,
+    first_seed: Annotated[int, typer.Option("--first-seed", min=0, help="The first of them.")] = 1,
+    days: Annotated[float | None, typer.Option(help="Length of each; default: the scenario's.")] = None,
+    dataset: Annotated[
+        Path | None, typer.Option("--dataset", metavar="DIR", help="Folder that `wetwell dataset` has made.")
+    ] = None,
+    detectors: Annotated[
+        str, typer.Option(metavar="NAMES", help="With commas between; `all` for every one.")
+    ] = "wetwell,paper_f_test,paper_tangent,paper_f_shift,paper_tangent_segments",
+    learning_h: Annotated[
+        float, typer.Option("--learning-h", min=0.0, help="Runs that end in these first hours are not scored.")
+    ] = 6.0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Score verdicts against truth: ours, the paper's two methods, their best readings and outside detectors."""
+    from wetwell.services.backtest import detector_names, overview, run_backtest, sources_of, write_backtest
+    from wetwell.services.presets import find_scenario, find_station
+
+    names = detector_names(detectors)
+    length_s = None if days is None else max(round(_positive(days, "--days") * 86_400.0), 1)
+    plans = [find_scenario(name) for name in scenario or []]
+    sources = sources_of(
+        find_station(station), recording or [], plans, range(first_seed, first_seed + seeds), length_s, dataset
+    )
+    result = run_backtest(sources, names, min(workers or os.cpu_count() or 1, len(sources)), learning_h * 3600.0)
+    write_backtest(result, out)
+    _print(result if as_json else overview(result), as_json=as_json)
 
 
 @app.command()

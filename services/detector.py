@@ -5,13 +5,15 @@ import contextlib
 import logging
 from collections import Counter
 
+from wetwell.detector.dispatch import Costs
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import sample_key, verdict_key
+from wetwell.protocols.keys import order_key, sample_key, verdict_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import MessageError, Sample, Verdict
+from wetwell.protocols.messages import MessageError, Order, Sample, Verdict
 from wetwell.protocols.station import Station
 from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.checkpoint import Checkpoint
 from wetwell.services.daemon import report_health, stop_event, until
 from wetwell.services.settings import Settings
 
@@ -30,8 +32,14 @@ async def serve_detector(settings: Settings, station: Station) -> None:
 
 async def _run(settings: Settings, station: Station, stack: contextlib.AsyncExitStack) -> None:
     bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
-    judge = StationJudge(bus, station)
+    checkpoint = Checkpoint(settings.detector.state_dir, station.name)
+    judge = StationJudge(bus, station, settings.detector.costs)
+    if checkpoint.restore(judge.detector):
+        log.info("station '%s': goes on from its checkpoint", station.name)
+    stack.callback(checkpoint.save, judge.detector)
     async with asyncio.TaskGroup() as group:
+        group.create_task(_keep(checkpoint, judge, settings.detector.checkpoint_s), name="detector.checkpoint")
+        group.create_task(judge.obey(), name="detector.orders")
         group.create_task(
             report_health(bus, station.name, "detector", settings.health.period_s, judge.figures),
             name="detector.health",
@@ -39,18 +47,26 @@ async def _run(settings: Settings, station: Station, stack: contextlib.AsyncExit
         group.create_task(judge.run(), name="detector.judge")
 
 
+async def _keep(checkpoint: Checkpoint, judge: "StationJudge", period_s: float) -> None:
+    while True:
+        await asyncio.sleep(period_s)
+        checkpoint.save(judge.detector)
+
+
 class StationJudge:
     """Feeds the detector of one station from a bus and publishes what it says."""
 
-    def __init__(self, bus: Bus, station: Station) -> None:
+    def __init__(self, bus: Bus, station: Station, costs: Costs | None = None) -> None:
         self._station = station.name
-        self._detector = Detector(station.name, nominal_of(station))
+        self.detector = Detector(station.name, nominal_of(station), costs)
+        self._orders = bus.subscribe(order_key(station.name))
         self._samples = bus.subscribe(sample_key(station.name), history=SAMPLE_HISTORY)
         self._publishers = [
             bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
             for pump in range(1, len(station.pump) + 1)
         ]
         self._states: dict[int, str] = {}
+        self._answer: Verdict | None = None
         self._counts: Counter[str] = Counter()
 
     async def run(self) -> None:
@@ -61,9 +77,15 @@ class StationJudge:
                 self._take(payload)
             await asyncio.sleep(0)  # let the health figures out between batches
 
+    async def obey(self) -> None:
+        """Carry out the orders of operators for ever. One that is none is counted and left out."""
+        while True:
+            for payload in await self._orders.receive():
+                self._carry_out(payload)
+
     def figures(self) -> dict[str, float]:
         """Health figures."""
-        counts = {name: float(count) for name, count in (self._detector.counts | self._counts).items()}
+        counts = {name: float(count) for name, count in (self.detector.counts | self._counts).items()}
         return counts | {"dropped": float(self._samples.dropped)}
 
     def _take(self, payload: bytes) -> None:
@@ -76,8 +98,31 @@ class StationJudge:
         if sample.station != self._station:
             self._counts["foreign"] += 1
             return
-        for verdict in self._detector.update(sample):
+        for verdict in self.detector.update(sample):
             self._publish(verdict)
+
+    def _carry_out(self, payload: bytes) -> None:
+        try:
+            order = Order.decode(payload)
+        except MessageError as error:
+            self._counts["malformed_orders"] += 1
+            log.warning("station '%s': %s", self._station, error)
+            return
+        if order.station != self._station or order.pump > len(self._publishers):
+            self._counts["foreign_orders"] += 1
+            log.warning(
+                "station '%s': %s", self._station, f"order for pump {order.pump} of '{order.station}' refused"
+            )
+            return
+        if self._answer is not None and self._answer.evidence["order"] == order.id:
+            self._publish(self._answer)  # sent again because the answer was lost
+            return
+        act = self.detector.rebaseline if order.act == "rebaseline" else self.detector.revert
+        verdict = act(order.pump - 1, order.time)
+        log.info("station '%s' pump %d: %s by %s", self._station, order.pump, order.act, order.by)
+        evidence = verdict.evidence | {"order": order.id, "by": order.by}
+        self._answer = verdict.model_copy(update={"evidence": evidence})
+        self._publish(self._answer)
 
     def _publish(self, verdict: Verdict) -> None:
         self._counts["verdicts"] += 1

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
+from wetwell.detector.dispatch import Costs
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.registers import WordOrder
 from wetwell.protocols.station import Positive, Table, load_toml
@@ -41,6 +42,14 @@ class HealthSettings(Table):
     period_s: Positive = 10.0
 
 
+class DetectorSettings(Table):
+    """The detector: where it keeps its state, if anywhere, and what acts cost."""
+
+    state_dir: Path | None = None
+    checkpoint_s: Positive = 60.0
+    costs: Costs = Costs()
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -50,6 +59,7 @@ class Settings(BaseSettings):
     modbus: ModbusSettings = ModbusSettings()
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
+    detector: DetectorSettings = DetectorSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:

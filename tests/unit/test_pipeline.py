@@ -71,15 +71,17 @@ def test_the_windows_of_a_pump_follow_one_another(verdicts):
             assert before[1] < after[0]
 
 
-def test_a_fault_is_told_within_the_run_and_its_onset_stays(verdicts, samples):
+def test_a_fault_is_told_within_the_run_and_its_onset_stays(verdicts):
     faults = [verdict for verdict in verdicts if verdict.state == "pump_fault"]
     whole = next(verdict for verdict in faults if "early" not in verdict.evidence)
     assert [verdict.evidence.get("early") for verdict in faults].count(True) == 1, "told once, not at every look"
     assert faults[0].evidence["early"] is True
     assert faults[0].evidence["steady_samples"] == 75
-    assert 129 <= (faults[0].time - whole.window[0]) / NS_PER_S <= 160, "two looks, after 75 and 100 steady samples"
-    assert {verdict.onset for verdict in faults} == {faults[0].window[0]}
-    assert (faults[0].onset - samples[0].time) / NS_PER_S > 24_000.0
+    begun_s = (faults[0].time - whole.window[0]) / NS_PER_S
+    assert 104 <= begun_s <= 160, "two looks, after 50 and 75 steady samples at the soonest"
+    (onset,) = {verdict.onset for verdict in faults}
+    healthy = [verdict for verdict in verdicts if verdict.pump == 2 and verdict.state == "normal"][-1]
+    assert sum(healthy.window) // 2 <= onset <= faults[0].window[0], "no run between these two has been seen"
 
 
 def test_doubled_and_late_samples_change_no_verdict(alpha, samples, verdicts):
@@ -157,7 +159,7 @@ def test_a_run_too_short_to_judge_is_unknown_and_carries_no_onset(alpha, samples
         )
     (verdict,) = told
     assert (verdict.pump, verdict.state, verdict.onset) == (2, "unknown", None)
-    assert verdict.evidence["reason"] == "fewer than 25 steady samples near nominal frequency"
+    assert verdict.evidence["reason"] == "fewer than 25 steady samples"
 
 
 def cheap_days(days, period_s):
@@ -169,7 +171,8 @@ def cheap_days(days, period_s):
         flow_m3h, head_m = 200.2 + rng.normal(0.0, 2.0), 26.0 + rng.normal(0.0, 0.3)
         on = PumpReading(frequency_hz=50.0, flow_m3h=flow_m3h, head_m=head_m, running=True)
         pumps = tuple(on if within_s >= 240 and pump == run % 3 else off for pump in range(3))
-        yield Sample(station="alpha", seq=seq, time=second * NS_PER_S, level_m=1.0, pumps=pumps)
+        level_m = 1.0 + rng.normal(0.0, 0.002)
+        yield Sample(station="alpha", seq=seq, time=second * NS_PER_S, level_m=level_m, pumps=pumps)
 
 
 def test_the_state_does_not_grow_over_ten_days(alpha):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from wetwell.detector.gate import Frame, PumpFrame
 from wetwell.detector.nominal import nominal_of
@@ -16,7 +17,7 @@ ON = PumpFrame(50.0, 200.0, 26.0, 15.0, True)
 
 
 def frame(second, *pumps, gap_s=1.0, level_m=1.0):
-    return Frame(second * NS_PER_S, gap_s, level_m, pumps + (OFF,) * (3 - len(pumps)))
+    return Frame(second * NS_PER_S, gap_s, level_m, NAN, pumps + (OFF,) * (3 - len(pumps)))
 
 
 @pytest.fixture
@@ -56,7 +57,12 @@ def test_segments_are_means_of_25_residuals(tracker, alpha):
     pump_m = 26.0 - c0 - c1 * steady - c2 * steady**2
     system_m = 26.0 - 2.0 - 6.0e-4 * steady**2
     expected = [[series[a : a + 25].mean() for series in (pump_m, system_m)] for a in (0, 25)]
-    np.testing.assert_allclose(run.segments, expected, atol=1e-12)
+    np.testing.assert_allclose(run.segments.residual_m, expected, atol=1e-12)
+    means = [steady[a : a + 25].mean() for a in (0, 25)]
+    np.testing.assert_allclose(run.segments.flow_m3h, means)
+    np.testing.assert_allclose(run.segments.total_m3h, means)
+    np.testing.assert_array_equal(run.segments.level_m, [1.0, 1.0])
+    np.testing.assert_array_equal(run.power_kw, np.full(70, 15.0))
 
 
 def test_a_change_of_the_running_pumps_unsettles_all(tracker):
@@ -68,11 +74,46 @@ def test_a_change_of_the_running_pumps_unsettles_all(tracker):
     assert first.time_s.tolist() == [*range(30, 100), *range(130, 200), *range(230, 260)]
 
 
-@pytest.mark.parametrize(("frequency_hz", "is_steady"), [(49.1, True), (50.9, True), (48.9, False), (51.1, False)])
-def test_only_samples_near_nominal_frequency_are_steady(tracker, frequency_hz, is_steady):
+@pytest.mark.parametrize(
+    ("frequency_hz", "is_steady"),
+    [(20.1, True), (25.0, True), (49.0, True), (62.4, True), (19.9, False), (62.6, False)],
+)
+def test_samples_at_any_speed_that_a_drive_goes_at_are_steady(tracker, frequency_hz, is_steady):
     feed(tracker, range(60), ON._replace(frequency_hz=frequency_hz))
     (run,) = tracker.finish()
     assert (len(run.time_s) == 30) is is_steady
+    assert (run.speed_ratio == frequency_hz / 50.0).all()
+
+
+def test_segments_at_another_speed_are_taken_to_nominal_and_know_the_datasheets_flow(tracker, alpha):
+    c0, c1, c2 = alpha.pump[0].coefficients
+    speed = 0.8
+    flow_m3h = brentq(lambda q: c0 * speed**2 + c1 * speed * q + c2 * q * q - 2.0 - 6.0e-4 * q * q, 1.0, 400.0)
+    duty = ON._replace(frequency_hz=50.0 * speed, flow_m3h=flow_m3h, head_m=2.0 + 6.0e-4 * flow_m3h**2)
+    feed(tracker, range(60), duty)
+    (run,) = tracker.finish()
+    np.testing.assert_allclose(run.segments.residual_m, 0.0, atol=1e-9)
+    np.testing.assert_allclose(run.segments.flow_m3h, flow_m3h / speed)
+    np.testing.assert_allclose(run.segments.total_m3h, flow_m3h)
+    np.testing.assert_allclose(run.segments.duty_m3h, flow_m3h / speed)
+    np.testing.assert_allclose(run.segments.duty_total_m3h, flow_m3h)
+
+
+@pytest.mark.parametrize(("step_hz", "is_settling"), [(0.9, False), (1.1, True)])
+def test_a_step_of_the_speed_has_to_settle_for_ten_seconds(tracker, step_hz, is_settling):
+    feed(tracker, range(60), ON)
+    feed(tracker, range(60, 90), ON._replace(frequency_hz=50.0 - step_hz))
+    (run,) = tracker.finish()
+    left_out = range(60, 70) if is_settling else ()
+    assert run.time_s.tolist() == [second for second in range(30, 90) if second not in left_out]
+
+
+def test_a_speed_that_goes_on_drifting_settles_again_and_again(tracker):
+    feed(tracker, range(60), ON)
+    for second in range(60, 120):
+        tracker.update(frame(second, ON._replace(frequency_hz=50.0 - 0.5 * (second - 59))))
+    (run,) = tracker.finish()
+    assert run.time_s.max() < 63.0, "after two steps of half a hertz the third has moved on by more than 2 %"
 
 
 def test_a_break_of_the_stream_ends_a_run_and_the_next_settles_anew(tracker):
@@ -154,14 +195,21 @@ def test_the_flag_has_the_last_word_on_running(tracker):
     assert tracker.finish() == []
 
 
-def test_the_last_segments_of_an_open_run_are_given_once_each_time_one_is_full(tracker):
+def test_the_last_segments_of_an_open_run_are_given_each_time_one_is_full(tracker):
     looks = {}
     for second in range(200):
         tracker.update(frame(second, ON))
-        run = tracker.last_segments(0, 3)
-        if run is not None:
-            looks[second] = run
-    assert list(looks) == [104, 129, 154, 179]
-    assert looks[129].window_ns == (55 * NS_PER_S, 129 * NS_PER_S)
-    assert all(len(run.segments) == 3 and len(run.time_s) == 75 for run in looks.values())
-    assert tracker.steady_samples() == [(0, 200.0, 26.0, 1.0, 200.0)]
+        if filled := tracker.full_segments(0):
+            looks[second] = filled, tracker.last_segments(0, min(filled, 3))
+    assert {second: filled for second, (filled, _) in looks.items()} == {54 + 25 * n: n + 1 for n in range(6)}
+    assert looks[154][1].window_ns == (80 * NS_PER_S, 154 * NS_PER_S)
+    assert [len(run.segments) for _, run in looks.values()] == [1, 2, 3, 3, 3, 3]
+    assert tracker.steady_samples() == [(0, (200.0, 26.0, 1.0, 200.0))]
+    with pytest.raises(ValueError, match="pump 1 has no open run"):
+        tracker.last_segments(1, 1)
+
+
+def test_a_closed_check_valve_says_nothing_of_the_main(tracker):
+    feed(tracker, range(60), ON._replace(flow_m3h=0.0, head_m=1.0))
+    (run,) = tracker.finish()
+    np.testing.assert_allclose(run.segments.residual_m, [[1.0 - 36.0, 0.0]])

@@ -2,16 +2,17 @@
 
 import numpy as np
 import pytest
-from scipy.stats import poisson
 
 from wetwell.detector.scoring import (
+    CLASSES,
     ScoredRun,
-    detection_delay_s,
-    false_alarms,
+    confusion,
+    f1,
+    in_order_of_time,
     macro_f1,
-    poisson_interval,
     precision_and_recall,
     scored_runs,
+    without_truth,
 )
 from wetwell.protocols.messages import Verdict
 from wetwell.protocols.recording import Recording
@@ -28,7 +29,12 @@ def recording():
     return Recording(
         time_ns=seconds * NS_PER_S,
         columns={"pump2_running": np.zeros(seconds.size)},
-        truth={"truth_pump1_state": states, "truth_pump2_state": np.full(seconds.size, "normal")},
+        truth={
+            "truth_pump1_state": states,
+            "truth_pump2_state": np.full(seconds.size, "normal"),
+            "truth_fault": np.where(seconds >= 1.5 * DAY_S, "blockage", ""),
+            "truth_pump1_severity": np.where(seconds >= 1.5 * DAY_S, 0.5, 0.0),
+        },
     )
 
 
@@ -47,22 +53,82 @@ def verdict(state, first_s, last_s, *, pump=1, early=False):
 START_S = DAY_S * 3 // 2
 
 
+def told(verdicts, recording, learning_s=0.0):
+    return [(run.pump, run.told, run.truth) for run in scored_runs(verdicts, recording, learning_s)]
+
+
 def test_a_run_is_truly_what_most_of_its_samples_are(recording):
-    runs = scored_runs(
-        [
-            verdict("learning", 0, 100),
-            verdict("normal", START_S - 100, START_S + 90),
-            verdict("pump_fault", START_S - 90, START_S + 100, early=True),
-            verdict("pump_fault", START_S - 90, START_S + 100),
-            verdict("unknown", START_S, START_S + 100, pump=2),
-        ],
-        recording,
-    )
-    assert runs == [
-        ScoredRun(1, "normal", "normal"),
-        ScoredRun(1, "pump_fault", "pump_fault"),
-        ScoredRun(2, "unknown", "normal"),
+    verdicts = [
+        verdict("learning", 0, 100),
+        verdict("normal", START_S - 100, START_S + 90),
+        verdict("pump_fault", START_S - 90, START_S + 100, early=True),
+        verdict("pump_fault", START_S - 90, START_S + 100),
+        verdict("unknown", START_S, START_S + 100, pump=2),
     ]
+    assert told(verdicts, recording) == [
+        (1, "learning", "normal"),
+        (1, "normal", "normal"),
+        (1, "pump_fault", "pump_fault"),
+        (2, "unknown", "normal"),
+    ]
+
+
+def test_what_ends_while_learning_is_allowed_is_not_scored_and_a_run_counts_once(recording):
+    verdicts = [
+        verdict("pump_fault", 10, 3600),
+        verdict("unknown", 3000, 3660),
+        verdict("normal", 3000, 4000),
+        verdict("learning", 5000, 6000),
+    ]
+    assert told(verdicts, recording, learning_s=3600.0) == [(1, "normal", "normal"), (1, "learning", "normal")]
+
+
+def test_kind_severity_and_probability_go_with_the_run(recording):
+    faulty = verdict("pump_fault", START_S, START_S + 99).model_copy(
+        update={"probability": {"normal": 0.25, "pump_fault": 0.5, "system_fault": 0.25}}
+    )
+    healthy = verdict("unknown", START_S, START_S + 99, pump=2)
+    first, second = scored_runs([faulty, healthy], recording)
+    assert (first.kind, first.severity, first.fault_probability) == ("blockage", 0.5, 0.75)
+    assert second.kind == ""
+    assert np.isnan([second.severity, second.fault_probability]).all()
+
+
+def test_rows_out_of_order_are_sorted_with_their_truth(recording):
+    order = np.random.default_rng(0).permutation(len(recording))
+    mixed = Recording(
+        time_ns=recording.time_ns[order],
+        columns={name: values[order] for name, values in recording.columns.items()},
+        truth={name: values[order] for name, values in recording.truth.items()},
+    )
+    ordered = in_order_of_time(mixed)
+    assert np.array_equal(ordered.time_ns, recording.time_ns)
+    assert np.array_equal(ordered.truth["truth_pump1_state"], recording.truth["truth_pump1_state"])
+
+
+def test_no_truth_is_left_for_a_detector(recording):
+    bare = without_truth(recording)
+    assert not bare.truth
+    assert bare.columns.keys() == recording.columns.keys()
+
+
+def test_the_confusion_counts_every_run_once():
+    runs = [ScoredRun(1, "normal", "normal")] * 3 + [
+        ScoredRun(1, "unknown", "system_fault"),
+        ScoredRun(1, "learning", "sensor_fault"),
+        ScoredRun(2, "pump_fault", "pump_and_system_fault"),
+    ]
+    table = confusion(runs)
+    assert table.shape == (5, 7)
+    assert table.sum() == 6
+    rows = {state: table[row].tolist() for row, state in enumerate(CLASSES)}
+    assert rows == {
+        "normal": [3, 0, 0, 0, 0, 0, 0],
+        "pump_fault": [0, 0, 0, 0, 0, 0, 0],
+        "system_fault": [0, 0, 0, 0, 0, 1, 0],
+        "pump_and_system_fault": [0, 1, 0, 0, 0, 0, 0],
+        "sensor_fault": [0, 0, 0, 0, 0, 0, 1],
+    }
 
 
 def test_precision_recall_and_f1_by_hand():
@@ -75,46 +141,6 @@ def test_precision_recall_and_f1_by_hand():
     assert precision_and_recall(runs, "normal") == (6 / 8, 6 / 8)
     assert precision_and_recall(runs, "system_fault") == (1.0, 0.5)
     assert precision_and_recall(runs, "pump_fault") == (0.0, 0.0)
+    assert f1(runs, "system_fault") == pytest.approx(2 / 3)
     assert macro_f1(runs) == pytest.approx((0.75 + 2 / 3) / 2)
     assert macro_f1([]) == 0.0
-
-
-def test_false_alarms_in_a_row_are_one_and_only_watched_healthy_time_counts(recording):
-    alarms = false_alarms(
-        [
-            verdict("learning", 0, DAY_S // 2),
-            verdict("normal", 0, DAY_S // 2),
-            verdict("pump_fault", DAY_S, DAY_S + 1),
-            verdict("system_fault", DAY_S + 2, DAY_S + 3),
-            verdict("normal", DAY_S + 4, DAY_S + 5),
-            verdict("pump_fault", DAY_S + 6, DAY_S + 7),
-            verdict("pump_fault", START_S - 1, START_S),
-            verdict("unknown", DAY_S, DAY_S, pump=2),
-        ],
-        recording,
-    )
-    assert alarms.count == 2
-    assert alarms.station_days == pytest.approx((1.0 + 1.0) / 2)
-
-
-def test_the_delay_runs_from_the_first_true_second_to_the_first_verdict_on_that_pump(recording):
-    told = [
-        verdict("pump_fault", 10, 20),
-        verdict("pump_fault", START_S, START_S + 50, pump=2),
-        verdict("system_fault", START_S, START_S + 60),
-        verdict("pump_and_system_fault", START_S, START_S + 70),
-        verdict("pump_fault", START_S, START_S + 80),
-    ]
-    assert detection_delay_s(told, recording, "pump_fault") == 70.0
-    assert detection_delay_s(told[:3], recording, "pump_fault") is None
-    assert detection_delay_s(told, recording, "system_fault") is None
-
-
-@pytest.mark.parametrize("count", [0, 1, 7])
-def test_the_poisson_interval_leaves_two_and_a_half_percent_on_either_side(count):
-    low, high = poisson_interval(count, 10.0)
-    assert poisson.cdf(count, high * 10.0) == pytest.approx(0.025)
-    if count:
-        assert poisson.sf(count - 1, low * 10.0) == pytest.approx(0.025)
-    else:
-        assert low == 0.0

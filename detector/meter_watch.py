@@ -1,0 +1,97 @@
+"""Meters that are stuck or noisy, told from the readings alone."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.gate import Frame
+from wetwell.detector.runs import Run
+from wetwell.protocols.stamps import NS_PER_S
+
+Floats = npt.NDArray[np.float64]
+
+STUCK_NS = 60 * NS_PER_S
+STUCK_FACTOR = 5.0
+"""A reading may repeat this many times as long as it ever did in the learning phase."""
+NOISY_FACTOR = 3.0
+MIN_DIFFERENCES = 30
+NORMAL_MEDIAN = 1.4826 / math.sqrt(2.0)
+"""Standard deviation of normal numbers over the median of the size of their differences."""
+
+
+@dataclass(slots=True)
+class RepeatWatch:
+    """Counts how long each reading other than 0 repeats itself exactly.
+
+    A feed that reports by exception, or in coarse steps, repeats itself in health: what it does in the learning phase
+    is remembered.
+
+    Memory: constant.
+    """
+
+    last: dict[str, float] = field(default_factory=dict)
+    since_ns: dict[str, int] = field(default_factory=dict)
+    longest_ns: dict[str, int] = field(default_factory=dict)
+    stuck: set[str] = field(default_factory=set)
+
+    def update(self, frame: Frame, running: tuple[bool, ...], *, is_learning: bool) -> None:
+        """Take a frame into account; in the learning phase all repeats count as healthy."""
+        time_ns = frame.time_ns
+        self._note("level_m", frame.level_m, time_ns, is_learning=is_learning)
+        for index, (pump, is_running) in enumerate(zip(frame.pumps, running, strict=True), start=1):
+            if pump.flow_m3h != 0.0:
+                self._note(f"pump{index}_flow_m3h", pump.flow_m3h, time_ns, is_learning=is_learning)
+            if is_running:
+                if pump.head_m != 0.0:
+                    self._note(f"pump{index}_head_m", pump.head_m, time_ns, is_learning=is_learning)
+                if pump.power_kw != 0.0:
+                    self._note(f"pump{index}_power_kw", pump.power_kw, time_ns, is_learning=is_learning)
+
+    def _note(self, name: str, value: float, time_ns: int, *, is_learning: bool) -> None:
+        if value != self.last.get(name):
+            self.last[name] = value
+            self.since_ns[name] = time_ns
+            self.stuck.discard(name)
+            return
+        lasts_ns = time_ns - self.since_ns[name]
+        if is_learning:
+            if lasts_ns > self.longest_ns.get(name, 0):
+                self.longest_ns[name] = lasts_ns
+        elif lasts_ns > max(STUCK_NS, STUCK_FACTOR * self.longest_ns.get(name, 0)):
+            self.stuck.add(name)
+
+
+def reading_noise(run: Run) -> Floats:
+    """(2,) standard deviation of flow and head from second to second, as shares of their means; NaN if too short.
+
+    From the median difference of neighbours: what changes slowly, or once, does not count.
+    """
+    if len(run.time_s) <= MIN_DIFFERENCES:
+        return np.full(2, math.nan)
+    is_next = np.diff(run.time_s) <= 1.5
+    if np.count_nonzero(is_next) < MIN_DIFFERENCES:
+        return np.full(2, math.nan)
+    noise = [
+        NORMAL_MEDIAN * float(np.median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
+        for values in (run.flow_m3h, run.head_m)
+    ]
+    return np.array(noise)
+
+
+def healthy_noise(noises: Sequence[Floats]) -> Floats:
+    """(2,) median of the noise of healthy runs, NaN where it was never known."""
+    known = np.array([noise for noise in noises if np.isfinite(noise).all()])
+    return np.median(known, axis=0) if len(known) else np.full(2, math.nan)
+
+
+def noisy_meters(run: Run, healthy: Floats) -> Mapping[str, float]:
+    """Readings that are noisier than in health by more than `NOISY_FACTOR`, with that factor."""
+    factors = reading_noise(run) / np.maximum(healthy, 1e-6)
+    return {
+        name: round(float(factor), 1)
+        for name, factor in zip(("flow_m3h", "head_m"), factors, strict=True)
+        if factor > NOISY_FACTOR
+    }
