@@ -1,0 +1,223 @@
+"""A true station as numbers in SI units, and what acts on it from outside."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.station import Station
+
+Floats = npt.NDArray[np.float64]
+
+HOUR_S = 3600.0
+WATER_N_M3 = 1000.0 * 9.81
+SMALL_INERTANCE = 20.0
+"""Of a few metres of pipe: water settles in some hundredths of a second. [s²/m²]"""
+PRISM, CONE, BENCH = range(3)
+
+
+class Spec(NamedTuple):
+    """A station as it truly is, SI units: m, m³/s, s, W; arrays are one value a pump.
+
+    Attributes
+    ----------
+    shutoff_m, linear, square : (pumps,) arrays
+        Pump head = shutoff N² − linear N q − square q². [m, s/m², s²/m⁵]
+    head_factor, ring_leak : (pumps,) arrays
+        Worn impeller: factor on the curve; worn ring: flow K sqrt(H) that runs back inside. [1, m^2.5/s]
+    rag_limit, rag_half_m3 : (pumps,) arrays
+        Loss of speed that a volume pumped since the start brings: limit V / (V + V_half). [1, m³]
+    vortex_m, vortex_level_m : float
+        Head lost at zero level, falling as a square to none at a level. [m, m]
+    flap_leak, flap_opening_m : float
+        Check valve: back flow K sqrt(H) when shut; head over the main's that first opens it. [m^2.5/s, m]
+    lift_m, lift_slope, lift_reference_m : float
+        Static lift at the reference level and its fall per metre of level. [m, 1, m]
+    own_loss, shared_loss, smoothness, rated_flow : float
+        Loss K q² of each pump's own pipe and of the shared one; a share of them goes by Blasius' law, like q^1.75,
+        equal at the rated flow. [s²/m⁵, s²/m⁵, 1, m³/s]
+    own_inertance, shared_inertance : float
+        length / (g area). [s²/m²]
+    air_limit_m, air_seed_m, air_rate, air_purge_m3 : float
+        Air at a high point: logistic growth while nothing flows, carried out by pumped volume. [m, m, 1/s, m³]
+    siphon_m, siphon_flow, siphon_prime_s : float
+        Lift saved by a siphon that has run full for a time; it breaks under a flow. [m, m³/s, s]
+    area_m2, shape, floor_factor, shape_height_m : float
+        Wet well: prism, cone or bench; the area at the floor as a factor, up to a height. [m², -, 1, m]
+    hidden_inflow, crest_m : float
+        Inflow without a meter; level at which the wet well spills. [m³/s, m]
+    slip, hunting, hunting_s : float
+        Slip at rated torque; swing of the real speed and its period. [1, 1, s]
+    ramp_bow, ramp_s : float
+        Share of a half cosine in the ramp of the shaft (negative: of a parabola); time of the ramp. [1, s]
+    rated_power_w, load_share, rated_factor : float
+        Power meter: share that follows the load. [W, 1, 1]
+    start_m, stop_m : (levels,) arrays
+        As the PLC has them. [m]
+    timer_s, level_lag_s, flow_lag_s : float
+        On- and off-delay timer of the PLC; damping of the sensors. [s]
+    """
+
+    shutoff_m: Floats
+    linear: Floats
+    square: Floats
+    head_factor: Floats
+    ring_leak: Floats
+    rag_limit: Floats
+    rag_half_m3: Floats
+    vortex_m: float
+    vortex_level_m: float
+    flap_leak: float
+    flap_opening_m: float
+    lift_m: float
+    lift_slope: float
+    lift_reference_m: float
+    own_loss: float
+    shared_loss: float
+    smoothness: float
+    rated_flow: float
+    own_inertance: float
+    shared_inertance: float
+    air_limit_m: float
+    air_seed_m: float
+    air_rate: float
+    air_purge_m3: float
+    siphon_m: float
+    siphon_flow: float
+    siphon_prime_s: float
+    area_m2: float
+    shape: float
+    floor_factor: float
+    shape_height_m: float
+    hidden_inflow: float
+    crest_m: float
+    slip: float
+    hunting: float
+    hunting_s: float
+    ramp_bow: float
+    ramp_s: float
+    rated_power_w: float
+    load_share: float
+    rated_factor: float
+    start_m: Floats
+    stop_m: Floats
+    timer_s: float
+    level_lag_s: float
+    flow_lag_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """What acts from outside in each of n seconds; arrays are worked into in place.
+
+    Attributes
+    ----------
+    inflow : (n + 1,) array
+        True inflow, linear between the seconds. [m³/s]
+    loss_factor, extra_lift_m, voltage_factor : (n,) arrays
+        On the losses of the main, on its lift, on the power. [1, m, 1]
+    speed_factor : (pumps, n) array
+        Speed that the water sees, over that of the shaft. [1]
+    level_error_m, is_level_stuck : (n,) arrays
+        Of the level sensor, seen by the PLC too: noise, bias; whether it repeats itself. [m, 0 or 1]
+    """
+
+    inflow: Floats
+    loss_factor: Floats
+    extra_lift_m: Floats
+    voltage_factor: Floats
+    speed_factor: Floats
+    level_error_m: Floats
+    is_level_stuck: Floats
+
+
+def spec_of(station: Station) -> Spec:
+    """True station that is just as its file says.
+
+    Raises
+    ------
+    ValueError
+        If the file asks for what this plant does not have.
+    """
+    control, electrical, main = station.control, station.electrical, station.rising_main
+    plain = control.mode == "on_off" and control.rotation == "round_robin" and not control.out_of_service
+    if not plain or control.min_frequency_hz > 0 or control.dwell_s > 0 or control.max_starts_per_hour > 0:
+        raise ValueError(f"station '{station.name}': the truth plant knows plain on/off control in rotation only")
+    if station.sump.profile is not None or station.effect or electrical.power_model != "current":
+        raise ValueError(f"station '{station.name}': the truth plant takes no profile, effect or load model")
+    pumps = len(station.pump)
+    c0, c1, c2 = np.array([pump.coefficients for pump in station.pump]).T
+    is_common = main.layout == "common"
+    loss = main.friction_h2_m5 * HOUR_S**2
+    return Spec(
+        shutoff_m=c0,
+        linear=-c1 * HOUR_S,
+        square=-c2 * HOUR_S**2,
+        head_factor=np.ones(pumps),
+        ring_leak=np.zeros(pumps),
+        rag_limit=np.zeros(pumps),
+        rag_half_m3=np.ones(pumps),
+        vortex_m=0.0,
+        vortex_level_m=1.0,
+        flap_leak=0.0,
+        flap_opening_m=0.0,
+        lift_m=main.static_head_m,
+        lift_slope=0.0,
+        lift_reference_m=0.0,
+        own_loss=0.0 if is_common else loss,
+        shared_loss=loss if is_common else 0.0,
+        smoothness=0.0,
+        rated_flow=duty_m3h(station)[0] / HOUR_S,
+        own_inertance=SMALL_INERTANCE,
+        shared_inertance=0.0,
+        air_limit_m=0.0,
+        air_seed_m=0.0,
+        air_rate=0.0,
+        air_purge_m3=1.0,
+        siphon_m=0.0,
+        siphon_flow=0.0,
+        siphon_prime_s=1.0,
+        area_m2=station.sump.area_m2,
+        shape=PRISM,
+        floor_factor=1.0,
+        shape_height_m=1.0,
+        hidden_inflow=0.0,
+        crest_m=control.start_levels_m[-1] + 3.0,
+        slip=0.0,
+        hunting=0.0,
+        hunting_s=1.0,
+        ramp_bow=0.0,
+        ramp_s=control.ramp_s,
+        rated_power_w=math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor,
+        load_share=0.0,
+        rated_factor=1.0,
+        start_m=np.array(control.start_levels_m),
+        stop_m=np.array(control.stop_levels_m),
+        timer_s=0.0,
+        level_lag_s=0.0,
+        flow_lag_s=0.0,
+    )
+
+
+def duty_m3h(station: Station) -> tuple[float, float]:
+    """Flow and head of the first pump alone at nominal speed, by bisection. [m³/h, m].
+
+    Examples
+    --------
+    >>> table = {"name": "s", "sump": {"area_m2": 8.0}, "pump": [{"curve": [36.0, 0.0, -2.5e-4]}]}
+    >>> flow_m3h, head_m = duty_m3h(Station.model_validate(table))
+    >>> round(flow_m3h**2 * (2.5e-4 + 6.0e-4), 9), round(head_m, 3)
+    (34.0, 26.0)
+    """
+    c0, c1, c2 = station.pump[0].coefficients
+    main = station.rising_main
+    low, high = 0.0, 1.0
+    while c0 + c1 * high + c2 * high**2 > main.static_head_m + main.friction_h2_m5 * high**2:
+        high *= 2.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        excess_m = c0 - main.static_head_m + c1 * middle + (c2 - main.friction_h2_m5) * middle**2
+        low, high = (middle, high) if excess_m > 0 else (low, middle)
+    return low, c0 + c1 * low + c2 * low**2

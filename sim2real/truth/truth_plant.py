@@ -1,0 +1,161 @@
+"""A true recording of a case, from the fine-step plant."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.recording import Recording
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.sim2real.truth import kernel
+from wetwell.sim2real.truth.case import Quantity, TruthCase
+from wetwell.sim2real.truth.deviations import DEVIATIONS
+from wetwell.sim2real.truth.faults import fault_states, force_faults, spoil
+from wetwell.sim2real.truth.inflow import inflow_m3h, slow_noise
+from wetwell.sim2real.truth.parts import Truth
+from wetwell.sim2real.truth.spec import HOUR_S, Floats, Surroundings, spec_of
+from wetwell.sim2real.truth.telemetry import Telemetry, sensed, transmitted
+
+
+def run(case: TruthCase, *, truth: bool = True) -> Recording:
+    """Recording of a case; the same case gives the same bytes.
+
+    Parameters
+    ----------
+    case : TruthCase
+    truth : bool
+        Whether to give the truth columns; a blind recording has none.
+
+    Raises
+    ------
+    ValueError
+        If a deviation is not known, or the station asks for what this plant does not have.
+    """
+    inflow_rng, sensor_rng, deviation_rng = np.random.default_rng(case.seed).spawn(3)
+    made = _truth_of(case, inflow_m3h(case.inflow, case.seconds, inflow_rng), sensor_rng, deviation_rng)
+    station_record = np.empty((2, case.seconds))
+    pump_record = np.empty((5, len(case.station.pump), case.seconds))
+    around = made.around
+    kernel.integrate(
+        made.spec,
+        case.initial_level_m,
+        around.inflow,
+        around.loss_factor,
+        around.extra_lift_m,
+        around.voltage_factor,
+        around.speed_factor,
+        around.level_error_m,
+        around.is_level_stuck,
+        station_record,
+        pump_record,
+    )
+    columns = recorded(case, made.telemetry, around.inflow[:-1] * HOUR_S, station_record, pump_record, sensor_rng)
+    return Recording(
+        time_ns=case.start_ns + NS_PER_S * np.arange(case.seconds),
+        columns=columns,
+        truth=_truth_columns(case, around, station_record, pump_record) if truth else {},
+    )
+
+
+def _truth_of(
+    case: TruthCase, inflow: Floats, sensor_rng: np.random.Generator, deviation_rng: np.random.Generator
+) -> Truth:
+    seconds, pumps = case.seconds, len(case.station.pump)
+    around = Surroundings(
+        inflow=inflow / HOUR_S,
+        loss_factor=np.ones(seconds),
+        extra_lift_m=np.zeros(seconds),
+        voltage_factor=np.ones(seconds),
+        speed_factor=np.ones((pumps, seconds)),
+        level_error_m=case.station.sensors.level_noise_m * _noise(case, sensor_rng),
+        is_level_stuck=np.zeros(seconds),
+    )
+    made = Truth(
+        station=case.station, spec=spec_of(case.station), around=around, telemetry=Telemetry(), rng=deviation_rng
+    )
+    for deviation in case.deviations:
+        if deviation.name not in DEVIATIONS:
+            raise ValueError(f"deviation '{deviation.name}' is not one of {', '.join(DEVIATIONS)}")
+        DEVIATIONS[deviation.name].act(made, deviation.parameters)
+    force_faults(case.faults, around)
+    return made
+
+
+def recorded(
+    case: TruthCase,
+    telemetry: Telemetry,
+    true_inflow_m3h: Floats,
+    station_record: Floats,
+    pump_record: Floats,
+    rng: np.random.Generator,
+) -> dict[str, Floats]:
+    """Columns of the recording from the records of a plant.
+
+    Parameters
+    ----------
+    case : TruthCase
+    telemetry : Telemetry
+    true_inflow_m3h : (n,) array
+        [m³/h]
+    station_record, pump_record : (2, n) and (5, pumps, n) arrays
+        Rows as in `kernel`, SI units.
+    rng : numpy.random.Generator
+        Of the sensors.
+    """
+    sensors = case.station.sensors
+    always = np.ones(case.seconds, dtype=np.bool_)
+    inflow_m3h = sensed(true_inflow_m3h, always, sensors.inflow_noise * _noise(case, rng), telemetry.of("inflow_m3h"))
+    columns = {
+        "level_m": transmitted(station_record[kernel.LEVEL_READING], telemetry.of("level_m")),
+        "inflow_m3h": transmitted(inflow_m3h, telemetry.of("inflow_m3h")),
+    }
+    for i, pump in enumerate(case.station.pump):
+        command, _, head, power, damped = pump_record[:, i]
+        turns = command > 0.0
+        frequency_hz = transmitted(command * pump.nominal_frequency_hz, telemetry.of("frequency_hz"))
+        columns[f"pump{i + 1}_frequency_hz"] = frequency_hz
+        flow_m3h = damped * HOUR_S
+        quantities: tuple[tuple[Quantity, Floats, npt.NDArray[np.bool_], float], ...] = (
+            ("flow_m3h", flow_m3h, turns | (flow_m3h > 1e-3), sensors.flow_noise),
+            ("head_m", head, turns, sensors.head_noise),
+            ("power_kw", power / 1000.0, turns, sensors.power_noise),
+        )
+        for quantity, values, is_alive, noise in quantities:
+            channel = telemetry.of(quantity)
+            reading = sensed(values, is_alive, noise * _noise(case, rng), channel)
+            columns[f"pump{i + 1}_{quantity}"] = transmitted(reading, channel)
+        columns[f"pump{i + 1}_running"] = (frequency_hz > 0.0).astype(np.float64)
+    spoil(case.faults, columns)
+    return columns
+
+
+def _noise(case: TruthCase, rng: np.random.Generator) -> Floats:
+    """(n,) noise of unit variance, white with a slow share."""
+    white = rng.standard_normal(case.seconds)
+    if case.slow_share <= 0.0:
+        return white
+    slow = slow_noise(case.seconds, case.slow_s, rng)
+    mixed: Floats = np.sqrt(1.0 - case.slow_share) * white + np.sqrt(case.slow_share) * slow
+    return mixed
+
+
+def _truth_columns(
+    case: TruthCase, around: Surroundings, station_record: Floats, pump_record: Floats
+) -> dict[str, npt.NDArray[Any]]:
+    """Truth columns as the simulator names them; a level sensor's or the station's fault is felt by all pumps."""
+    truth: dict[str, npt.NDArray[Any]] = {
+        "truth_state": fault_states(case.faults, None, case.seconds),
+        "truth_level_m": station_record[kernel.LEVEL],
+        "truth_inflow_m3h": around.inflow[:-1] * HOUR_S,
+        "truth_friction_factor": around.loss_factor,
+        "truth_static_rise_m": around.extra_lift_m,
+    }
+    for i in range(len(case.station.pump)):
+        truth |= {
+            f"truth_pump{i + 1}_state": fault_states(case.faults, i + 1, case.seconds),
+            f"truth_pump{i + 1}_speed_factor": around.speed_factor[i],
+            f"truth_pump{i + 1}_flow_m3h": pump_record[kernel.FLOW, i] * HOUR_S,
+            f"truth_pump{i + 1}_head_m": pump_record[kernel.HEAD, i],
+            f"truth_pump{i + 1}_power_kw": pump_record[kernel.POWER, i] / 1000.0,
+        }
+    return truth
