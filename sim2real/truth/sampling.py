@@ -91,7 +91,12 @@ def inflow_of(station: Station, rng: np.random.Generator) -> TrueInflow:
 
 
 def case_of(
-    names: tuple[str, ...], station_name: str, rng: np.random.Generator, *, seconds: int, slow_share: float = 0.0
+    names: tuple[str, ...],
+    station_name: str,
+    rng: np.random.Generator,
+    *,
+    seconds: int,
+    slow_share: float = 0.0,
 ) -> TruthCase:
     """A case with deviations of these names, at a new station, with parameters drawn for it.
 

@@ -31,8 +31,7 @@ def run(case: TruthCase, *, truth: bool = True) -> Recording:
     ValueError
         If a deviation is not known, or the station asks for what this plant does not have.
     """
-    inflow_rng, sensor_rng, deviation_rng = np.random.default_rng(case.seed).spawn(3)
-    made = _truth_of(case, inflow_m3h(case.inflow, case.seconds, inflow_rng), sensor_rng, deviation_rng)
+    made, sensor_rng = truth_of(case)
     station_record = np.empty((2, case.seconds))
     pump_record = np.empty((5, len(case.station.pump), case.seconds))
     around = made.around
@@ -49,6 +48,20 @@ def run(case: TruthCase, *, truth: bool = True) -> Recording:
         station_record,
         pump_record,
     )
+    return recording_of(case, made, station_record, pump_record, sensor_rng, truth=truth)
+
+
+def recording_of(
+    case: TruthCase,
+    made: Truth,
+    station_record: Floats,
+    pump_record: Floats,
+    sensor_rng: np.random.Generator,
+    *,
+    truth: bool,
+) -> Recording:
+    """Recording of what a plant has noted, (2, n) and (5, pumps, n) in rows as in `kernel`, SI units."""
+    around = made.around
     columns = recorded(case, made.telemetry, around.inflow[:-1] * HOUR_S, station_record, pump_record, sensor_rng)
     return Recording(
         time_ns=case.start_ns + NS_PER_S * np.arange(case.seconds),
@@ -57,9 +70,16 @@ def run(case: TruthCase, *, truth: bool = True) -> Recording:
     )
 
 
-def _truth_of(
-    case: TruthCase, inflow: Floats, sensor_rng: np.random.Generator, deviation_rng: np.random.Generator
-) -> Truth:
+def truth_of(case: TruthCase) -> tuple[Truth, np.random.Generator]:
+    """Truth of a case, faults and deviations worked in, and the generator of its sensors.
+
+    Raises
+    ------
+    ValueError
+        If a deviation is not known, or the station asks for what this plant does not have.
+    """
+    inflow_rng, sensor_rng, deviation_rng = np.random.default_rng(case.seed).spawn(3)
+    inflow = inflow_m3h(case.inflow, case.seconds, inflow_rng)
     seconds, pumps = case.seconds, len(case.station.pump)
     around = Surroundings(
         inflow=inflow / HOUR_S,
@@ -78,7 +98,7 @@ def _truth_of(
             raise ValueError(f"deviation '{deviation.name}' is not one of {', '.join(DEVIATIONS)}")
         DEVIATIONS[deviation.name].act(made, deviation.parameters)
     force_faults(case.faults, around)
-    return made
+    return made, sensor_rng
 
 
 def recorded(
