@@ -331,6 +331,9 @@ def gap_trial(
     recalibration: Annotated[
         bool, typer.Option("--recalibration", help="Diagnose each case once more by recalibration only.")
     ] = False,
+    unseen: Annotated[
+        bool, typer.Option("--unseen", help="Measure the shrinkage on recordings that no diagnosis has seen.")
+    ] = False,
     diagnoser: Annotated[
         str | None, typer.Option("--diagnoser", metavar="COMMAND", help="In place of wetwell gap diagnose.")
     ] = None,
@@ -339,7 +342,7 @@ def gap_trial(
     """Check the diagnosis on sealed recordings of other plants; run again to resume."""
     import shlex
 
-    from wetwell.services.trial import DIAGNOSE, TrialPlan, brief, parse_kinds, run_trial
+    from wetwell.services.trial import DIAGNOSE, REPLAY, TrialPlan, brief, parse_kinds, run_trial
 
     plan = TrialPlan(
         seed=seed,
@@ -348,6 +351,7 @@ def gap_trial(
         plants=("fine", "swmm") if plant == "both" else (plant,),
         seconds=round(_positive(days, "--days") * 86_400.0),
         command=DIAGNOSE if diagnoser is None else tuple(shlex.split(diagnoser)),
+        replay=REPLAY if unseen else (),
         has_recalibration=recalibration,
     )
     result = run_trial(plan, out, workers)

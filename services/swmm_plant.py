@@ -19,7 +19,7 @@ from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.parts import Truth
 from wetwell.sim2real.truth.spec import Floats, Spec
 from wetwell.sim2real.truth.swmm_input import ROUTING_STEP_S, SWMM_LIBRARY, SWMM_OPEN, swmm_input
-from wetwell.sim2real.truth.truth_plant import recording_of, truth_of
+from wetwell.sim2real.truth.truth_plant import Passage, truth_of
 
 _ONE_AT_A_TIME = threading.Lock()
 _SHUT = 1e-6
@@ -55,7 +55,12 @@ class _Plc:
 
 
 def run_swmm(case: TruthCase, *, truth: bool = True) -> Recording:
-    """Recording of a case with the water moved by SWMM; as `truth_plant.run`.
+    """Recording of a case with the water moved by SWMM; as `truth_plant.run`, raises as `swmm_passage_of`."""
+    return swmm_passage_of(case).recording(truth=truth)
+
+
+def swmm_passage_of(case: TruthCase) -> Passage:
+    """SWMM's passage through a case.
 
     Raises
     ------
@@ -81,7 +86,9 @@ def run_swmm(case: TruthCase, *, truth: bool = True) -> Recording:
         path.write_text(swmm_input(made.spec, case.initial_level_m), encoding="ascii")
         with pyswmm.Simulation(str(path)) as simulation:
             _drive(simulation, pyswmm.Nodes(simulation), pyswmm.Links(simulation), made, station_record, pump_record)
-    return recording_of(case, made, station_record, pump_record, sensor_rng, truth=truth)
+    return Passage(
+        case=case, made=made, sensor_rng=sensor_rng, station_record=station_record, pump_record=pump_record
+    )
 
 
 def _drive(simulation: Any, nodes: Any, links: Any, made: Truth, station_record: Floats, pump_record: Floats) -> None:

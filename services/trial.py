@@ -30,6 +30,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
 from wetwell.protocols.recording import write_recording
 from wetwell.protocols.whole_file import whole_file
+from wetwell.services.held_out import held_out_summary, hold_out
 from wetwell.services.swmm_plant import run_swmm
 from wetwell.services.trial_page import trial_page
 from wetwell.sim2real.trial.answer import Answer, answer_of
@@ -40,6 +41,7 @@ from wetwell.sim2real.truth import truth_plant
 
 SCHEMA = "wetwell.trial/1"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
+REPLAY = (sys.executable, "-m", "wetwell.services", "gap", "replay")
 RECALIBRATION = ("friction_bias", "static_head_bias", "head_sensor_offset", "flow_meter_gain")
 """What anybody would calibrate: the library of the lower bound."""
 STATION_FILE, RECORDING_FILE, SEAL_FILE, REPORT_FILE = (
@@ -65,6 +67,9 @@ class TrialPlan:
         The diagnosis; it gets `--station FILE --recording FILE --out DIR`, and `--without NAME` or `--only NAME`.
     timeout_s : float
         For one diagnosis. [s]
+    replay : tuple of str
+        Replays a recording under a station: gets `--station FILE --recording FILE --out FILE`; empty for no figures
+        on unseen recordings.
     has_recalibration : bool
         Whether each case is diagnosed once more with the library of `RECALIBRATION` alone.
     """
@@ -75,6 +80,7 @@ class TrialPlan:
     plants: tuple[PlantName, ...] = ("fine",)
     seconds: int = 86_400
     command: tuple[str, ...] = DIAGNOSE
+    replay: tuple[str, ...] = ()
     timeout_s: float = 1800.0
     has_recalibration: bool = False
 
@@ -137,6 +143,13 @@ def run_trial(plan: TrialPlan, folder: Path, workers: int) -> dict[str, Any]:
         if plan.has_recalibration:
             jobs += [(case, True) for case in cases if case.kind in {"single", "pair"}]
         _each(progress, "diagnoses", workers, [partial(_diagnose, plan, case, again, folder) for case, again in jobs])
+        if plan.replay:
+            unseen = [
+                partial(hold_out, case, folder / "published" / case.name, folder / "reports" / case.name, plan.replay)
+                for case in cases
+                if case.kind in {"single", "pair"}
+            ]
+            _each(progress, "unseen recordings", workers, unseen)
     return score_trial(plan, folder)
 
 
@@ -224,6 +237,7 @@ def score_trial(plan: TrialPlan, folder: Path) -> dict[str, Any]:
         "effects_scored": _grouped(
             [score for score in scores if score.label.kind == "single"], lambda score: score.label.names[0]
         ),
+        "unseen": held_out_summary([folder / "reports" / name for name in names]),
         "controls": controls,
         "confusion": {"rows": rows, "columns": columns, "counts": counts.tolist()},
     }

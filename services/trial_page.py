@@ -44,6 +44,7 @@ def trial_page(result: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) ->
             ),
             Section("Single effects", _share_table("effect", result["effects_scored"])),
             Section("Controls", _controls(result["controls"])),
+            *([Section("Unseen recordings", _unseen(result["unseen"]))] if result["unseen"] else []),
             Section("Cases", _cases(cases)),
         ],
     )
@@ -78,6 +79,22 @@ def _controls(controls: Mapping[str, Any]) -> str:
         names = controls["permuted_labels"]
         rows.append(["recalibration only (lower bound)", *((lower[name] or {}).get("value") for name in names)])
     return table(["control", *(name.replace("_", " ") for name in controls["permuted_labels"])], rows)
+
+
+def _unseen(figures: Mapping[str, Any]) -> str:
+    rows = [
+        ["station file as it was", figures["before"], None],
+        ["diagnosed station", figures["after"], (figures["shrinkage"] or {}).get("median")],
+        [
+            "flexible regressor of the residuals (upper bound without a cause)",
+            figures["regressor"],
+            (figures["regressor_shrinkage"] or {}).get("median"),
+        ],
+        ["oracle", figures["oracle"], 1.0],
+    ]
+    return table(["model", "median gap in units of noise", "median shrinkage"], rows) + paragraph(
+        f"{figures['cases']} cases, other weather and noise, the same truth."
+    )
 
 
 def _cases(cases: Sequence[Mapping[str, Any]]) -> str:

@@ -52,4 +52,5 @@ if mode == "perfect":
             }
             for name in labels["names"]
         ]
+    (given.out / "station.toml").write_bytes(given.station.read_bytes())
 (given.out / "report.json").write_text("{" if mode == "garbage" else json.dumps(report))

@@ -126,6 +126,19 @@ def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
         run_fake("perfect", folder, monkeypatch, seed=4)
 
 
+def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
+    replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
+    _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
+    unseen = result["unseen"]
+    assert unseen["cases"] == 4
+    assert unseen["after"] == 0.0
+    assert unseen["before"] > 2.0
+    assert 0.5 < unseen["oracle"] < 1.5
+    assert unseen["shrinkage"]["median"] > 1.0
+    assert unseen["regressor"] < 0.3 * unseen["before"]
+    assert "flexible regressor" in (folder / "trial.html").read_text()
+
+
 def test_every_effect_takes_its_turn():
     plan = trial.TrialPlan(seed=5, count=50, kinds=("single",), seconds=3600)
     names = [plan.case(number).names[0] for number in range(50)]
