@@ -73,12 +73,15 @@ def _share_table(title: str, groups: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _controls(controls: Mapping[str, Any]) -> str:
-    rows: list[list[object]] = [["labels dealt at random (chance)", *controls["permuted_labels"].values()]]
+    chance = controls["permuted_labels"]
+    rows: list[list[object]] = [["labels dealt at random (chance)", *chance.values(), None]]
     if "recalibration_only" in controls:
         lower = controls["recalibration_only"]
-        names = controls["permuted_labels"]
-        rows.append(["recalibration only (lower bound)", *((lower[name] or {}).get("value") for name in names)])
-    return table(["control", *(name.replace("_", " ") for name in controls["permuted_labels"])], rows)
+        shares = [(lower[name] or {}).get("value") for name in chance]
+        rows.append(
+            ["recalibration only (lower bound, single and pair)", *shares, (lower["shrinkage"] or {}).get("median")]
+        )
+    return table(["control", *(name.replace("_", " ") for name in chance), "median shrinkage"], rows)
 
 
 def _unseen(figures: Mapping[str, Any]) -> str:

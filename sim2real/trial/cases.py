@@ -105,7 +105,7 @@ def trial_case(
     names = _names(seed, kind, plant, turn // len(plants), rng)
     truth = case_of(
         names,
-        f"station-{number:04}",
+        f"station-{rng.integers(16**6):06x}",
         rng,
         seconds=seconds,
         slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,

@@ -8,7 +8,8 @@ from wetwell.protocols.recording import Recording
 Floats = npt.NDArray[np.float64]
 
 _SIGNALS = ("flow_m3h", "head_m", "power_kw")
-RIDGE = 1e-3
+RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
+"""Strengths of the ridge, as shares of the number of rows; the one that serves the second half of the rows best."""
 RUN_SCALES_S = (5.0, 30.0, 200.0, 1000.0)
 
 
@@ -17,6 +18,7 @@ def corrected(trained_on: Recording, recorded: Recording, predicted: Recording) 
 
     Ridge regression of the residual on all products of two of: a constant, frequency, level, number of running pumps,
     inflow, the prediction itself, and four exponentials of the time since the last start or stop.
+    Nothing is corrected where no ridge helps on rows that it has not learnt from.
 
     Parameters
     ----------
@@ -40,14 +42,32 @@ def corrected(trained_on: Recording, recorded: Recording, predicted: Recording) 
             alive = (recorded.columns[name] != 0.0) & np.isfinite(residual) & np.isfinite(rows).all(axis=1)
             if alive.sum() < rows.shape[1]:
                 continue
-            middle, spread = rows[alive].mean(axis=0), rows[alive].std(axis=0) + 1e-9
-            design = _products((rows[alive] - middle) / spread)
-            normal = design.T @ design + RIDGE * alive.sum() * np.eye(design.shape[1])
-            weights = np.linalg.solve(normal, design.T @ residual[alive])
-            others = (_features(predicted, i, name) - middle) / spread
             is_on = predicted.columns[name] != 0.0
-            columns[name] = predicted.columns[name] + np.where(is_on, _products(others) @ weights, 0.0)
+            learnt = _learnt(rows[alive], residual[alive], _features(predicted, i, name))
+            columns[name] = predicted.columns[name] + np.where(is_on, learnt, 0.0)
     return Recording(time_ns=predicted.time_ns, columns=columns)
+
+
+def _learnt(rows: Floats, residual: Floats, others: Floats) -> Floats:
+    """Residual to be expected for other rows, each feature kept within the range it was learnt on."""
+    low, high = rows.min(axis=0), rows.max(axis=0)
+    middle, spread = rows.mean(axis=0), rows.std(axis=0) + 1e-9
+    design = _products((rows - middle) / spread)
+    half = len(design) // 2
+    errors = [
+        np.mean((residual[half:] - design[half:] @ _weights(design[:half], residual[:half], ridge)) ** 2)
+        for ridge in RIDGES
+    ]
+    best = int(np.argmin(errors))
+    if errors[best] >= np.mean(residual[half:] ** 2):
+        return np.zeros(len(others))
+    seen = (np.clip(others, low, high) - middle) / spread
+    return np.asarray(_products(seen) @ _weights(design, residual, RIDGES[best]))
+
+
+def _weights(design: Floats, residual: Floats, ridge: float) -> Floats:
+    normal = design.T @ design + ridge * len(design) * np.eye(design.shape[1])
+    return np.asarray(np.linalg.solve(normal, design.T @ residual))
 
 
 def _features(prediction: Recording, pump: int, name: str) -> Floats:
