@@ -16,7 +16,6 @@ SWMM_LIBRARY = (
     "static_head_bias",
     "level_dependent_static_head",
     "common_header",
-    "water_inertia",
     "sump_area_profile",
     "unmetered_inflow",
     "pump_wear",
