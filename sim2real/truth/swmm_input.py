@@ -1,7 +1,8 @@
 """A true station as an input file of EPA SWMM 5: storage, variable-speed pumps, force mains under the dynamic wave.
 
-The force mains are as long and wide as their loss and their inertance ask for, with the friction of Darcy and
-Weisbach as SWMM computes it. Pumps are of its type 5, whose curve follows the speed by the affinity laws.
+The force mains are as long and wide as their loss and a settling time of half a second ask for, with the
+friction of Darcy and Weisbach as SWMM computes it.
+Pumps are of its type 5, whose curve follows the speed by the affinity laws.
 """
 
 import math
@@ -45,8 +46,8 @@ SWMM_OPEN = (
 """Deviations that SWMM can express, or that lie in control and telemetry."""
 
 ROUTING_STEP_S = 0.5
-LEAST_INERTANCE = 300.0
-"""Of the shortest main that the dynamic wave takes without trouble; half a second to settle. [s²/m²]"""
+SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
+"""Inertance of the mains, times rated flow over head: with more or less, pumps stick or surge in ramps. [s]"""
 ROUGHNESS_MM = 0.1
 GRAVITY = 9.81
 WATER_NU_M2_S = 1.1e-6
@@ -65,8 +66,9 @@ def swmm_input(spec: Spec, level_m: float) -> str:
         At the beginning. [m]
     """
     numbers = range(1, spec.shutoff_m.size + 1)
-    inertance = max(spec.own_inertance + spec.shared_inertance, LEAST_INERTANCE)
     total = spec.own_loss + spec.shared_loss
+    settling_s = HEADER_SETTLING_S if spec.shared_loss > 0 else SETTLING_S
+    inertance = settling_s * (spec.lift_m + total * spec.rated_flow**2) / spec.rated_flow
     own = _main(spec.own_loss, inertance * spec.own_loss / total, spec.rated_flow) if spec.own_loss > 0 else None
     shared = (
         _main(spec.shared_loss, inertance * spec.shared_loss / total, spec.rated_flow)

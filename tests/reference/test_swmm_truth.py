@@ -1,7 +1,7 @@
 """EPA SWMM 5 as a truth plant against the fine-step plant: two programs, one station.
 
 Tolerances: friction after Colebrook for a length that fits k at the rated flow, 0.3 % of the duty, 1 % where the duty
-lies elsewhere; drives move in steps of half a second and the mains have an inertance of 300 s²/m², which moves a
+lies elsewhere; drives move in steps of half a second and the mains have an inertance of 190 s²/m², which moves a
 switching by some seconds: one start of two hours, 5 % of the mean flow of one pump.
 """
 
