@@ -30,6 +30,8 @@ station_app = typer.Typer(no_args_is_help=True, help="Station files.")
 config_app = typer.Typer(no_args_is_help=True, help="Settings of the services.")
 app.add_typer(station_app, name="station")
 app.add_typer(config_app, name="config")
+gap_app = typer.Typer(no_args_is_help=True, help="The gap between simulation and reality.")
+app.add_typer(gap_app, name="gap")
 
 StationOption = Annotated[
     str, typer.Option("--station", metavar="FILE", help="Station file, or the name of a built-in station.")
@@ -388,6 +390,47 @@ def kpi(recording: RecordingOption, as_json: JsonOption = False) -> None:
     from wetwell.simulator.kpi import kpis
 
     _print(kpi_table(kpis(read_recording(recording)), with_hours=as_json), as_json=as_json)
+
+
+@gap_app.command("trial")
+def gap_trial(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")],
+    seed: SeedOption = 1,
+    cases: Annotated[int, typer.Option(min=1, help="Number of sealed cases.")] = 50,
+    plant: Annotated[Literal["fine", "swmm", "both"], typer.Option(help="What stands for reality.")] = "fine",
+    kinds: Annotated[
+        str, typer.Option(help="Of single, pair, none, open, leave_one_out; with commas.")
+    ] = "single,pair,none,open,leave_one_out",
+    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    workers: Annotated[int, typer.Option(min=1, help="Diagnoses at once.")] = 1,
+    recalibration: Annotated[
+        bool, typer.Option("--recalibration", help="Diagnose each case once more by recalibration only.")
+    ] = False,
+    unseen: Annotated[
+        bool, typer.Option("--unseen", help="Measure the shrinkage on recordings that no diagnosis has seen.")
+    ] = False,
+    diagnoser: Annotated[
+        str | None, typer.Option("--diagnoser", metavar="COMMAND", help="In place of wetwell gap diagnose.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check the diagnosis on sealed recordings of other plants; run again to resume."""
+    import shlex
+
+    from wetwell.services.trial import DIAGNOSE, REPLAY, TrialPlan, brief, parse_kinds, run_trial
+
+    plan = TrialPlan(
+        seed=seed,
+        count=cases,
+        kinds=parse_kinds(kinds),
+        plants=("fine", "swmm") if plant == "both" else (plant,),
+        seconds=round(_positive(days, "--days") * 86_400.0),
+        command=DIAGNOSE if diagnoser is None else tuple(shlex.split(diagnoser)),
+        replay=REPLAY if unseen else (),
+        has_recalibration=recalibration,
+    )
+    result = run_trial(plan, out, workers)
+    _print(result if as_json else brief(result, out), as_json=as_json)
 
 
 @app.command("modbus-map")

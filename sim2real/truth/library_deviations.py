@@ -5,7 +5,7 @@ A parameter that means what one of the library's effect of this name means has t
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -63,11 +63,10 @@ def _air_pocket(truth: Truth, p: Mapping[str, Any]) -> None:
 
 def _sump_area_profile(truth: Truth, p: Mapping[str, Any]) -> None:
     """Frustum of a cone, or a bench with a rounded edge."""
-    truth.change(
-        shape=float(CONE if p["form"] == "cone" else BENCH),
-        floor_factor=p["bottom_factor"],
-        shape_height_m=p["height_m"],
-    )
+    if "bench_m" in p:
+        truth.change(shape=float(BENCH), floor_factor=p["bench_factor"], shape_height_m=p["bench_m"])
+    else:
+        truth.change(shape=float(CONE), floor_factor=p["bottom_factor"], shape_height_m=p["height_m"])
 
 
 def _unmetered_inflow(truth: Truth, p: Mapping[str, Any]) -> None:
@@ -90,7 +89,7 @@ def _ragging(truth: Truth, p: Mapping[str, Any]) -> None:
     spec = truth.spec
     half_m3 = p["half_s"] * spec.rated_flow
     truth.change(
-        rag_limit=_chosen(spec.rag_limit, p["pump"], p["speed_loss"]),
+        rag_limit=_chosen(spec.rag_limit, p["pump"], p["rag_limit"]),
         rag_half_m3=_chosen(spec.rag_half_m3, p["pump"], half_m3),
     )
 
@@ -112,7 +111,7 @@ def _ramp_shape(truth: Truth, p: Mapping[str, Any]) -> None:
 
 def _load_dependent_power(truth: Truth, p: Mapping[str, Any]) -> None:
     """Torque parabola times speed, copper loss by the square of the torque, iron loss."""
-    truth.change(load_share=p["share"], rated_factor=p["rated_factor"])
+    truth.change(load_share=p["share"], rated_factor=p["load_factor"])
 
 
 def _supply_voltage_variation(truth: Truth, p: Mapping[str, Any]) -> None:
@@ -200,14 +199,11 @@ def _reported(d: Draw) -> Parameters:
 
 
 def _area(d: Draw) -> Parameters:
-    form: Literal["cone", "bench"] = "cone" if d.rng.random() < 0.5 else "bench"
     stop_m = d.station.control.stop_levels_m[0]
-    share = d.between(0.5, 0.95) if form == "cone" else d.between(0.25, 0.6)
-    return {
-        "form": form,
-        "bottom_factor": d.between(0.3, 0.65),
-        "height_m": rounded(stop_m + share * d.depth_m),
-    }
+    if d.rng.random() < 0.5:
+        height_m = rounded(stop_m + d.between(0.5, 0.95) * d.depth_m)
+        return {"bottom_factor": d.between(0.3, 0.65), "height_m": height_m}
+    return {"bench_factor": d.between(0.3, 0.65), "bench_m": rounded(stop_m + d.between(0.25, 0.6) * d.depth_m)}
 
 
 LIBRARY_KINDS: dict[str, Kind] = {
@@ -269,7 +265,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
     "ragging": Kind(
         "pump",
         ("flow_m3h", "head_m"),
-        lambda d: {"speed_loss": d.over(0.06, 0.2), "half_s": d.over(60.0, 240.0), "pump": d.pump},
+        lambda d: {"rag_limit": d.over(0.06, 0.2), "half_s": d.over(60.0, 240.0), "pump": d.pump},
         _ragging,
     ),
     "check_valve_leak": Kind(
@@ -294,7 +290,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
     "load_dependent_power": Kind(
         "drive",
         ("power_kw",),
-        lambda d: {"share": d.between(0.6, 1.0), "rated_factor": d.between(0.75, 1.1)},
+        lambda d: {"share": d.between(0.6, 1.0), "load_factor": d.between(0.75, 1.1)},
         _load_dependent_power,
     ),
     "supply_voltage_variation": Kind(

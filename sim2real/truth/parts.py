@@ -29,6 +29,8 @@ class Truth:
     telemetry : Telemetry
     rng : numpy.random.Generator
         Of the deviations alone.
+    level_noise_m : (n,) array
+        Part of the level's error that is noise. [m]
     """
 
     station: Station
@@ -36,6 +38,7 @@ class Truth:
     around: Surroundings
     telemetry: Telemetry
     rng: np.random.Generator
+    level_noise_m: Floats
 
     def change(self, **changes: Any) -> None:
         """Replace fields of the spec."""

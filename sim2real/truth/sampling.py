@@ -8,8 +8,10 @@ import numpy as np
 from wetwell.protocols.station import Station
 from wetwell.sim2real.truth.case import Deviation, FaultKind, Quantity, TrueInflow, TruthCase, TruthFault
 from wetwell.sim2real.truth.deviations import DEVIATIONS
+from wetwell.sim2real.truth.kernel import LEVEL
 from wetwell.sim2real.truth.parts import draw_of, rounded
 from wetwell.sim2real.truth.spec import HOUR_S, WATER_N_M3, duty_m3h
+from wetwell.sim2real.truth.truth_plant import passage_of
 
 
 def station_of(name: str, rng: np.random.Generator, *, needs_two_pumps: bool = False) -> Station:
@@ -91,7 +93,12 @@ def inflow_of(station: Station, rng: np.random.Generator) -> TrueInflow:
 
 
 def case_of(
-    names: tuple[str, ...], station_name: str, rng: np.random.Generator, *, seconds: int, slow_share: float = 0.0
+    names: tuple[str, ...],
+    station_name: str,
+    rng: np.random.Generator,
+    *,
+    seconds: int,
+    slow_share: float = 0.0,
 ) -> TruthCase:
     """A case with deviations of these names, at a new station, with parameters drawn for it.
 
@@ -119,7 +126,7 @@ def case_of(
     draw = draw_of(station, rng)
     deviations = tuple(Deviation(name=name, parameters=DEVIATIONS[name].draw(draw)) for name in names)
     control = station.control
-    return TruthCase(
+    case = TruthCase(
         station=station,
         deviations=deviations,
         inflow=inflow_of(station, rng),
@@ -128,8 +135,24 @@ def case_of(
         initial_level_m=rounded(0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])),
         slow_share=slow_share,
     )
+    return _relieved(case)
 
 
+def _relieved(case: TruthCase) -> TruthCase:
+    """The case with so much inflow that its pumps, with their deviations, can carry it."""
+    highest_m = case.station.control.start_levels_m[-1] + HIGH_WATER_M
+    for _ in range(_TRIES):
+        if passage_of(case).station_record[LEVEL].max() < highest_m:
+            break
+        inflow = replace(case.inflow, mean_m3h=RELIEF * case.inflow.mean_m3h, most_m3h=RELIEF * case.inflow.most_m3h)
+        case = replace(case, inflow=inflow)
+    return case
+
+
+HIGH_WATER_M = 1.0
+"""So far over the last start level the wet well may fill; it spills at three times that. [m]"""
+RELIEF = 0.85
+_TRIES = 8
 LEARNING_S = 21_600.0
 """No fault begins in the first six hours, in which a detector may learn. [s]"""
 _SENSED: tuple[Quantity, ...] = ("level_m", "flow_m3h", "head_m", "power_kw")

@@ -1,5 +1,6 @@
 """A true recording of a case, from the fine-step plant."""
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy.typing as npt
 
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.station import Sensors
 from wetwell.sim2real.truth import kernel
 from wetwell.sim2real.truth.case import Quantity, TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS
@@ -15,6 +17,45 @@ from wetwell.sim2real.truth.inflow import inflow_m3h, slow_noise
 from wetwell.sim2real.truth.parts import Truth
 from wetwell.sim2real.truth.spec import HOUR_S, Floats, Surroundings, spec_of
 from wetwell.sim2real.truth.telemetry import Telemetry, sensed, transmitted
+
+_QUIET = Sensors(flow_noise=0.0, head_noise=0.0, power_noise=0.0, inflow_noise=0.0, level_noise_m=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passage:
+    """What a plant has noted of a case: (2, n) and (5, pumps, n) in rows as in `kernel`, SI units."""
+
+    case: TruthCase
+    made: Truth
+    sensor_rng: np.random.Generator
+    station_record: Floats
+    pump_record: Floats
+
+    def recording(self, *, truth: bool) -> Recording:
+        """The recording, to be taken once; a blind one has no truth columns."""
+        columns = self._columns(self.case, self.station_record, self.sensor_rng)
+        return Recording(
+            time_ns=self._stamps_ns,
+            columns=columns,
+            truth=_truth_columns(self.case, self.made.around, self.station_record, self.pump_record) if truth else {},
+        )
+
+    def oracle(self) -> Recording:
+        """What sensors without noise would have recorded: what a perfect model says of the recording."""
+        station = self.case.station.model_copy(update={"sensors": _QUIET})
+        station_record = self.station_record.copy()
+        station_record[kernel.LEVEL_READING] -= self.made.level_noise_m
+        case = replace(self.case, station=station)
+        columns = self._columns(case, station_record, np.random.default_rng(0))
+        return Recording(time_ns=self._stamps_ns, columns=columns)
+
+    @property
+    def _stamps_ns(self) -> npt.NDArray[np.int64]:
+        return self.case.start_ns + NS_PER_S * np.arange(self.case.seconds)
+
+    def _columns(self, case: TruthCase, station_record: Floats, rng: np.random.Generator) -> dict[str, Floats]:
+        inflow_m3h = self.made.around.inflow[:-1] * HOUR_S
+        return recorded(case, self.made.telemetry, inflow_m3h, station_record, self.pump_record, rng)
 
 
 def run(case: TruthCase, *, truth: bool = True) -> Recording:
@@ -31,8 +72,12 @@ def run(case: TruthCase, *, truth: bool = True) -> Recording:
     ValueError
         If a deviation is not known, or the station asks for what this plant does not have.
     """
-    inflow_rng, sensor_rng, deviation_rng = np.random.default_rng(case.seed).spawn(3)
-    made = _truth_of(case, inflow_m3h(case.inflow, case.seconds, inflow_rng), sensor_rng, deviation_rng)
+    return passage_of(case).recording(truth=truth)
+
+
+def passage_of(case: TruthCase) -> Passage:
+    """The fine-step plant's passage through a case; raises as `run`."""
+    made, sensor_rng = truth_of(case)
     station_record = np.empty((2, case.seconds))
     pump_record = np.empty((5, len(case.station.pump), case.seconds))
     around = made.around
@@ -49,17 +94,21 @@ def run(case: TruthCase, *, truth: bool = True) -> Recording:
         station_record,
         pump_record,
     )
-    columns = recorded(case, made.telemetry, around.inflow[:-1] * HOUR_S, station_record, pump_record, sensor_rng)
-    return Recording(
-        time_ns=case.start_ns + NS_PER_S * np.arange(case.seconds),
-        columns=columns,
-        truth=_truth_columns(case, around, station_record, pump_record) if truth else {},
+    return Passage(
+        case=case, made=made, sensor_rng=sensor_rng, station_record=station_record, pump_record=pump_record
     )
 
 
-def _truth_of(
-    case: TruthCase, inflow: Floats, sensor_rng: np.random.Generator, deviation_rng: np.random.Generator
-) -> Truth:
+def truth_of(case: TruthCase) -> tuple[Truth, np.random.Generator]:
+    """Truth of a case, faults and deviations worked in, and the generator of its sensors.
+
+    Raises
+    ------
+    ValueError
+        If a deviation is not known, or the station asks for what this plant does not have.
+    """
+    inflow_rng, sensor_rng, deviation_rng = np.random.default_rng(case.seed).spawn(3)
+    inflow = inflow_m3h(case.inflow, case.seconds, inflow_rng)
     seconds, pumps = case.seconds, len(case.station.pump)
     around = Surroundings(
         inflow=inflow / HOUR_S,
@@ -67,18 +116,24 @@ def _truth_of(
         extra_lift_m=np.zeros(seconds),
         voltage_factor=np.ones(seconds),
         speed_factor=np.ones((pumps, seconds)),
-        level_error_m=case.station.sensors.level_noise_m * _noise(case, sensor_rng),
+        level_error_m=np.zeros(seconds),
         is_level_stuck=np.zeros(seconds),
     )
     made = Truth(
-        station=case.station, spec=spec_of(case.station), around=around, telemetry=Telemetry(), rng=deviation_rng
+        station=case.station,
+        spec=spec_of(case.station),
+        around=around,
+        telemetry=Telemetry(),
+        rng=deviation_rng,
+        level_noise_m=case.station.sensors.level_noise_m * _noise(case, sensor_rng),
     )
     for deviation in case.deviations:
         if deviation.name not in DEVIATIONS:
             raise ValueError(f"deviation '{deviation.name}' is not one of {', '.join(DEVIATIONS)}")
         DEVIATIONS[deviation.name].act(made, deviation.parameters)
     force_faults(case.faults, around)
-    return made
+    around.level_error_m[:] += made.level_noise_m
+    return made, sensor_rng
 
 
 def recorded(

@@ -1,0 +1,125 @@
+"""The cases of a trial: which truth, which kind, each from the seed and its number alone.
+
+Case k of seed S does not depend on how many there are. Kinds take turns; within a kind the names take turns in an
+order that the seed shuffles, so that each is met as often as any other.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from wetwell.sim2real.truth.case import TruthCase
+from wetwell.sim2real.truth.deviations import DEVIATIONS, LIBRARY, OPEN
+from wetwell.sim2real.truth.sampling import case_of
+from wetwell.sim2real.truth.swmm_input import SWMM_LIBRARY, SWMM_OPEN
+
+CaseKind = Literal["single", "pair", "none", "open", "leave_one_out"]
+PlantName = Literal["fine", "swmm"]
+KINDS: tuple[CaseKind, ...] = get_args(CaseKind)
+VERDICT_OF: dict[CaseKind, str] = {
+    "single": "effect",
+    "pair": "effect",
+    "none": "none",
+    "open": "unknown",
+    "leave_one_out": "unknown",
+}
+_HELD: dict[tuple[PlantName, bool], tuple[str, ...]] = {
+    ("fine", False): LIBRARY,
+    ("fine", True): OPEN,
+    ("swmm", False): SWMM_LIBRARY,
+    ("swmm", True): SWMM_OPEN,
+}
+SLOW_SHARE = 0.3
+"""Share of the variance of the sensors' noise that is slow, in every other case."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialCase:
+    """One sealed case.
+
+    Attributes
+    ----------
+    number : int
+        k, from 0.
+    kind : CaseKind
+    plant : PlantName
+    truth : TruthCase
+    """
+
+    number: int
+    kind: CaseKind
+    plant: PlantName
+    truth: TruthCase
+
+    @property
+    def name(self) -> str:
+        """Name of the case, which says nothing of it."""
+        return f"case-{self.number:04}"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its deviations."""
+        return tuple(deviation.name for deviation in self.truth.deviations)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Components in which they lie."""
+        return tuple(DEVIATIONS[name].component for name in self.names)
+
+    @property
+    def inherent(self) -> tuple[str, ...]:
+        """Effects that its plant always has to some degree: the mains of SWMM are not without inertia."""
+        return ("water_inertia",) if self.plant == "swmm" else ()
+
+    @property
+    def without(self) -> tuple[str, ...]:
+        """Effects that are taken out of the library for it."""
+        return self.names if self.kind == "leave_one_out" else ()
+
+
+def trial_case(
+    seed: int, number: int, *, kinds: tuple[CaseKind, ...], plants: tuple[PlantName, ...], seconds: int
+) -> TrialCase:
+    """Case `number` of the trial of a seed.
+
+    Parameters
+    ----------
+    seed, number : int
+        S and k.
+    kinds, plants : tuple
+        They take turns.
+    seconds : int
+        Length of its recording. [s]
+
+    Examples
+    --------
+    >>> case = trial_case(1, 7, kinds=("single", "none"), plants=("fine",), seconds=600)
+    >>> case.kind, case.names, case.name
+    ('none', (), 'case-0007')
+    """
+    turn, place = divmod(number, len(kinds))
+    kind = kinds[place]
+    plant = plants[turn % len(plants)]
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+    names = _names(seed, kind, plant, turn // len(plants), rng)
+    truth = case_of(
+        names,
+        f"station-{rng.integers(16**6):06x}",
+        rng,
+        seconds=seconds,
+        slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,
+    )
+    return TrialCase(number=number, kind=kind, plant=plant, truth=truth)
+
+
+def _names(seed: int, kind: CaseKind, plant: PlantName, turn: int, rng: np.random.Generator) -> tuple[str, ...]:
+    if kind == "none":
+        return ()
+    held = _HELD[plant, kind == "open"]
+    order = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(KINDS.index(kind), len(held), 0)))
+    first = held[int(order.permutation(len(held))[turn % len(held)])]
+    if kind != "pair":
+        return (first,)
+    others = [name for name in held if DEVIATIONS[name].component != DEVIATIONS[first].component]
+    return first, others[int(rng.integers(len(others)))]

@@ -1,0 +1,228 @@
+"""Scores of a trial: answers beside opened labels."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.trial.answer import Answer, ToldEffect
+from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind, PlantName
+
+FAILED = "failed"
+TELLS = ("effect", "none", "unknown", FAILED)
+PERMUTATIONS = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label:
+    """What a sealed case is.
+
+    Attributes
+    ----------
+    case, kind, plant : str
+        Of a `TrialCase`.
+    names, components : tuple of str
+        True effects and where they lie.
+    parameters : mapping of effect to mapping of parameter to value
+        Some are the library's, by name and unit.
+    inherent : tuple of str
+        Effects that this plant always has to some degree: to tell them is neither right nor wrong.
+    """
+
+    case: str
+    kind: CaseKind
+    plant: PlantName
+    names: tuple[str, ...]
+    components: tuple[str, ...]
+    parameters: Mapping[str, Mapping[str, Any]]
+    inherent: tuple[str, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """Row of the confusion matrix."""
+        joined = "+".join(self.names)
+        return {"none": "none", "open": f"open: {joined}", "leave_one_out": f"without: {joined}"}.get(
+            self.kind, joined
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseScore:
+    """How an answer compares with a label; None where the question does not arise.
+
+    `top_2` counts a declared equivalent of what is told first. With two true effects `top_1` asks whether what is
+    told first is one of them, and `top_2` whether both are told or declared equivalent. Where the truth is not in
+    the library, `top_1` and `top_2` do not arise, and "unknown" or a declared equivalent is right.
+    """
+
+    label: Label
+    told: str
+    told_names: tuple[str, ...]
+    verdict_right: bool
+    top_1: bool | None
+    top_2: bool | None
+    component_right: bool | None
+    false_attribution: bool | None
+    shrinkage: float | None
+    parameters: tuple[dict[str, Any], ...]
+
+
+def score_case(label: Label, answer: Answer | None) -> CaseScore:
+    """Score of one answer; None for a diagnosis that failed, which is wrong in all."""
+    answer = answer and _without(answer, set(label.inherent) - set(label.names))
+    told = answer.verdict if answer else FAILED
+    names = answer.names if answer and told == "effect" else ()
+    is_known = label.kind in {"single", "pair"}
+    place = answer.where[0].component if answer and answer.where else ""
+    expected = VERDICT_OF[label.kind]
+    named_equivalent = bool(answer and names and set(answer.effects[0].equivalent) & set(label.names))
+    return CaseScore(
+        label=label,
+        told=told,
+        told_names=names,
+        verdict_right=told == expected or (label.kind == "leave_one_out" and named_equivalent),
+        top_1=bool(names and names[0] in label.names) if is_known else None,
+        top_2=_top_2(label, answer if names else None) if is_known else None,
+        component_right=place in label.components if label.names else None,
+        false_attribution=told == "effect" if label.kind == "none" else None,
+        shrinkage=answer.gap.shrinkage if answer and is_known and told == "effect" else 0.0 if is_known else None,
+        parameters=tuple(_parameter_rows(label, answer)) if answer and is_known else (),
+    )
+
+
+def _without(answer: Answer, names: set[str]) -> Answer:
+    """Answer less some effects; "none" if it told nothing else."""
+    effects = tuple(effect for effect in answer.effects if effect.name not in names)
+    if len(effects) == len(answer.effects):
+        return answer
+    changes = {
+        "effects": effects,
+        "candidates": tuple(candidate for candidate in answer.candidates if candidate.name not in names),
+        "verdict": answer.verdict if effects else "none",
+    }
+    return answer.model_copy(update=changes)
+
+
+def _top_2(label: Label, answer: Answer | None) -> bool:
+    if answer is None:
+        return False
+    if len(label.names) == 1:
+        return label.names[0] in {*answer.ranking[:2], *answer.effects[0].equivalent}
+    known = [{effect.name, *effect.equivalent} for effect in answer.effects]
+    return any(
+        label.names[0] in one and label.names[1] in other
+        for k, one in enumerate(known)
+        for j, other in enumerate(known)
+        if j != k
+    )
+
+
+def _parameter_rows(label: Label, answer: Answer) -> list[dict[str, Any]]:
+    """A row for each number that truth and answer both name, of effects that are told by their true name."""
+    return [
+        row
+        for effect in answer.effects
+        if effect.name in label.names
+        for row in _compared(effect, label.parameters.get(effect.name, {}))
+    ]
+
+
+def _compared(effect: ToldEffect, true_values: Mapping[str, Any]) -> list[dict[str, Any]]:
+    rows = []
+    for name, parameter in effect.parameters.items():
+        true_value, value = true_values.get(name), parameter.value
+        if name == "pump" or not isinstance(true_value, int | float) or not isinstance(value, int | float):
+            continue
+        low, high = parameter.ci or (None, None)
+        rows.append(
+            {
+                "effect": effect.name,
+                "parameter": name,
+                "truth": float(true_value),
+                "value": float(value),
+                "relative_error": abs(float(value) - true_value) / max(abs(true_value), 1e-12),
+                "is_covered": None if low is None or high is None else low <= true_value <= high,
+            }
+        )
+    return rows
+
+
+def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
+    """Figures over all cases: shares with Wilson's 95 % interval, medians, coverage.
+
+    Shares range from 0 to 1, best 1, but for `false_attribution` (best 0).
+    """
+    rows = [row for score in scores for row in score.parameters]
+    covered = [row["is_covered"] for row in rows if row["is_covered"] is not None]
+    shrinkages = [score.shrinkage for score in scores if score.shrinkage is not None]
+    return {
+        "cases": len(scores),
+        "failed": sum(score.told == FAILED for score in scores),
+        **{
+            name: share([getattr(score, name) for score in scores])
+            for name in ("verdict_right", "top_1", "top_2", "component_right", "false_attribution")
+        },
+        "shrinkage": {"median": float(np.median(shrinkages)), "mean": float(np.mean(shrinkages))}
+        if shrinkages
+        else None,
+        "parameter_error": {
+            "median": float(np.median([row["relative_error"] for row in rows])),
+            "count": len(rows),
+        }
+        if rows
+        else None,
+        "interval_coverage": share(covered),
+    }
+
+
+def share(answers: Sequence[bool | None]) -> dict[str, Any] | None:
+    """Share of yes among those that are not None, with Wilson's 95 % interval; None without any.
+
+    References
+    ----------
+    .. [1] E. B. Wilson, Probable inference, the law of succession, and statistical inference, JASA 1927.
+
+    Examples
+    --------
+    >>> share([True, True, None, False])["value"], share([None])
+    (0.6666666666666666, None)
+    """
+    known = [bool(answer) for answer in answers if answer is not None]
+    if not known:
+        return None
+    n, p, z = len(known), sum(known) / len(known), 1.959964
+    middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    return {"value": p, "ci": [max(middle - half, 0.0), min(middle + half, 1.0)], "count": n}
+
+
+def chance_level(pairs: Sequence[tuple[Label, Answer | None]], rng: np.random.Generator) -> dict[str, float | None]:
+    """Mean shares when labels are dealt to the answers at random: what knowing nothing of the case scores."""
+    totals: dict[str, list[float]] = {name: [] for name in ("verdict_right", "top_1", "top_2", "component_right")}
+    for _ in range(PERMUTATIONS):
+        order = rng.permutation(len(pairs))
+        dealt = [score_case(pairs[int(k)][0], answer) for k, (_, answer) in zip(order, pairs, strict=True)]
+        for name, values in totals.items():
+            if (one := share([getattr(score, name) for score in dealt])) is not None:
+                values.append(one["value"])
+    return {name: float(np.mean(values)) if values else None for name, values in totals.items()}
+
+
+def confusion(scores: Sequence[CaseScore]) -> tuple[list[str], list[str], npt.NDArray[np.int64]]:
+    """Rows (what is true), columns (what is told first, or the verdict) and counts; pairs are one row."""
+    rows = sorted({_row(score) for score in scores})
+    columns = sorted({score.told_names[0] for score in scores if score.told_names})
+    columns += [tell for tell in TELLS[1:] if any(not s.told_names and s.told == tell for s in scores)]
+    columns += ["effect"] if any(not s.told_names and s.told == "effect" for s in scores) else []
+    counts = np.zeros((len(rows), len(columns)), dtype=np.int64)
+    for score in scores:
+        told = score.told_names[0] if score.told_names else score.told
+        counts[rows.index(_row(score)), columns.index(told)] += 1
+    return rows, columns, counts
+
+
+def _row(score: CaseScore) -> str:
+    return "pair" if score.label.kind == "pair" else score.label.title
