@@ -4,7 +4,7 @@ Colours are CSS variables with a default each, so that a chart stands alone and 
 scheme. Every chart has a title and a description for screen readers.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
@@ -378,13 +378,12 @@ def _extremes(values: NDArray[np.float64]) -> list[float]:
 
 
 def _thinned(
-    x: NDArray[np.float64], y: NDArray[np.float64], scale: Callable[[float], float]
+    x: NDArray[np.float64], y: NDArray[np.float64], scale: _Scale
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Of each pixel's points the least, the greatest and a gap, in order; short series as they are."""
     if len(x) <= 2 * WIDTH:
         return x, y
-    start, end = scale(0.0), scale(1.0)
-    pixel = np.floor(start + x * (end - start)).astype(np.int64)
+    pixel = np.floor((x - scale.low) / (scale.high - scale.low) * (scale.end - scale.start)).astype(np.int64)
     keep: set[int] = set()
     for begin, stop in pairwise([0, *(np.flatnonzero(np.diff(pixel)) + 1), len(x)]):
         part = y[begin:stop]

@@ -58,13 +58,14 @@ def test_a_gap_breaks_the_line() -> None:
     assert path.count("L") == 2
 
 
-def test_a_long_series_keeps_its_only_spike_and_its_only_gap() -> None:
+@pytest.mark.parametrize(("begin", "step"), [(0, 1), (1_735_689_600 * 10**9, 10**9)])
+def test_a_long_series_keeps_its_only_spike_and_its_only_gap(begin: int, step: int) -> None:
     y = np.zeros(86_400)
     y[50_000] = 7.0
     y[20_000] = math.nan
-    svg = line_chart("t", [Series("a", np.arange(86_400), y)])
+    svg = line_chart("t", [Series("a", begin + step * np.arange(86_400), y)])
     (points,) = path_points(svg)
-    assert len(points) < 3 * WIDTH
+    assert (WIDTH - LEFT - RIGHT) <= len(points) < 3 * WIDTH
     assert min(y for _, y in points) < min(sorted(y for _, y in points)[1:])
     spike = min(points, key=lambda point: point[1])
     assert spike[0] == pytest.approx(LEFT + 50_000 / 86_399 * (WIDTH - LEFT - RIGHT), abs=1.0)
