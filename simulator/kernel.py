@@ -22,8 +22,10 @@ from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overfl
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-INERTIA_STEPS = 5
+INERTIA_STEPS = 3
 """Steps within a second in which the column of water is accelerated."""
+STAGE = 1.0 - math.sqrt(0.5)
+"""γ of the two-stage implicit step of second order that damps every stiffness (R. Alexander 1977)."""
 
 
 @compiled
@@ -69,15 +71,14 @@ def advance(
     for second in range(station_force.shape[1]):
         level_m = level_at_volume_m(station_state[at.VOLUME], profile)
         static_head_m = station[at.STATIC_HEAD] - station[at.LIFT_SLOPE] * (level_m - station[at.LIFT_REFERENCE])
-        static_head_m += station_state[at.AIR] + station_force[at.STATIC_RISE, second]
-        static_head_m = max(static_head_m, 0.0)
+        static_head_m += station_force[at.STATIC_RISE, second]
         friction_h2_m5 = station[at.FRICTION] * station_force[at.FRICTION_FACTOR, second]
         is_moving = _is_moving(pump_state)
         if is_moving:
             _turn_pumps(station, pump, pump_state, pump_force, second, curves)
             _move_water(station, pump_state, curves, static_head_m, friction_h2_m5)
         if station[at.AIR_HEAD] > 0.0:
-            _gather_air(station, station_state, pump_state)
+            _gather_air(station, pump_state)
         over_m3h = overflow_m3h(level_m, station[at.OVERFLOW_LEVEL], station[at.WEIR_WIDTH], profile)
         inflow_m3h = station_force[at.INFLOW_FORCE, second]
         back_m3h = _back_flow_m3h(station, pump, pump_state, pump_force, second, static_head_m, friction_h2_m5)
@@ -187,36 +188,73 @@ def _move_water(
     station: Floats, pump_state: Floats, curves: Floats, static_head_m: float, friction_h2_m5: float
 ) -> None:
     """Set the flows after the second and their means over it."""
-    inertia_m_m3h = station[at.INERTIA] / 3600.0 * INERTIA_STEPS
-    steps = INERTIA_STEPS if inertia_m_m3h > 0.0 else 1
-    speed_ratio = pump_state[at.SPEED_RATIO]
     flow_m3h = pump_state[at.FLOW_NOW]
     mean_m3h = pump_state[at.MEAN_FLOW]
+    if station[at.INERTIA] <= 0.0:
+        _solve_flows(station, pump_state, curves, static_head_m, friction_h2_m5, 0.0)
+        for i in range(mean_m3h.size):
+            mean_m3h[i] = flow_m3h[i]
+        return
+    inertia_m_m3h = station[at.INERTIA] / 3600.0 * INERTIA_STEPS / STAGE
+    before_m3h = pump_state[at.FLOW_BEFORE]
     for i in range(mean_m3h.size):
         mean_m3h[i] = 0.0
-    for _ in range(steps):
-        if station[at.IS_COMMON_HEADER] > 0.0:
-            own_h2_m5 = friction_h2_m5 * (1.0 - station[at.SHARED_FRICTION])
-            for i in range(mean_m3h.size):
-                curves[i, 2] -= own_h2_m5
-            shared_h2_m5 = friction_h2_m5 * station[at.SHARED_FRICTION]
-            common_flows(curves, speed_ratio, static_head_m, shared_h2_m5, inertia_m_m3h, flow_m3h)
-            for i in range(mean_m3h.size):
-                curves[i, 2] += own_h2_m5
-        else:
-            individual_flows(curves, speed_ratio, static_head_m, friction_h2_m5, inertia_m_m3h, flow_m3h)
+    for _ in range(INERTIA_STEPS):
         for i in range(mean_m3h.size):
-            mean_m3h[i] += flow_m3h[i] / steps
+            before_m3h[i] = flow_m3h[i]
+        _solve_flows(station, pump_state, curves, static_head_m, friction_h2_m5, inertia_m_m3h)
+        for i in range(mean_m3h.size):
+            mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / INERTIA_STEPS
+            flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
+        _solve_flows(station, pump_state, curves, static_head_m, friction_h2_m5, inertia_m_m3h)
+        for i in range(mean_m3h.size):
+            mean_m3h[i] += STAGE * flow_m3h[i] / INERTIA_STEPS
 
 
 @compiled
-def _gather_air(station: Floats, station_state: Floats, pump_state: Floats) -> None:
-    """Let the air at high points grow while no water moves, and be purged while some does."""
+def _solve_flows(
+    station: Floats,
+    pump_state: Floats,
+    curves: Floats,
+    static_head_m: float,
+    friction_h2_m5: float,
+    inertia_m_m3h: float,
+) -> None:
+    """Set the flows by the layout of the mains, each with its own air."""
+    speed_ratio = pump_state[at.SPEED_RATIO]
+    flow_m3h = pump_state[at.FLOW_NOW]
+    lift_m = max(static_head_m + pump_state[at.AIR, 0], 0.0)
+    if station[at.IS_COMMON_HEADER] > 0.0:
+        own_h2_m5 = friction_h2_m5 * (1.0 - station[at.SHARED_FRICTION])
+        for i in range(flow_m3h.size):
+            curves[i, 2] -= own_h2_m5
+        common_flows(
+            curves, speed_ratio, lift_m, friction_h2_m5 * station[at.SHARED_FRICTION], inertia_m_m3h, flow_m3h
+        )
+        for i in range(flow_m3h.size):
+            curves[i, 2] += own_h2_m5
+    elif station[at.AIR_HEAD] > 0.0:
+        for i in range(flow_m3h.size):
+            one = slice(i, i + 1)
+            lift_m = max(static_head_m + pump_state[at.AIR, i], 0.0)
+            individual_flows(curves[one], speed_ratio[one], lift_m, friction_h2_m5, inertia_m_m3h, flow_m3h[one])
+    else:
+        individual_flows(curves, speed_ratio, lift_m, friction_h2_m5, inertia_m_m3h, flow_m3h)
+
+
+@compiled
+def _gather_air(station: Floats, pump_state: Floats) -> None:
+    """Let the air of each main grow while no water moves in it, and be purged while some does."""
+    total_m3h = 0.0
     for i in range(pump_state.shape[1]):
-        if pump_state[at.MEAN_FLOW, i] > 0.0:
-            station_state[at.AIR] -= station_state[at.AIR] / station[at.AIR_PURGE]
-            return
-    station_state[at.AIR] += (station[at.AIR_HEAD] - station_state[at.AIR]) / station[at.AIR_GROWTH]
+        total_m3h += pump_state[at.MEAN_FLOW, i]
+    for i in range(pump_state.shape[1]):
+        air_m = pump_state[at.AIR, i]
+        flow_m3h = total_m3h if station[at.IS_COMMON_HEADER] > 0.0 else pump_state[at.MEAN_FLOW, i]
+        if flow_m3h > 0.0:
+            pump_state[at.AIR, i] -= air_m / station[at.AIR_PURGE]
+        else:
+            pump_state[at.AIR, i] += (station[at.AIR_HEAD] - air_m) / station[at.AIR_GROWTH]
 
 
 @compiled
@@ -234,7 +272,7 @@ def _back_flow_m3h(
     for i in range(pump.shape[1]):
         leak_m3h = pump[at.VALVE_LEAK, i] + pump_force[at.VALVE_LEAK_FORCE, i, second]
         if leak_m3h > 0.0 and pump_state[at.SPEED_RATIO, i] <= 0.0 and pump_state[at.FLOW_NOW, i] <= 0.0:
-            head_m = static_head_m
+            head_m = max(static_head_m + pump_state[at.AIR, i], 0.0)
             if station[at.IS_COMMON_HEADER] > 0.0:
                 total_m3h = 0.0
                 for k in range(pump.shape[1]):

@@ -35,9 +35,9 @@ class PlantParameters:
     the loss of speed at rated torque; back flow through the check valve of a standing pump at 1 m. Rising main:
     on a common header, the share `shared_friction` of k acts on the total flow, the rest on each pump's own;
     static head that falls by `lift_slope` for each metre of level above `lift_reference_m`; `inertia_s2_m2` =
-    length / (g area); air that grows idle and purges running. Drive: shape of the ramp. Control: levels, delay,
-    rotation, limits, level controller. Electrical: a power that follows the frequency, or the load, or between
-    the two by `load_share`.
+    length / (g area); air that grows idle and purges running, in each main. Drive: shape of the ramp. Control:
+    levels, delay, rotation, limits, level controller. Electrical: a power that follows the frequency, or the load,
+    or between the two by `load_share`.
     """
 
     profile: Floats
@@ -241,7 +241,7 @@ class Plant:
     ----------
     parameters : PlantParameters
     level_m : float
-        Level at the beginning, with all pumps standing. [m]
+        Level at the beginning, with all pumps standing, for so long that all air has gathered. [m]
     """
 
     def __init__(self, parameters: PlantParameters, level_m: float) -> None:
@@ -254,6 +254,7 @@ class Plant:
         self._station_state[at.VOLUME] = volume_at_level_m3(level_m, parameters.profile)
         self._station_state[at.WANTED_FREQUENCY] = np.inf
         self._pump_state = np.zeros((at.PUMP_STATES, pumps))
+        self._pump_state[at.AIR] = parameters.air_head_m
         self._channel_state = np.full((at.CHANNEL_STATES, channels(pumps)), np.nan)
         self._channel_state[at.LAST_NOISE] = 0.0
         self._past = np.full((channels(pumps), PAST_S), np.nan)

@@ -13,7 +13,7 @@ class AirPocket(Effect):
     $$\frac{da}{dt} = \frac{a_{\max} - a}{\tau_g} \text{ idle}, \qquad
     \frac{da}{dt} = -\frac{a}{\tau_p} \text{ running}, \qquad H = H_s + a + k Q^2$$
 
-    At the beginning there is no air; mains of their own share one pocket.
+    At the beginning, after a long idle, all air is there. Mains of their own have a pocket each.
 
     Parameters
     ----------

@@ -12,7 +12,8 @@ class CheckValveLeak(Effect):
 
     $$Q_\text{back} = K \sqrt{H / 1\,\text{m}}, \qquad H = H_s \text{, on a common header } H_s + k Q^2$$
 
-    No flow meter shows it. The main is taken to stay full.
+    No meter shows it: the pump's own reads 0 while it stands, and the back flow is no part of the inflow. Flow and
+    head of the running pumps are as without it. The main is taken to stay full.
 
     Parameters
     ----------

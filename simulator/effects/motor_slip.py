@@ -12,7 +12,10 @@ class MotorSlip(Effect):
 
     $$N = N_c \left(1 - s\, \frac{M}{M_n}\right)$$
 
-    The torque is that of the second before. Electrical power follows the command.
+    The torque is that of the second before: shaft power over speed, where the shaft power is a straight line in the
+    flow from the station's `shutoff_power_share` of the rated one at no flow. The smaller that share, the less a
+    throttled pump slips; with a share of 1 the slip at nominal speed is s at every flow. Electrical power follows the
+    command.
 
     Parameters
     ----------

@@ -14,7 +14,8 @@ class CheckValveLeak(PumpFault):
     $$Q_\text{back} = K\, r(t) \sqrt{H / 1\,\text{m}}, \qquad
     H = H_s \text{, on a common header } H_s + k Q^2$$
 
-    No flow meter shows it; the level rises faster and pumps start more often. The main is taken to stay full.
+    No meter shows it: the pump's own reads 0 while it stands. The level rises faster and pumps start more often. The
+    main is taken to stay full.
 
     Parameters
     ----------
