@@ -1,0 +1,56 @@
+"""Where the search for some parameters begins: what the recording shows directly."""
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.bins import POWER, Bins
+from wetwell.sim2real.candidates import Candidate
+from wetwell.sim2real.misfit import Misfit
+from wetwell.sim2real.regimes import MULTI_PUMP, STEADY
+
+Floats = npt.NDArray[np.float64]
+
+LONGEST_S = 14_400.0
+SHORTEST_S = 45.0
+GRID_S = 20.0
+FINER = 4
+"""Frequencies between two that the length of the recording tells apart."""
+
+
+def hints_of(candidate: Candidate, misfit: Misfit, residuals: Floats) -> dict[str, float]:
+    """Start values by parameter: deadbands and quanta that are seen, the period of what swings in the power."""
+    fixed = dict(candidate.fixed)
+    hints: dict[str, float] = {}
+    names = {free.name for free in candidate.free}
+    for pattern in misfit.telemetry.patterns:
+        if "deadband" in names and pattern.kind == "deadband" and fixed.get("channel") == pattern.quantity:
+            hints["deadband"] = pattern.size
+        if "quantum_m" in names and pattern.kind == "quantum":
+            hints["quantum_m"] = pattern.size
+    if "fast_period_s" in names:
+        hints |= _swing(misfit.bins, residuals)
+    return hints
+
+
+def _swing(bins: Bins, residuals: Floats) -> dict[str, float]:
+    """Period and phase of the strongest sine in the steady residuals of the power; its amplitude is small."""
+    rows = (bins.signal == POWER) & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
+    if rows.sum() < 50:
+        return {}
+    time_s = bins.second[rows].astype(float) + 10.0
+    values = residuals[rows] * bins.deviation[rows]
+    day = 2.0 * np.pi * time_s / 86_400.0
+    slow = np.column_stack([np.ones(time_s.size), np.cos(day), np.sin(day)])
+    values = values - slow @ np.linalg.lstsq(slow, values, rcond=None)[0]
+    place = (time_s / GRID_S).astype(np.int64)
+    grid = np.bincount(place, values)
+    frequency_hz = np.fft.rfftfreq(FINER * grid.size, GRID_S)
+    power = np.abs(np.fft.rfft(grid, FINER * grid.size))
+    power[(frequency_hz < 1.0 / LONGEST_S) | (frequency_hz > 1.0 / SHORTEST_S)] = 0.0
+    best = 2.0 * np.pi * float(frequency_hz[int(np.argmax(power))])
+    if best == 0.0:
+        return {}
+    wave = np.column_stack([np.sin(best * time_s), np.cos(best * time_s)])
+    a, b = np.linalg.lstsq(wave, values, rcond=None)[0]
+    phase_s = (-np.arctan2(b, a) / best) % (2.0 * np.pi / best)
+    return {"fast_period_s": 2.0 * np.pi / best, "fast_phase_s": float(phase_s), "fast_amplitude": 0.01}
