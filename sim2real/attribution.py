@@ -13,13 +13,12 @@ from wetwell.sim2real.hints import hints_of
 from wetwell.sim2real.misfit import Misfit, soft
 from wetwell.sim2real.regimes import REGIMES
 from wetwell.sim2real.replay import Replay
+from wetwell.sim2real.sureness import is_sure
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-SURE = 4.0
-"""Standard errors by which an effect must help on cycles that it was not fitted on: 3 for one, 4 for a library."""
-VISIBLE = 0.25
+VISIBLE = 0.12
 """Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
 PRICE = 0.006
 """Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""
@@ -42,10 +41,9 @@ class Ranked:
     by_cycle: Floats
 
     @property
-    def sureness(self) -> float:
-        """Gain over its standard error, from the scatter of the gains of the cycles."""
-        spread = float(np.sqrt(self.by_cycle.size * np.var(self.by_cycle, ddof=1))) if self.by_cycle.size > 1 else 0.0
-        return self.gain / spread if spread > 0.0 else 0.0
+    def is_sure(self) -> bool:
+        """Whether the gain is beyond chance."""
+        return is_sure(self.by_cycle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +91,7 @@ class Attributor:
         self.plain = soft(misfit.residuals(replay.run()))
         self.fitted, self.held = halves(misfit.bins, replay.traces.pumps)
         self._fitter = Fitter(replay, misfit, self.fitted)
-        self._hints = {candidate: hints_of(candidate, misfit, self.plain) for candidate in candidates}
+        self._hints = {candidate: hints_of(candidate, replay, misfit, self.plain) for candidate in candidates}
 
     def search(self) -> Attribution:
         """Single effects first, then further ones while they help, each member swapped for all others."""
@@ -101,7 +99,7 @@ class Attributor:
         best = singles[0] if singles else None
         accepted: Fit | None = None
         if best is not None and self._is_real(self.plain, best):
-            accepted = self._extend(best, singles).fit
+            accepted = self._reduced(self._extend(best, singles)).fit
         self._progress(1.0)
         return Attribution(
             plain=self.plain,
@@ -141,6 +139,25 @@ class Attributor:
             current = self._swapped(tried, singles)
         return current
 
+    def _reduced(self, current: Ranked) -> Ranked:
+        """Without the members that the others can stand in for."""
+        count = len(current.fit.candidates)
+        for place in range(count if count > 1 else 0):
+            kept = [k for k in range(count) if k != place]
+            fit = Fit(
+                candidates=tuple(current.fit.candidates[k] for k in kept),
+                places=tuple(current.fit.places[k] for k in kept),
+                residuals=current.fit.residuals,
+            )
+            residuals = self._fitter.residuals(fit.candidates, fit.places)
+            if residuals is None:
+                continue
+            start = Fit(candidates=fit.candidates, places=fit.places, residuals=residuals)
+            fewer = self._rank(self.plain, self._fitter.refine(start))
+            if fewer.gain > (1.0 - JOIN_SHARE) * current.gain:
+                return self._reduced(fewer)
+        return current
+
     def _joined(self, current: Ranked, candidates: Sequence[Candidate]) -> Ranked | None:
         """Best fit of the current effects with one more."""
         firsts = []
@@ -177,7 +194,7 @@ class Attributor:
 
     def _is_real(self, before: Floats, ranked: Ranked) -> bool:
         """Whether a gain is beyond chance, and beyond what is worth a name, in some group of bins."""
-        if ranked.sureness < SURE:
+        if not ranked.is_sure:
             return False
         gains = (before**2 - ranked.fit.residuals**2)[self.held]
         group = self._misfit.bins.signal[self.held] * len(REGIMES) + self._misfit.bins.regime[self.held]

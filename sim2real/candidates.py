@@ -16,7 +16,7 @@ Floats = npt.NDArray[np.float64]
 
 WIDE = 50.0
 """Ratio of a range's ends from which a parameter is varied on a logarithmic scale."""
-TRIALS = (0.002, 0.01, 0.04, 0.12, 0.35)
+TRIALS = (0.002, 0.01, 0.04, 0.12, 0.3)
 """Strengths that are tried first, as shares of the way from neutral to either end of the range."""
 
 

@@ -19,6 +19,7 @@ from wetwell.sim2real.regimes import REGIMES, Regimes, regimes_of
 from wetwell.sim2real.replay import Replay
 from wetwell.sim2real.shrinkage import Interval, Shrinkage, bootstrap, shrinkage_of
 from wetwell.sim2real.structure import explained, repeating
+from wetwell.sim2real.sureness import is_sure
 from wetwell.sim2real.traces import Traces, traces_of
 from wetwell.simulator.effects import effects_of
 from wetwell.simulator.effects.effect import Component
@@ -32,7 +33,8 @@ HARDLY = 0.3
 """Share of the whole gap that is left when the effects found so far hardly matter."""
 SEEN = 0.6
 """Repeating mean square of a signal in one regime, in units of noise, from which it is a gap."""
-SURE = 4.0
+LARGE = 4.0
+"""Mean square of half of the cycles, in units of noise, that no noise has."""
 MIN_BINS = 12
 TWO_SIDED = 1.96
 
@@ -130,13 +132,14 @@ def diagnose(
     after_residuals = found.plain if accepted is None else accepted.residuals
     after = before if accepted is None else _repeating_gap(after_residuals, bins, found, pumps)
     verdict: Verdict = "none" if accepted is None else "effect"
-    if _is_unexplained(before, after, bins, found):
+    if _is_unexplained(before, after, after_residuals, bins, found):
         verdict = "unknown"
     causes = _causes(found)
     where: tuple[Place, ...] = ()
     if verdict == "unknown":
         explains_little = float(after.sum()) > HARDLY * float(before.sum())
-        left, residuals = (before, found.plain) if explains_little else (after, after_residuals)
+        residuals = found.plain if explains_little else after_residuals
+        left = np.where(found.held, residuals**2 - bins.floor, 0.0)
         where = _places(residuals, left, bins, found, culprit(left, residuals, bins, plain.plant), rng)
     elif verdict == "effect":
         where = _places(found.plain, before, bins, found, causes[0].component, rng)
@@ -163,21 +166,26 @@ def _repeating_gap(residuals: Floats, bins: Bins, found: Attribution, pumps: int
     return np.where(found.held, explained(residuals, expected), 0.0)
 
 
-def _is_unexplained(before: Floats, after: Floats, bins: Bins, found: Attribution) -> bool:
-    """Whether a signal keeps a gap that is there in the first place, sure, and more than a third of what it was."""
-    was = np.bincount(bins.signal[found.held], before[found.held], len(SIGNALS))
+def _is_unexplained(before: Floats, after: Floats, residuals: Floats, bins: Bins, found: Attribution) -> bool:
+    """Whether a signal keeps a gap that is sure, or large, and more than a third of what it was."""
     for signal in range(len(SIGNALS)):
+        rows = found.held & (bins.signal == signal)
+        was = max(float(before[rows].sum()), float(np.sum(found.plain[rows] ** 2 - bins.floor[rows])))
+        left = float(after[rows].sum())
         is_left = False
         for regime in range(len(REGIMES)):
-            rows = found.held & (bins.signal == signal) & (bins.regime == regime)
-            if rows.sum() < MIN_BINS:
+            cell = rows & (bins.regime == regime)
+            if cell.sum() < MIN_BINS:
                 continue
-            cycles = np.unique(bins.cycle[rows], return_inverse=True)[1]
-            by_cycle = np.bincount(cycles, after[rows])
-            spread = float(np.sqrt(by_cycle.size * np.var(by_cycle, ddof=1))) if by_cycle.size > 1 else 0.0
-            is_left |= float(after[rows].mean()) > SEEN and float(by_cycle.sum()) > SURE * spread
-        left = float(after[found.held & (bins.signal == signal)].sum())
-        if is_left and left > KEPT * was[signal]:
+            cycles = np.unique(bins.cycle[cell], return_inverse=True)[1]
+            is_repeating = float(after[cell].mean()) > SEEN and is_sure(
+                np.bincount(cycles, after[cell]).astype(np.float64)
+            )
+            is_large = float(np.median(np.bincount(cycles, residuals[cell] ** 2) / np.bincount(cycles))) > LARGE
+            if is_large:
+                left = max(left, float(np.sum(residuals[rows] ** 2 - bins.floor[rows])))
+            is_left |= is_repeating or is_large
+        if is_left and left > KEPT * was:
             return True
     return False
 

@@ -10,7 +10,8 @@ from wetwell.protocols.station import Station
 from wetwell.sim2real.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.sim2real.regimes import IDLE, STEADY, Event, Regimes
 from wetwell.sim2real.replay import Prediction
-from wetwell.sim2real.signal_misfit import level_noise_m
+from wetwell.sim2real.signal_misfit import QUANTUM_SHARE, level_noise_m
+from wetwell.sim2real.telemetry_misfit import Pattern
 from wetwell.sim2real.traces import Traces
 from wetwell.simulator.channels import LEVEL
 
@@ -31,6 +32,7 @@ class EventMisfit:
     number: npt.NDArray[np.int64]
     level_m: Floats
     slope_m_s: Floats
+    pattern: Pattern | None
 
     def residuals(self, prediction: Prediction) -> Floats:
         """(events,) level that the controller saw, minus its threshold, over the standard deviation."""
@@ -39,10 +41,15 @@ class EventMisfit:
         seen_m = self.level_m + self.slope_m_s * late_s
         is_start = self.bins.signal == START_LEVEL
         wanted_m = np.where(is_start, plant.start_levels_m[self.number], plant.stop_levels_m[self.number])
-        return np.asarray((seen_m - wanted_m) / self.bins.deviation, dtype=np.float64)
+        error_m = seen_m - wanted_m
+        if self.pattern is not None:
+            held_m = min(float(plant.sensors.deadband[LEVEL]), self.pattern.deadband)
+            rounded_m = QUANTUM_SHARE * min(float(plant.sensors.quantum[LEVEL]), self.pattern.quantum)
+            error_m = np.sign(error_m) * np.maximum(np.abs(error_m) - held_m - rounded_m, 0.0)
+        return np.asarray(error_m / self.bins.deviation, dtype=np.float64)
 
 
-def event_misfit(traces: Traces, station: Station, regimes: Regimes) -> EventMisfit:
+def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pattern | None) -> EventMisfit:
     """Of every start and stop that follows a straight stretch of the level."""
     noise_m = level_noise_m(traces, station)
     rows: list[tuple[Event, float, float]] = []
@@ -80,6 +87,7 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes) -> EventMis
         number=np.array([event.number - 1 for event, _, _ in rows], dtype=np.int64),
         level_m=np.array([level for _, level, _ in rows]) + sign * (0.7 * early_m - 0.5 * np.abs(slope_m_s)),
         slope_m_s=slope_m_s,
+        pattern=pattern,
     )
 
 

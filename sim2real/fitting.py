@@ -17,6 +17,7 @@ STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
 ROUNDS = 12
 SETTLED = 1e-3
+SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +91,7 @@ class Fitter:
             squares = slopes.T @ slopes
             held = ((x <= 0.0) & (gradient > 0.0)) | ((x >= 1.0) & (gradient < 0.0)) | (np.diag(squares) <= 0.0)
             if held.all():
-                break
+                return self._scanned(fit)
             moved = False
             for _ in range(5):
                 step = np.zeros(x.size)
@@ -104,12 +105,33 @@ class Fitter:
                     break
                 damping *= 6.0
             if not moved or tried is None:
-                break
+                return self._scanned(fit) if residuals is fit.residuals else self._at(fit, x, sizes, residuals)
             gain = cost - self.cost(tried)
             x, residuals, cost, damping = trial, tried, self.cost(tried), damping / 6.0
             if gain < SETTLED * cost:
                 break
+        return self._at(fit, x, sizes, residuals)
+
+    @staticmethod
+    def _at(fit: Fit, x: Floats, sizes: list[int], residuals: Floats) -> Fit:
         return Fit(candidates=fit.candidates, places=tuple(np.split(x, np.cumsum(sizes)[:-1])), residuals=residuals)
+
+    def _scanned(self, fit: Fit) -> Fit:
+        """Fit with the last candidate's strengths tried nearer to neutral and further off: limits have no slope."""
+        candidate, best = fit.candidates[-1], fit
+        for k, free in enumerate(candidate.free):
+            if free.neutral is None:
+                continue
+            neutral = free.share(free.neutral)
+            for factors in SCANS:
+                start = best.places[-1]
+                for factor in factors:
+                    place = start.copy()
+                    place[k] = min(max(neutral + factor * (start[k] - neutral), 0.0), 1.0)
+                    residuals = self.residuals(fit.candidates, (*fit.places[:-1], place))
+                    if residuals is not None and self.cost(residuals) < self.cost(best.residuals):
+                        best = Fit(candidates=fit.candidates, places=(*fit.places[:-1], place), residuals=residuals)
+        return best
 
     def spread(self, fit: Fit, cycle: npt.NDArray[np.int64]) -> Floats:
         """(parameters,) standard deviations of the places, from the scatter of the pull of whole cycles."""

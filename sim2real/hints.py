@@ -7,6 +7,7 @@ from wetwell.sim2real.bins import POWER, Bins
 from wetwell.sim2real.candidates import Candidate
 from wetwell.sim2real.misfit import Misfit
 from wetwell.sim2real.regimes import MULTI_PUMP, STEADY
+from wetwell.sim2real.replay import Replay
 
 Floats = npt.NDArray[np.float64]
 
@@ -17,16 +18,22 @@ FINER = 4
 """Frequencies between two that the length of the recording tells apart."""
 
 
-def hints_of(candidate: Candidate, misfit: Misfit, residuals: Floats) -> dict[str, float]:
-    """Start values by parameter: deadbands and quanta that are seen, the period of what swings in the power."""
+def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Floats) -> dict[str, float]:
+    """Start values by parameter: what of deadbands, quanta, limits and swings the recording shows."""
     fixed = dict(candidate.fixed)
     hints: dict[str, float] = {}
     names = {free.name for free in candidate.free}
     for pattern in misfit.telemetry.patterns:
-        if "deadband" in names and pattern.kind == "deadband" and fixed.get("channel") == pattern.quantity:
-            hints["deadband"] = pattern.size
-        if "quantum_m" in names and pattern.kind == "quantum":
-            hints["quantum_m"] = pattern.size
+        if "deadband" in names and pattern.deadband > 0.0 and fixed.get("channel") == pattern.quantity:
+            hints["deadband"] = pattern.deadband
+        if "quantum_m" in names and pattern.quantum > 0.0:
+            hints["quantum_m"] = pattern.quantum
+    control = replay.station.control
+    middle_m = 0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])
+    hints |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
+    if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
+        flow_m3h = replay.traces.signals["flow_m3h"]
+        hints["cutoff_m3h"] = 0.98 * float(np.min(flow_m3h[flow_m3h > 0.0], initial=np.inf))
     if "fast_period_s" in names:
         hints |= _swing(misfit.bins, residuals)
     return hints

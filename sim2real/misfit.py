@@ -33,10 +33,11 @@ class Misfit:
 
     def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> None:
         self.telemetry = telemetry_misfit(traces, regimes)
-        self._parts: list[_Part] = [*pump_misfits(traces, station, regimes, plain), self.telemetry]
+        patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
+        self._parts: list[_Part] = [*pump_misfits(traces, station, regimes, plain, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
-            self._parts.append(level_misfit(traces, station, regimes, plain))
-            self._parts.append(event_misfit(traces, station, regimes))
+            self._parts.append(level_misfit(traces, station, regimes, plain, patterns))
+            self._parts.append(event_misfit(traces, station, regimes, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 
     def residuals(self, prediction: Prediction) -> Floats:

@@ -11,6 +11,8 @@ SEGMENT_S = 20
 MIN_SEGMENTS = 8
 MIN_POINTS = 5
 GAUSSIAN_MAD = 0.6745
+MOST = 1.5
+"""Noise over the configured one, beyond which it is taken for a gap."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +49,9 @@ def noise_of(stretches: list[Floats], configured: float, tolerance: float) -> No
     spread = _robust_sd([_without_line(values) for values in stretches], 1.0)
     if not np.isfinite(fine):
         return Noise(single=float(np.hypot(configured, tolerance)), slow=tolerance)
-    single = max(fine, spread if np.isfinite(spread) else 0.0, 0.5 * configured)
-    slow = max(moved**2 - fine**2 / SEGMENT_S, 0.0) if np.isfinite(moved) else 0.0
+    most = MOST * configured if configured > 0.0 else np.inf
+    single = min(max(fine, spread if np.isfinite(spread) else 0.0, 0.5 * configured), most)
+    slow = min(max(moved**2 - fine**2 / SEGMENT_S, 0.0), (most / MOST) ** 2) if np.isfinite(moved) else 0.0
     return Noise(single=float(np.hypot(single, tolerance)), slow=float(np.sqrt(slow + tolerance**2)))
 
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from wetwell.protocols.station import Station
 from wetwell.sim2real.replay_kernel import replay_seconds
-from wetwell.sim2real.traces import PUMP_SIGNALS, Traces
+from wetwell.sim2real.traces import PUMP_SIGNALS, Traces, repeated
 from wetwell.simulator import layout as at
 from wetwell.simulator.channels import INFLOW, LEVEL, Quantity, channels_of
 from wetwell.simulator.effects.effect import Effect
@@ -57,6 +57,7 @@ class Replay:
         self._forcing = healthy_forcing(inflow_m3h, traces.pumps)
         self._level_m = np.empty(traces.seconds)
         self._reading = np.empty((len(PUMP_SIGNALS), traces.pumps, traces.seconds))
+        self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
         self._first_level_m = float(traces.level_m[known[0]]) if known.size else _middle_level_m(station)
 
@@ -95,7 +96,7 @@ class Replay:
             np.zeros((len(PUMP_SIGNALS), pumps)),
             *forcing.arrays[:2],
             np.ascontiguousarray(self._earlier(traces.frequency_hz, plant, "frequency_hz")),
-            traces.level_m,
+            self._told_level_m if plant.sensors.deadband[LEVEL] > 0.0 else traces.level_m,
             *gains,
             np.zeros((len(PUMP_SIGNALS), pumps, 1)),
             level_m,

@@ -14,6 +14,8 @@ from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overfl
 
 Floats = npt.NDArray[np.float64]
 
+MOST_FOLLOWED = 0.5
+"""Share of an error that one value may take away, however long there was none."""
 LOST_S = 300
 """After that long without a level the observer begins anew."""
 
@@ -102,14 +104,15 @@ def replay_seconds(
             lost_s += 1
             continue
         error_m = measured_level_m[second] - expected_m
+        followed = min(level_gain * (lost_s + 1), MOST_FOLLOWED)
         if lost_s > LOST_S:
             station_state[at.VOLUME] = volume_at_level_m3(max(measured_level_m[second], 0.0), profile)
             sensed_m = measured_level_m[second]
         else:
             area_m2 = (volume_at_level_m3(true_m + 0.01, profile) - volume_at_level_m3(true_m, profile)) / 0.01
-            corrected_m3 = station_state[at.VOLUME] + level_gain * error_m * area_m2
+            corrected_m3 = station_state[at.VOLUME] + followed * error_m * area_m2
             station_state[at.VOLUME] = max(corrected_m3, 0.0)
-            sensed_m += level_gain * error_m
+            sensed_m += followed * error_m
             extra_m3h += inflow_gain * error_m * area_m2 * 3600.0
         lost_s = 0
 

@@ -1,5 +1,6 @@
 """Residuals of flow, head and power of each pump, and of the level."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,8 @@ from wetwell.sim2real.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Secon
 from wetwell.sim2real.noise import Noise, noise_of
 from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.replay import LEVEL_TIME_S, UNKNOWN_INFLOW_TIME_S, Prediction
-from wetwell.sim2real.traces import Traces
+from wetwell.sim2real.telemetry_misfit import Pattern
+from wetwell.sim2real.traces import Traces, repeated
 from wetwell.simulator.channels import Quantity, channels_of
 from wetwell.simulator.plant import PlantParameters
 
@@ -29,6 +31,8 @@ TIMING_S = 0.2
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
 MIN_STRETCH_S = 60
+QUANTUM_SHARE = 0.75
+"""Share of a quantum by which a rounded value may be off: half of it, and the same if it is cut off instead."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,19 +45,19 @@ class SignalMisfit:
     seconds: Seconds
     recorded: Floats
     is_repeated: npt.NDArray[np.bool_]
+    pattern: Pattern | None
 
     def residuals(self, prediction: Prediction) -> Floats:
         """(bins,) means of recorded minus predicted, over their standard deviation.
 
-        Where the telemetry holds a value, only what its deadband cannot explain counts.
+        Where the telemetry holds or rounds values, only what that cannot explain counts.
         """
         values = prediction.level_m if self.pump == NO_PUMP else prediction.signals[self.name][self.pump]
         error = self.recorded - values[self.seconds.second]
         sensors, channel = prediction.plant.sensors, _channel(prediction.plant, self.name, self.pump)
-        allowed = (
-            np.where(self.is_repeated, sensors.deadband[channel], 0.0) if sensors.deadband[channel] > 0.0 else 0.0
-        )
-        if np.any(allowed > 0.0):
+        if self.pattern is not None:
+            held = min(sensors.deadband[channel], self.pattern.deadband) * self.is_repeated
+            allowed = held + QUANTUM_SHARE * min(sensors.quantum[channel], self.pattern.quantum)
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
 
@@ -62,7 +66,9 @@ def _channel(plant: PlantParameters, name: Quantity, pump: int) -> int:
     return channels_of(name, plant.nominal_frequency_hz.size, None if pump == NO_PUMP else pump + 1)[0]
 
 
-def pump_misfits(traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> list[SignalMisfit]:
+def pump_misfits(
+    traces: Traces, station: Station, regimes: Regimes, plain: Prediction, patterns: Mapping[Quantity, Pattern]
+) -> list[SignalMisfit]:
     """Of every measured signal of every pump.
 
     Parameters
@@ -78,9 +84,10 @@ def pump_misfits(traces: Traces, station: Station, regimes: Regimes, plain: Pred
     misfits = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
+        quantity: Quantity = name  # type: ignore[assignment]
         noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
         for pump in range(traces.pumps):
-            misfit = _pump_misfit(name, pump, recorded[pump], expected[pump], regimes, noise)
+            misfit = _pump_misfit(name, pump, recorded[pump], expected[pump], regimes, noise, patterns.get(quantity))
             if misfit is not None:
                 misfits.append(misfit)
     return misfits
@@ -100,7 +107,13 @@ def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list
 
 
 def _pump_misfit(
-    name: str, pump: int, recorded: Floats, expected: Floats, regimes: Regimes, noise: Noise
+    name: str,
+    pump: int,
+    recorded: Floats,
+    expected: Floats,
+    regimes: Regimes,
+    noise: Noise,
+    pattern: Pattern | None,
 ) -> SignalMisfit | None:
     regime = regimes.of_pumps[pump]
     counted = np.isfinite(recorded) & (regime != IDLE)
@@ -134,10 +147,13 @@ def _pump_misfit(
         seconds=seconds,
         recorded=recorded[seconds.second],
         is_repeated=repeated(recorded)[seconds.second],
+        pattern=pattern,
     )
 
 
-def level_misfit(traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> SignalMisfit:
+def level_misfit(
+    traces: Traces, station: Station, regimes: Regimes, plain: Prediction, patterns: Mapping[Quantity, Pattern]
+) -> SignalMisfit:
     """Of the level."""
     counted = np.isfinite(traces.level_m)
     regime = regimes.of_station
@@ -162,6 +178,7 @@ def level_misfit(traces: Traces, station: Station, regimes: Regimes, plain: Pred
         seconds=seconds,
         recorded=traces.level_m[seconds.second],
         is_repeated=repeated(traces.level_m)[seconds.second],
+        pattern=patterns.get("level_m"),
     )
 
 
@@ -171,10 +188,3 @@ def level_noise_m(traces: Traces, station: Station) -> float:
     bends = np.abs(bends[np.isfinite(bends)])
     seen_m = float(np.median(bends)) / 0.6745 / np.sqrt(6.0) if bends.size else 0.0
     return max(seen_m, 0.5 * station.sensors.level_noise_m, 1e-4)
-
-
-def repeated(values: Floats) -> npt.NDArray[np.bool_]:
-    """(..., n) whether a value is exactly that of the second before; the zeros of a standing pump are not meant."""
-    same = np.zeros(values.shape, dtype=bool)
-    same[..., 1:] = (values[..., 1:] == values[..., :-1]) & (values[..., 1:] != 0.0)
-    return same

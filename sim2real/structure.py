@@ -1,5 +1,7 @@
 """What of the residuals repeats itself: the part that a perfect model could explain, whatever the noise is like."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,7 +11,8 @@ from wetwell.sim2real.regimes import REGIMES
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-MIN_FITTED = 3
+MIN_FITTED = 4
+SURE = 3.0
 PHASES_S = np.array([2, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 60, 90, 150, 250, 400, 700, 1200])
 NEIGHBOURS = 4
 
@@ -50,8 +53,8 @@ def _table(key: npt.NDArray[np.int64], values: Floats, fitted: Flags) -> Floats:
     _, inverse = np.unique(key, return_inverse=True)
     count = np.bincount(inverse[fitted], minlength=inverse.max(initial=0) + 1)
     total = np.bincount(inverse[fitted], values[fitted], count.size)
-    means = np.where(count >= MIN_FITTED, total / np.maximum(count, 1), 0.0)
-    return np.asarray(means[inverse], dtype=np.float64)
+    squares = np.bincount(inverse[fitted], values[fitted] ** 2, count.size)
+    return _certain(total, squares, count)[inverse]
 
 
 def _drift(
@@ -62,10 +65,23 @@ def _drift(
     cycles = int(cycle.max(initial=0)) + 1
     place = inverse * cycles + cycle
     size = (int(inverse.max(initial=0)) + 1) * cycles
-    total = np.bincount(place[fitted], values[fitted], size).reshape(-1, cycles)
-    count = np.bincount(place[fitted], minlength=size).reshape(-1, cycles)
+    count = np.bincount(place[fitted], minlength=size)
+    means = np.bincount(place[fitted], values[fitted], size) / np.maximum(count, 1)
+    total, squares, weight = (
+        _near(rows.reshape(-1, cycles), width) for rows in (means, means**2, (count > 0).astype(np.float64))
+    )
+    drift: Floats = _certain(total, squares, weight).ravel()[place]
+    return drift
+
+
+def _near(rows: Floats, width: int) -> Floats:
+    """Sums over `width` columns on both sides."""
     window = np.ones(2 * width + 1)
-    near = np.array([np.convolve(row, window, mode="full")[width : width + cycles] for row in total])
-    weight = np.array([np.convolve(row, window, mode="full")[width : width + cycles] for row in count])
-    means = np.where(weight >= MIN_FITTED, near / np.maximum(weight, 1), 0.0)
-    return np.asarray(means.ravel()[place], dtype=np.float64)
+    return np.array([np.convolve(row, window, mode="full")[width : width + row.size] for row in rows])
+
+
+def _certain(total: npt.NDArray[Any], squares: npt.NDArray[Any], count: npt.NDArray[Any]) -> Floats:
+    """Means that differ from 0 by `SURE` standard errors or more, else 0."""
+    means = total / np.maximum(count, 1)
+    variance = np.maximum(squares / np.maximum(count, 1) - means**2, 0.0) / np.maximum(count - 1, 1)
+    return np.asarray(np.where((count >= MIN_FITTED) & (means**2 > SURE**2 * variance), means, 0.0), dtype=np.float64)

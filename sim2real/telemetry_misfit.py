@@ -28,11 +28,11 @@ STRENGTH = 12.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pattern:
-    """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit."""
+    """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither."""
 
     quantity: Quantity
-    kind: str
-    size: float
+    deadband: float = 0.0
+    quantum: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +49,9 @@ class TelemetryMisfit:
         left = []
         for pattern in self.patterns:
             channel = channels_of(pattern.quantity, pumps)[0]
-            acting = float(sensors.deadband[channel] if pattern.kind == "deadband" else sensors.quantum[channel])
-            left.append(STRENGTH * min(abs(acting / pattern.size - 1.0) / 0.3, 1.0))
+            acting = float(sensors.deadband[channel] if pattern.deadband > 0.0 else sensors.quantum[channel])
+            seen = max(pattern.deadband, pattern.quantum)
+            left.append(STRENGTH * min(abs(acting / seen - 1.0) / 0.3, 1.0))
         return np.repeat(np.array(left), self.cycles)
 
 
@@ -92,12 +93,12 @@ def _patterns(traces: Traces) -> list[Pattern]:
             continue
         quantum = _lattice(np.concatenate(parts))
         if quantity == "level_m" and quantum >= MIN_QUANTUM_M:
-            found.append(Pattern(quantity=quantity, kind="quantum", size=quantum))
+            found.append(Pattern(quantity=quantity, quantum=quantum))
             continue
         smallest = float(np.quantile(jumps, 0.01))
         is_apart = smallest > DEAD_ZONE * float(np.median(jumps)) and smallest > 2.5 * quantum
         if 1.0 - jumps.size / moves.size > HELD_SHARE and is_apart:
-            found.append(Pattern(quantity=quantity, kind="deadband", size=smallest))
+            found.append(Pattern(quantity=quantity, deadband=smallest))
     return found
 
 

@@ -126,3 +126,10 @@ def filled(values: Floats, longest: int, otherwise: float) -> Floats:
     last = np.maximum.accumulate(np.where(np.isfinite(values), place, -1))
     held = np.where((last >= 0) & (place - last <= longest), values[last], otherwise)
     return np.asarray(held, dtype=np.float64)
+
+
+def repeated(values: Floats) -> npt.NDArray[np.bool_]:
+    """(..., n) whether a value is exactly that of the second before; the zeros of a standing pump are not meant."""
+    same = np.zeros(values.shape, dtype=bool)
+    same[..., 1:] = (values[..., 1:] == values[..., :-1]) & (values[..., 1:] != 0.0)
+    return same
