@@ -20,6 +20,8 @@ Flags = npt.NDArray[np.bool_]
 
 VISIBLE = 0.12
 """Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
+LEAST_GAIN = 80.0
+"""Drop of the sum of squares that a right model may make by chance."""
 PRICE = 0.006
 """Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""
 MOST_EFFECTS = 3
@@ -130,6 +132,9 @@ class Attributor:
     def _extend(self, best: Ranked, singles: Sequence[Ranked]) -> Ranked:
         current, first_gain = best, best.gain
         for _ in range(MOST_EFFECTS - 1):
+            left = current.fit.residuals**2 - self._misfit.bins.floor
+            if float(left[self.held].sum()) < JOIN_SHARE * first_gain:
+                break  # no further effect could gain enough
             tried = self._joined(current, [s.fit.candidates[0] for s in singles])
             if tried is None:
                 break
@@ -164,6 +169,8 @@ class Attributor:
         for candidate in candidates:
             if candidate.name in current.fit.names:
                 continue
+            if len(current.fit.names) > 1 and candidate.component in {c.component for c in current.fit.candidates}:
+                continue
             fit = self._fitter.first(candidate, candidate.starts(self._hints[candidate]), others=current.fit)
             if fit is not None:
                 firsts.append(fit)
@@ -194,7 +201,7 @@ class Attributor:
 
     def _is_real(self, before: Floats, ranked: Ranked) -> bool:
         """Whether a gain is beyond chance, and beyond what is worth a name, in some group of bins."""
-        if not ranked.is_sure:
+        if not ranked.is_sure or ranked.gain < LEAST_GAIN:
             return False
         gains = (before**2 - ranked.fit.residuals**2)[self.held]
         group = self._misfit.bins.signal[self.held] * len(REGIMES) + self._misfit.bins.regime[self.held]

@@ -22,7 +22,7 @@ from wetwell.sim2real.structure import explained, repeating
 from wetwell.sim2real.sureness import is_sure
 from wetwell.sim2real.traces import Traces, traces_of
 from wetwell.simulator.effects import effects_of
-from wetwell.simulator.effects.effect import Component
+from wetwell.simulator.effects.effect import Component, Effect
 
 Floats = npt.NDArray[np.float64]
 
@@ -168,6 +168,7 @@ def _repeating_gap(residuals: Floats, bins: Bins, found: Attribution, pumps: int
 
 def _is_unexplained(before: Floats, after: Floats, residuals: Floats, bins: Bins, found: Attribution) -> bool:
     """Whether a signal keeps a gap that is sure, or large, and more than a third of what it was."""
+    swinging = _swinging(bins, found)
     for signal in range(len(SIGNALS)):
         rows = found.held & (bins.signal == signal)
         was = max(float(before[rows].sum()), float(np.sum(found.plain[rows] ** 2 - bins.floor[rows])))
@@ -181,13 +182,24 @@ def _is_unexplained(before: Floats, after: Floats, residuals: Floats, bins: Bins
             is_repeating = float(after[cell].mean()) > SEEN and is_sure(
                 np.bincount(cycles, after[cell]).astype(np.float64)
             )
-            is_large = float(np.median(np.bincount(cycles, residuals[cell] ** 2) / np.bincount(cycles))) > LARGE
+            is_large = (
+                signal not in swinging
+                and float(np.median(np.bincount(cycles, residuals[cell] ** 2) / np.bincount(cycles))) > LARGE
+            )
             if is_large:
                 left = max(left, float(np.sum(residuals[rows] ** 2 - bins.floor[rows])))
             is_left |= is_repeating or is_large
         if is_left and left > KEPT * was:
             return True
     return False
+
+
+def _swinging(bins: Bins, found: Attribution) -> set[int]:
+    """Signals that an accepted effect lets swing with time: how they swing beyond its form is no news."""
+    if found.accepted is None or all(type(effect).force is Effect.force for effect in found.accepted.effects):
+        return set()
+    gains = np.bincount(bins.signal, found.plain**2 - found.accepted.residuals**2, len(SIGNALS))
+    return {int(np.argmax(gains))}
 
 
 def _places(

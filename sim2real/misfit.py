@@ -32,7 +32,7 @@ class Misfit:
     """Residuals of a recording; which they are and what they weigh is the same for every prediction."""
 
     def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> None:
-        self.telemetry = telemetry_misfit(traces, regimes)
+        self.telemetry = telemetry_misfit(traces, station, regimes)
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
         self._parts: list[_Part] = [*pump_misfits(traces, station, regimes, plain, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():

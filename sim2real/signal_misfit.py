@@ -163,6 +163,10 @@ def level_misfit(
     rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
     balance_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * follow_s
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
+    if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know
+        error_m = np.abs(seconds.means_of(traces.level_m[seconds.second] - plain.level_m[seconds.second]))
+        is_idle = seconds.first(regime) == IDLE
+        balance_m = float(np.hypot(balance_m, np.median(error_m[is_idle]) / 0.6745 if is_idle.any() else 0.0))
     return SignalMisfit(
         bins=Bins(
             signal=np.full(seconds.counts.size, LEVEL),

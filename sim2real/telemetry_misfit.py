@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.station import Sensors, Station
 from wetwell.sim2real.bins import NO_PUMP, TELEMETRY, Bins
 from wetwell.sim2real.regimes import STEADY, Regimes
 from wetwell.sim2real.replay import Prediction
@@ -13,11 +14,11 @@ from wetwell.simulator.channels import Quantity, channels_of
 
 Floats = npt.NDArray[np.float64]
 
-MIN_MOVES = 100
+MIN_MOVES = 30
 HELD_SHARE = 0.15
 """Share of repeated values from which a channel counts as held; noise repeats nothing."""
-DEAD_ZONE = 0.12
-"""Smallest move over the median one; 0.04 for noise."""
+DEAD_ZONE = 0.35
+"""Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
 LATTICE_SHARE = 0.98
 COARSE = 0.75
 """Step of a lattice, over the noise, from which it is more than the resolution of a file."""
@@ -55,10 +56,10 @@ class TelemetryMisfit:
         return np.repeat(np.array(left), self.cycles)
 
 
-def telemetry_misfit(traces: Traces, regimes: Regimes) -> TelemetryMisfit:
+def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> TelemetryMisfit:
     """Patterns of all channels that carry noise; a recording without noise shows none."""
     cycle, first = np.unique(regimes.cycle, return_index=True)
-    patterns = tuple(_patterns(traces))
+    patterns = tuple(_patterns(traces, station.sensors))
     count = len(patterns)
     return TelemetryMisfit(
         bins=Bins(
@@ -75,17 +76,25 @@ def telemetry_misfit(traces: Traces, regimes: Regimes) -> TelemetryMisfit:
     )
 
 
-def _patterns(traces: Traces) -> list[Pattern]:
+def _patterns(traces: Traces, sensors: Sensors) -> list[Pattern]:
     running = traces.frequency_hz > 0.0
-    steady = running & np.roll(running, 1, axis=1) & np.roll(running, 30, axis=1)
     found = []
     series: list[tuple[Quantity, list[Floats]]] = [("level_m", [traces.level_m])]
     if traces.inflow_m3h is not None:
         series.append(("inflow_m3h", [traces.inflow_m3h]))
     for name, values in traces.signals.items():
         quantity: Quantity = name  # type: ignore[assignment]
-        series.append((quantity, [np.where(steady[i], values[i], np.nan) for i in range(traces.pumps)]))
+        series.append((quantity, [np.where(running[i], values[i], np.nan) for i in range(traces.pumps)]))
+    noise = {
+        "level_m": sensors.level_noise_m,
+        "inflow_m3h": sensors.inflow_noise,
+        "flow_m3h": sensors.flow_noise,
+        "head_m": sensors.head_noise,
+        "power_kw": sensors.power_noise,
+    }
     for quantity, parts in series:
+        if noise[quantity] <= 0.0:
+            continue
         moves = np.concatenate([np.diff(part) for part in parts])
         moves = np.abs(moves[np.isfinite(moves)])
         jumps = moves[moves > 0.0]
@@ -95,7 +104,7 @@ def _patterns(traces: Traces) -> list[Pattern]:
         if quantity == "level_m" and quantum >= MIN_QUANTUM_M:
             found.append(Pattern(quantity=quantity, quantum=quantum))
             continue
-        smallest = float(np.quantile(jumps, 0.01))
+        smallest = float(np.quantile(jumps, 0.1))
         is_apart = smallest > DEAD_ZONE * float(np.median(jumps)) and smallest > 2.5 * quantum
         if 1.0 - jumps.size / moves.size > HELD_SHARE and is_apart:
             found.append(Pattern(quantity=quantity, deadband=smallest))

@@ -164,7 +164,13 @@ def turn_pumps(
     """Set the curve of each pump, and the speed that the water sees: command, ramp, slip, ragging, blockage."""
     for i in range(pump.shape[1]):
         commanded = pump_state[at.FREQUENCY_NOW, i] / pump[at.NOMINAL_FREQUENCY, i]
-        turned = turned_ratio(commanded, pump_state[at.SHAFT_RATIO, i], station[at.RAMP_POWER], station[at.SPEED_LAG])
+        turned = turned_ratio(
+            commanded,
+            pump_state[at.SHAFT_RATIO, i],
+            station[at.RAMP_POWER],
+            station[at.SPEED_LAG],
+            station[at.RAMP_BOW],
+        )
         pump_state[at.SHAFT_RATIO, i] = turned
         if turned <= 0.0:
             pump_state[at.SPEED_RATIO, i] = 0.0
@@ -245,12 +251,13 @@ def _solve_flows(
 @compiled
 def gather_air(station: Floats, pump_state: Floats) -> None:
     """Let the air of each main grow while no water moves in it, and be purged while some does."""
+    is_one = station[at.IS_COMMON_HEADER] > 0.0 or station[at.IS_AIR_SHARED] > 0.0
     total_m3h = 0.0
     for i in range(pump_state.shape[1]):
         total_m3h += pump_state[at.MEAN_FLOW, i]
     for i in range(pump_state.shape[1]):
         air_m = pump_state[at.AIR, i]
-        flow_m3h = total_m3h if station[at.IS_COMMON_HEADER] > 0.0 else pump_state[at.MEAN_FLOW, i]
+        flow_m3h = total_m3h if is_one else pump_state[at.MEAN_FLOW, i]
         if flow_m3h > 0.0:
             pump_state[at.AIR, i] -= air_m / station[at.AIR_PURGE]
         else:

@@ -12,7 +12,7 @@ from wetwell.sim2real.diagnosis import diagnose
 from wetwell.sim2real.gap_report import GapReport, report_of
 from wetwell.simulator.simulation import Simulation
 
-HALF_DAY_S = 43_200
+LENGTH_S = 21_600
 MODERATE = {
     "friction_bias": {"factor": 1.25},
     "head_sensor_offset": {"offset_m": 0.8},
@@ -22,7 +22,7 @@ MODERATE = {
 }
 
 
-def record(station, effects=(), seconds=HALF_DAY_S, seed=11):
+def record(station, effects=(), seconds=LENGTH_S, seed=11):
     tables = tuple(EffectTable.model_validate(effect) for effect in effects)
     true = station.model_copy(update={"effect": tables})
     return Simulation(true, find_scenario("nominal"), seed).advance(seconds, truth=False)
