@@ -11,7 +11,7 @@ from wetwell.sim2real.candidates import Candidate
 from wetwell.sim2real.fitting import Fit, Fitter
 from wetwell.sim2real.hints import hints_of
 from wetwell.sim2real.misfit import Misfit, soft
-from wetwell.sim2real.regimes import REGIMES
+from wetwell.sim2real.regimes import MULTI_PUMP, REGIMES
 from wetwell.sim2real.replay import Replay
 from wetwell.sim2real.sureness import is_sure
 
@@ -20,6 +20,8 @@ Flags = npt.NDArray[np.bool_]
 
 VISIBLE = 0.12
 """Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
+CLEAR = 0.5
+"""The same for a further effect: small gains are what the form of the first one leaves."""
 LEAST_GAIN = 80.0
 """Drop of the sum of squares that a right model may make by chance."""
 PRICE = 0.006
@@ -64,9 +66,15 @@ class Attribution:
 
 
 def halves(bins: Bins, pumps: int) -> tuple[Flags, Flags]:
-    """Bins to fit and to judge: cycles alternate, as many at a time as there are pumps: each pump is in both."""
-    first = (bins.cycle // pumps) % 2 == 0
-    return first, ~first
+    """Bins to fit and to judge: cycles alternate, as many at a time as there are pumps, so that each pump is in both.
+
+    Cycles with several pumps at once are few: they alternate one by one.
+    """
+    cycles, of_bin = np.unique(bins.cycle, return_inverse=True)
+    is_multi = np.bincount(of_bin, bins.regime == MULTI_PUMP) > 0.0
+    first = (cycles // pumps) % 2 == 0
+    first[is_multi] = np.arange(int(is_multi.sum())) % 2 == 0
+    return first[of_bin], ~first[of_bin]
 
 
 class Attributor:
@@ -139,7 +147,7 @@ class Attributor:
             if tried is None:
                 break
             extra = self._rank(current.fit.residuals, tried.fit)
-            if extra.gain < JOIN_SHARE * first_gain or not self._is_real(current.fit.residuals, extra):
+            if extra.gain < JOIN_SHARE * first_gain or not self._is_real(current.fit.residuals, extra, CLEAR):
                 break
             current = self._swapped(tried, singles)
         return current
@@ -199,7 +207,7 @@ class Attributor:
         gain = float(gains.sum())
         return Ranked(fit=fit, gain=gain, score=gain, by_cycle=by_cycle)
 
-    def _is_real(self, before: Floats, ranked: Ranked) -> bool:
+    def _is_real(self, before: Floats, ranked: Ranked, visible: float = VISIBLE) -> bool:
         """Whether a gain is beyond chance, and beyond what is worth a name, in some group of bins."""
         if not ranked.is_sure or ranked.gain < LEAST_GAIN:
             return False
@@ -207,7 +215,7 @@ class Attributor:
         group = self._misfit.bins.signal[self.held] * len(REGIMES) + self._misfit.bins.regime[self.held]
         counts = np.bincount(group, minlength=len(SIGNALS) * len(REGIMES))
         means = np.bincount(group, gains, counts.size) / np.maximum(counts, 1)
-        return bool(np.max(means[counts >= 10], initial=0.0) > VISIBLE)
+        return bool(np.max(means[counts >= 10], initial=0.0) > visible)
 
 
 def _names(singles: Sequence[Ranked]) -> list[Candidate]:
