@@ -18,11 +18,11 @@ from wetwell.sim2real.sureness import is_sure
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-VISIBLE = 0.12
+VISIBLE = 0.2
 """Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
 CLEAR = 0.5
 """The same for a further effect: small gains are what the form of the first one leaves."""
-LEAST_GAIN = 80.0
+LEAST_GAIN = 200.0
 """Drop of the sum of squares that a right model may make by chance."""
 PRICE = 0.006
 """Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""

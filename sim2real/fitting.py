@@ -17,6 +17,8 @@ STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
 ROUNDS = 12
 SETTLED = 1e-3
+STAYED = 0.01
+"""Share of its range by which a strength may move and still count as neutral."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
 
 
@@ -40,8 +42,12 @@ class Fit:
 
     @property
     def free(self) -> int:
-        """Number of free parameters."""
-        return sum(len(candidate.free) for candidate in self.candidates)
+        """Number of free parameters, but for strengths that have stayed neutral."""
+        return sum(
+            free.neutral is None or abs(float(share) - free.share(free.neutral)) > STAYED
+            for candidate, place in zip(self.candidates, self.places, strict=True)
+            for free, share in zip(candidate.free, place, strict=True)
+        )
 
 
 class Fitter:
