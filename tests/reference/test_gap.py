@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.station import EffectTable
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.recording import Recording, read_recording, write_recording
+from wetwell.protocols.station import EffectTable, load_station
+from wetwell.services.gap import diagnose_file, replay_file
 from wetwell.services.presets import find_scenario
 from wetwell.sim2real.diagnosis import diagnose
 from wetwell.sim2real.gap_report import GapReport, report_of
@@ -108,3 +110,35 @@ def test_what_cannot_be_diagnosed_is_said(alpha, plain, change, message):
 def test_a_name_that_is_not_in_the_library_is_refused(alpha, plain):
     with pytest.raises(ValueError, match="effect 'gravity' is not in the library"):
         diagnose(plain, alpha, without=["gravity"])
+
+
+def test_the_command_writes_report_page_and_station(alpha, tmp_path):
+    recording = tmp_path / "field.parquet"
+    write_recording(record(alpha, [{"name": "head_sensor_offset", "offset_m": 0.8}]), recording)
+    report = diagnose_file(alpha, recording, tmp_path / "out", only=["head_sensor_offset", "friction_bias"])
+    assert [effect.name for effect in report.effects] == ["head_sensor_offset"]
+    assert GapReport.model_validate_json((tmp_path / "out" / "report.json").read_text(encoding="utf-8")) == report
+    assert load_station(tmp_path / "out" / "station.toml").effect[0].name == "head_sensor_offset"
+    assert "<svg" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_nothing_is_written_where_nothing_can_be_diagnosed(alpha, plain, tmp_path):
+    recording = tmp_path / "short.parquet"
+    write_recording(_rows(plain, slice(0, 900)), recording)
+    with pytest.raises(RecordingError, match=r"short\.parquet: the recording is 900 s long"):
+        diagnose_file(alpha, recording, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("closed_loop", [False, True])
+def test_a_replay_has_the_rows_and_columns_of_the_recording(alpha, plain, tmp_path, closed_loop):
+    recording, out = tmp_path / "field.parquet", tmp_path / "predicted.parquet"
+    write_recording(plain, recording)
+    replay_file(alpha, recording, out, closed_loop=closed_loop)
+    predicted = read_recording(out)
+    assert np.array_equal(predicted.time_ns, plain.time_ns)
+    assert set(predicted.columns) == set(plain.columns)
+    if not closed_loop:
+        running = plain.column("pump1_frequency_hz") == 50.0
+        ratio = plain.column("pump1_flow_m3h")[running] / predicted.column("pump1_flow_m3h")[running]
+        assert ratio.mean() == pytest.approx(1.0, abs=0.002)
