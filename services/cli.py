@@ -507,6 +507,48 @@ def config_show(config: ConfigOption = None) -> None:
     typer.echo(load_settings(config).model_dump_json(indent=2))
 
 
+@gap_app.command("diagnose")
+def gap_diagnose(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for report and station file.")],
+    station: StationOption = "alpha",
+    without: Annotated[
+        list[str] | None, typer.Option("--without", metavar="NAME", help="Leave this effect out; may be given again.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say where a recording departs from the simulator, which effect causes it, and how far that closes the gap."""
+    from wetwell.services.gap import diagnose_file
+    from wetwell.services.gap_terminal import gap_lines, progress_bar
+    from wetwell.services.presets import find_station
+
+    plant = find_station(station)
+    with progress_bar("diagnosis") as progress:
+        report = diagnose_file(plant, recording, out, only=only, without=without or (), progress=progress)
+    typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
+
+
+@gap_app.command("replay")
+def gap_replay(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    station: StationOption = "alpha",
+    closed_loop: Annotated[
+        bool,
+        typer.Option("--closed-loop", help="Take only the inflow from the recording, not frequencies and level."),
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write what the simulator says for a recording, second by second."""
+    from wetwell.services.gap import replay_file
+    from wetwell.services.presets import find_station
+
+    _print(replay_file(find_station(station), recording, out, closed_loop=closed_loop), as_json=as_json)
+
+
 def parse_duration_s(text: str) -> float:
     """Seconds in a text such as 90, 90s, 10m or 2h.
 

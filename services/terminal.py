@@ -180,7 +180,8 @@ def effect_lines(table: Sequence[Mapping[str, Any]]) -> str:
             allowed = f"{parameter['low']:g} to {parameter['high']:g}" if "low" in parameter else "any"
             allowed = ", ".join(parameter["choices"]) if "choices" in parameter else allowed
             unit = f" [{parameter['unit']}]" if "unit" in parameter else ""
-            default = f", default {parameter['default']:g}" if "default" in parameter else ""
+            value = parameter.get("default")
+            default = "" if value is None else f", default {value if isinstance(value, str) else format(value, 'g')}"
             lines.append(f"  {parameter['name']}: {allowed}{unit}{default}")
     return "\n".join(lines)
 

@@ -41,10 +41,13 @@ def next_frequency_hz(
 
 
 @compiled
-def turned_ratio(commanded_ratio: float, before_ratio: float, ramp_power: float, lag_s: float) -> float:
+def turned_ratio(
+    commanded_ratio: float, before_ratio: float, ramp_power: float, lag_s: float, ramp_bow: float = 0.0
+) -> float:
     r"""Speed ratio of the shaft for a commanded one: another shape of the ramp, and a first-order lag.
 
-    $$N = N_c^p, \qquad N \leftarrow N_\text{before} + (N - N_\text{before}) (1 - e^{-1 / \tau})$$
+    $$N = \left((1 - b) N_c + \frac{b}{2} (1 - \cos \pi N_c)\right)^p, \qquad
+    N \leftarrow N_\text{before} + (N - N_\text{before}) (1 - e^{-1 / \tau})$$
 
     At rest and at nominal speed the shape makes no difference.
 
@@ -56,13 +59,19 @@ def turned_ratio(commanded_ratio: float, before_ratio: float, ramp_power: float,
         p; 1 follows the command. [1]
     lag_s : float
         τ; 0 follows at once. [s]
+    ramp_bow : float
+        b; share of an S, a half cosine. [1]
 
     Examples
     --------
     >>> turned_ratio(0.5, 0.4, 1.0, 0.0), turned_ratio(0.5, 0.4, 2.0, 0.0)
     (0.5, 0.25)
     """
-    ratio = commanded_ratio if ramp_power == 1.0 else commanded_ratio**ramp_power
+    ratio = commanded_ratio
+    if ramp_bow != 0.0 and ratio < 1.0:
+        ratio = (1.0 - ramp_bow) * ratio + 0.5 * ramp_bow * (1.0 - math.cos(math.pi * ratio))
+    if ramp_power != 1.0:
+        ratio = ratio**ramp_power
     if lag_s <= 0.0:
         return ratio
     ratio = before_ratio + (ratio - before_ratio) * (1.0 - math.exp(-1.0 / lag_s))

@@ -73,15 +73,15 @@ def advance(
         static_head_m = station[at.STATIC_HEAD] - station[at.LIFT_SLOPE] * (level_m - station[at.LIFT_REFERENCE])
         static_head_m += station_force[at.STATIC_RISE, second]
         friction_h2_m5 = station[at.FRICTION] * station_force[at.FRICTION_FACTOR, second]
-        is_moving = _is_moving(pump_state)
+        is_moving = is_moving_now(pump_state)
         if is_moving:
-            _turn_pumps(station, pump, pump_state, pump_force, second, curves)
-            _move_water(station, pump_state, curves, static_head_m, friction_h2_m5)
+            turn_pumps(station, pump, pump_state, pump_force, second, curves)
+            move_water(station, pump_state, curves, static_head_m, friction_h2_m5)
         if station[at.AIR_HEAD] > 0.0:
-            _gather_air(station, pump_state)
+            gather_air(station, pump_state)
         over_m3h = overflow_m3h(level_m, station[at.OVERFLOW_LEVEL], station[at.WEIR_WIDTH], profile)
         inflow_m3h = station_force[at.INFLOW_FORCE, second]
-        back_m3h = _back_flow_m3h(station, pump, pump_state, pump_force, second, static_head_m, friction_h2_m5)
+        back_m3h = back_flow_m3h(station, pump, pump_state, pump_force, second, static_head_m, friction_h2_m5)
         station_state[at.VOLUME] = next_volume_m3(
             station_state[at.VOLUME],
             inflow_m3h + station[at.UNMETERED_INFLOW] + back_m3h,
@@ -90,7 +90,7 @@ def advance(
         )
         if is_moving:
             voltage_factor = station_force[at.VOLTAGE_FACTOR, second]
-            _load_pumps(station, pump, pump_state, voltage_factor, curves, second, pump_truth)
+            load_pumps(station, pump, pump_state, voltage_factor, curves, second, pump_truth)
         station_truth[at.TRUE_LEVEL, second] = level_m
         station_truth[at.TRUE_OVERFLOW, second] = over_m3h
 
@@ -144,7 +144,7 @@ def advance(
 
 
 @compiled
-def _is_moving(pump_state: Floats) -> bool:
+def is_moving_now(pump_state: Floats) -> bool:
     """Whether any pump is driven, turns, or has water moving in it, now or in the second before."""
     for i in range(pump_state.shape[1]):
         if (
@@ -158,13 +158,19 @@ def _is_moving(pump_state: Floats) -> bool:
 
 
 @compiled
-def _turn_pumps(
+def turn_pumps(
     station: Floats, pump: Floats, pump_state: Floats, pump_force: Floats, second: int, curves: Floats
 ) -> None:
     """Set the curve of each pump, and the speed that the water sees: command, ramp, slip, ragging, blockage."""
     for i in range(pump.shape[1]):
         commanded = pump_state[at.FREQUENCY_NOW, i] / pump[at.NOMINAL_FREQUENCY, i]
-        turned = turned_ratio(commanded, pump_state[at.SHAFT_RATIO, i], station[at.RAMP_POWER], station[at.SPEED_LAG])
+        turned = turned_ratio(
+            commanded,
+            pump_state[at.SHAFT_RATIO, i],
+            station[at.RAMP_POWER],
+            station[at.SPEED_LAG],
+            station[at.RAMP_BOW],
+        )
         pump_state[at.SHAFT_RATIO, i] = turned
         if turned <= 0.0:
             pump_state[at.SPEED_RATIO, i] = 0.0
@@ -184,7 +190,7 @@ def _turn_pumps(
 
 
 @compiled
-def _move_water(
+def move_water(
     station: Floats, pump_state: Floats, curves: Floats, static_head_m: float, friction_h2_m5: float
 ) -> None:
     """Set the flows after the second and their means over it."""
@@ -243,14 +249,15 @@ def _solve_flows(
 
 
 @compiled
-def _gather_air(station: Floats, pump_state: Floats) -> None:
+def gather_air(station: Floats, pump_state: Floats) -> None:
     """Let the air of each main grow while no water moves in it, and be purged while some does."""
+    is_one = station[at.IS_COMMON_HEADER] > 0.0 or station[at.IS_AIR_SHARED] > 0.0
     total_m3h = 0.0
     for i in range(pump_state.shape[1]):
         total_m3h += pump_state[at.MEAN_FLOW, i]
     for i in range(pump_state.shape[1]):
         air_m = pump_state[at.AIR, i]
-        flow_m3h = total_m3h if station[at.IS_COMMON_HEADER] > 0.0 else pump_state[at.MEAN_FLOW, i]
+        flow_m3h = total_m3h if is_one else pump_state[at.MEAN_FLOW, i]
         if flow_m3h > 0.0:
             pump_state[at.AIR, i] -= air_m / station[at.AIR_PURGE]
         else:
@@ -258,7 +265,7 @@ def _gather_air(station: Floats, pump_state: Floats) -> None:
 
 
 @compiled
-def _back_flow_m3h(
+def back_flow_m3h(
     station: Floats,
     pump: Floats,
     pump_state: Floats,
@@ -283,7 +290,7 @@ def _back_flow_m3h(
 
 
 @compiled
-def _load_pumps(
+def load_pumps(
     station: Floats,
     pump: Floats,
     pump_state: Floats,

@@ -19,10 +19,12 @@ and this page names their rows. `plant.py` packs the named parameters into them.
     AIR_HEAD,
     AIR_GROWTH,
     AIR_PURGE,
+    IS_AIR_SHARED,
     RAMP,
     MIN_FREQUENCY,
     DWELL,
     RAMP_POWER,
+    RAMP_BOW,
     SPEED_LAG,
     CONTROL_DELAY,
     ROTATION,
@@ -40,7 +42,7 @@ and this page names their rows. `plant.py` packs the named parameters into them.
     DRIVE_EFFICIENCY,
     SHUTOFF_POWER_SHARE,
     LOAD_SHARE,
-) = range(34)
+) = range(36)
 
 # Numbers of each pump: rows of (rows, pumps).
 (

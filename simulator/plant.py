@@ -64,11 +64,13 @@ class PlantParameters:
     air_head_m: float
     air_growth_s: float
     air_purge_s: float
+    is_air_shared: bool
 
     ramp_s: float
     min_frequency_hz: float
     dwell_s: float
     ramp_power: float
+    ramp_bow: float
     speed_lag_s: float
 
     start_levels_m: Floats
@@ -157,10 +159,12 @@ def plant_parameters(station: Station) -> PlantParameters:
         air_head_m=0.0,
         air_growth_s=np.inf,
         air_purge_s=np.inf,
+        is_air_shared=False,
         ramp_s=control.ramp_s,
         min_frequency_hz=control.min_frequency_hz,
         dwell_s=control.dwell_s,
         ramp_power=1.0,
+        ramp_bow=0.0,
         speed_lag_s=0.0,
         start_levels_m=np.array(control.start_levels_m),
         stop_levels_m=np.array(control.stop_levels_m),
@@ -333,10 +337,12 @@ def pack(parameters: PlantParameters) -> tuple[Floats, Floats, Floats]:
             p.air_head_m,
             p.air_growth_s,
             p.air_purge_s,
+            p.is_air_shared,
             p.ramp_s,
             p.min_frequency_hz,
             p.dwell_s,
             p.ramp_power,
+            p.ramp_bow,
             p.speed_lag_s,
             p.control_delay_s,
             p.rotation,

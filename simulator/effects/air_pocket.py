@@ -13,7 +13,7 @@ class AirPocket(Effect):
     $$\frac{da}{dt} = \frac{a_{\max} - a}{\tau_g} \text{ idle}, \qquad
     \frac{da}{dt} = -\frac{a}{\tau_p} \text{ running}, \qquad H = H_s + a + k Q^2$$
 
-    At the beginning, after a long idle, all air is there. Mains of their own have a pocket each.
+    At the beginning, after a long idle, all air is there.
 
     Parameters
     ----------
@@ -23,6 +23,9 @@ class AirPocket(Effect):
         τ_g. [s]
     purge_s : float
         τ_p. [s]
+    pocket : str
+        "own": mains of their own have a pocket each; "shared": they meet at the high point, and whichever runs purges
+        it for all. One main has one pocket.
 
     References
     ----------
@@ -36,7 +39,14 @@ class AirPocket(Effect):
     head_m: Annotated[float, limits(0.0, 20.0, "m")]
     growth_s: Annotated[float, limits(10.0, 1.0e5, "s")] = 1800.0
     purge_s: Annotated[float, limits(5.0, 1.0e4, "s")] = 120.0
+    pocket: Literal["own", "shared"] = "own"
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let air gather."""
-        return replace(parameters, air_head_m=self.head_m, air_growth_s=self.growth_s, air_purge_s=self.purge_s)
+        return replace(
+            parameters,
+            air_head_m=self.head_m,
+            air_growth_s=self.growth_s,
+            air_purge_s=self.purge_s,
+            is_air_shared=self.pocket == "shared",
+        )

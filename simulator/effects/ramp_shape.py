@@ -10,7 +10,7 @@ from wetwell.simulator.plant import PlantParameters
 class RampShape(Effect):
     r"""The shaft follows its command by another shape, and late.
 
-    $$\tau \frac{dN}{dt} = N_c^p - N, \qquad N_c = f / f_n$$
+    $$\tau \frac{dN}{dt} = \left((1 - b) N_c + \frac{b}{2} (1 - \cos \pi N_c)\right)^p - N, \qquad N_c = f / f_n$$
 
     The recorded frequency is the command. At nominal speed the shape makes no difference.
 
@@ -20,6 +20,8 @@ class RampShape(Effect):
         p; over 1 the ramp starts flat, under 1 steep. [1]
     lag_s : float
         τ; 0 is none. [s]
+    bow : float
+        b, share of an S-curve in the straight ramp. [1]
 
     References
     ----------
@@ -27,11 +29,12 @@ class RampShape(Effect):
     """
 
     component: ClassVar[Component] = "drive"
-    neutral: ClassVar[dict[str, float]] = {"power": 1.0, "lag_s": 0.0}
+    neutral: ClassVar[dict[str, float]] = {"power": 1.0, "lag_s": 0.0, "bow": 0.0}
 
     name: Literal["ramp_shape"] = "ramp_shape"
     power: Annotated[float, limits(0.2, 5.0, "1")] = 1.0
     lag_s: Annotated[float, limits(0.0, 15.0, "s")] = 0.0
+    bow: Annotated[float, limits(0.0, 1.0, "1")] = 0.0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Bend the ramp."""
@@ -39,4 +42,5 @@ class RampShape(Effect):
             parameters,
             ramp_power=parameters.ramp_power * self.power,
             speed_lag_s=parameters.speed_lag_s + self.lag_s,
+            ramp_bow=max(parameters.ramp_bow, self.bow),
         )

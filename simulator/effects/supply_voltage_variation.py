@@ -12,7 +12,7 @@ class SupplyVoltageVariation(Effect):
     r"""The voltage of the supply swings over the day, and faster; power follows it.
 
     $$\frac{U}{U_n} = 1 + a_d \cos\left(2 \pi \frac{t - t_d}{24\,\text{h}}\right)
-    + a_f \sin\left(2 \pi \frac{t}{T_f}\right)$$
+    + a_f \sin\left(2 \pi \frac{t - t_f}{T_f}\right)$$
 
     Time counts from the start of the scenario.
 
@@ -26,6 +26,8 @@ class SupplyVoltageVariation(Effect):
         a_f; 0 is none. [1]
     fast_period_s : float
         T_f. [s]
+    fast_phase_s : float
+        t_f, from the start to the first rise through the mean. [s]
 
     References
     ----------
@@ -40,9 +42,10 @@ class SupplyVoltageVariation(Effect):
     daily_phase_h: Annotated[float, limits(0.0, 24.0, "h")] = 0.0
     fast_amplitude: Annotated[float, limits(0.0, 0.2, "1")] = 0.0
     fast_period_s: Annotated[float, limits(4.0, 2.0e4, "s")] = 300.0
+    fast_phase_s: Annotated[float, limits(0.0, 2.0e4, "s")] = 0.0
 
     def force(self, forcing: Forcing, time_s: Floats) -> None:
         """Scale the voltage."""
         daily = np.cos(2.0 * np.pi * (time_s / 3600.0 - self.daily_phase_h) / 24.0)
-        fast = np.sin(2.0 * np.pi * time_s / self.fast_period_s)
+        fast = np.sin(2.0 * np.pi * (time_s - self.fast_phase_s) / self.fast_period_s)
         forcing.voltage_factor[:] *= 1.0 + self.daily_amplitude * daily + self.fast_amplitude * fast

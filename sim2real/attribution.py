@@ -1,0 +1,239 @@
+"""Which effects of the library explain the gap: fitted on half of the cycles, ranked on the other half."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.bins import SIGNALS, Bins
+from wetwell.sim2real.candidates import Candidate
+from wetwell.sim2real.fitting import Fit, Fitter
+from wetwell.sim2real.hints import hints_of
+from wetwell.sim2real.misfit import Misfit, soft
+from wetwell.sim2real.regimes import MULTI_PUMP, REGIMES
+from wetwell.sim2real.replay import Replay
+from wetwell.sim2real.sureness import is_sure
+
+Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+VISIBLE = 0.2
+"""Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
+CLEAR = 0.5
+"""The same for a further effect: small gains are what the form of the first one leaves."""
+LEAST_GAIN = 200.0
+"""Drop of the sum of squares that a right model may make by chance."""
+PRICE = 0.006
+"""Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""
+MOST_EFFECTS = 3
+JOIN_SHARE = 0.06
+"""Least gain of a further effect, as a share of what the first explains."""
+CLASS_SHARE = 0.02
+"""Candidates within this share of the best gain are equivalent."""
+PROMISING = 0.02
+"""Share of the best gain before refinement under which a candidate is not refined."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ranked:
+    """A fitted candidate and its gain on the cycles it was not fitted on: in all, and priced for its parameters."""
+
+    fit: Fit
+    gain: float
+    score: float
+    by_cycle: Floats
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the gain is beyond chance."""
+        return is_sure(self.by_cycle)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attribution:
+    """Outcome: the plain residuals, the accepted fit (None: no effect), single candidates by score, held-out rows.
+
+    `spread` is the standard deviation of each place of the accepted fit, in the order of its candidates.
+    """
+
+    plain: Floats
+    accepted: Fit | None
+    spread: Floats
+    singles: tuple[Ranked, ...]
+    fitted: Flags
+    held: Flags
+
+
+def halves(bins: Bins, pumps: int) -> tuple[Flags, Flags]:
+    """Bins to fit and to judge: cycles alternate, as many at a time as there are pumps, so that each pump is in both.
+
+    Cycles with several pumps at once are few: they alternate one by one.
+    """
+    cycles, of_bin = np.unique(bins.cycle, return_inverse=True)
+    is_multi = np.bincount(of_bin, bins.regime == MULTI_PUMP) > 0.0
+    first = (cycles // pumps) % 2 == 0
+    first[is_multi] = np.arange(int(is_multi.sum())) % 2 == 0
+    return first[of_bin], ~first[of_bin]
+
+
+class Attributor:
+    """Searches the library for what explains a recording.
+
+    Parameters
+    ----------
+    replay, misfit : Replay, Misfit
+    candidates : sequence of Candidate
+    progress : callable
+        Gets the share of the work that is done, 0 to 1.
+    """
+
+    def __init__(
+        self,
+        replay: Replay,
+        misfit: Misfit,
+        candidates: Sequence[Candidate],
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> None:
+        self._misfit = misfit
+        self._candidates = tuple(candidates)
+        self._progress = progress
+        self.plain = soft(misfit.residuals(replay.run()))
+        self.fitted, self.held = halves(misfit.bins, replay.traces.pumps)
+        self._fitter = Fitter(replay, misfit, self.fitted)
+        self._hints = {candidate: hints_of(candidate, replay, misfit, self.plain) for candidate in candidates}
+
+    def search(self) -> Attribution:
+        """Single effects first, then further ones while they help, each member swapped for all others."""
+        singles = self._singles()
+        best = singles[0] if singles else None
+        accepted: Fit | None = None
+        if best is not None and self._is_real(self.plain, best):
+            accepted = self._reduced(self._extend(best, singles)).fit
+        self._progress(1.0)
+        return Attribution(
+            plain=self.plain,
+            accepted=accepted,
+            spread=np.zeros(0) if accepted is None else self._fitter.spread(accepted, self._misfit.bins.cycle),
+            singles=tuple(singles),
+            fitted=self.fitted,
+            held=self.held,
+        )
+
+    def _singles(self) -> list[Ranked]:
+        before = self._fitter.cost(self.plain)
+        firsts = []
+        for k, candidate in enumerate(self._candidates):
+            fit = self._fitter.first(candidate, candidate.starts(self._hints[candidate]))
+            if fit is not None:
+                firsts.append(fit)
+            self._progress(0.3 * (k + 1) / len(self._candidates))
+        most = max((before - self._fitter.cost(fit.residuals) for fit in firsts), default=0.0)
+        ranked = []
+        for k, fit in enumerate(firsts):
+            gain = before - self._fitter.cost(fit.residuals)
+            refined = self._fitter.refine(fit) if gain > PROMISING * most and gain > 0.0 else fit
+            ranked.append(self._rank(self.plain, refined))
+            self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
+        return _priced(ranked, _plainest)
+
+    def _extend(self, best: Ranked, singles: Sequence[Ranked]) -> Ranked:
+        current, first_gain = best, best.gain
+        for _ in range(MOST_EFFECTS - 1):
+            left = current.fit.residuals**2 - self._misfit.bins.floor
+            if float(left[self.held].sum()) < JOIN_SHARE * first_gain:
+                break  # no further effect could gain enough
+            tried = self._joined(current, [s.fit.candidates[0] for s in singles])
+            if tried is None:
+                break
+            extra = self._rank(current.fit.residuals, tried.fit)
+            if extra.gain < JOIN_SHARE * first_gain or not self._is_real(current.fit.residuals, extra, CLEAR):
+                break
+            current = self._swapped(tried, singles)
+        return current
+
+    def _reduced(self, current: Ranked) -> Ranked:
+        """Without the members that the others can stand in for."""
+        count = len(current.fit.candidates)
+        for place in range(count if count > 1 else 0):
+            kept = [k for k in range(count) if k != place]
+            fit = Fit(
+                candidates=tuple(current.fit.candidates[k] for k in kept),
+                places=tuple(current.fit.places[k] for k in kept),
+                residuals=current.fit.residuals,
+            )
+            residuals = self._fitter.residuals(fit.candidates, fit.places)
+            if residuals is None:
+                continue
+            start = Fit(candidates=fit.candidates, places=fit.places, residuals=residuals)
+            fewer = self._rank(self.plain, self._fitter.refine(start))
+            if fewer.gain > (1.0 - JOIN_SHARE) * current.gain:
+                return self._reduced(fewer)
+        return current
+
+    def _joined(self, current: Ranked, candidates: Sequence[Candidate]) -> Ranked | None:
+        """Best fit of the current effects with one more."""
+        firsts = []
+        for candidate in candidates:
+            if candidate.name in current.fit.names:
+                continue
+            if len(current.fit.names) > 1 and candidate.component in {c.component for c in current.fit.candidates}:
+                continue
+            fit = self._fitter.first(candidate, candidate.starts(self._hints[candidate]), others=current.fit)
+            if fit is not None:
+                firsts.append(fit)
+        firsts.sort(key=lambda fit: self._fitter.cost(fit.residuals))
+        refined = [self._rank(self.plain, self._fitter.refine(fit)) for fit in firsts[:6]]
+        return max(_priced(refined, _plainest), key=lambda r: r.score, default=None)
+
+    def _swapped(self, current: Ranked, singles: Sequence[Ranked]) -> Ranked:
+        """Each member in turn against every other candidate, the rest kept: greedy choices are taken back."""
+        for place in range(len(current.fit.candidates)):
+            kept = [k for k in range(len(current.fit.candidates)) if k != place]
+            base = Fit(
+                candidates=tuple(current.fit.candidates[k] for k in kept),
+                places=tuple(current.fit.places[k] for k in kept),
+                residuals=current.fit.residuals,
+            )
+            other = self._joined(Ranked(fit=base, gain=0.0, score=0.0, by_cycle=np.zeros(1)), _names(singles))
+            if other is not None and other.score > current.score * (1.0 + 0.01):
+                current = other
+        return current
+
+    def _rank(self, before: Floats, fit: Fit) -> Ranked:
+        gains = (before**2 - fit.residuals**2)[self.held]
+        cycles = np.unique(self._misfit.bins.cycle[self.held], return_inverse=True)[1]
+        by_cycle = np.bincount(cycles, gains).astype(np.float64)
+        gain = float(gains.sum())
+        return Ranked(fit=fit, gain=gain, score=gain, by_cycle=by_cycle)
+
+    def _is_real(self, before: Floats, ranked: Ranked, visible: float = VISIBLE) -> bool:
+        """Whether a gain is beyond chance, and beyond what is worth a name, in some group of bins."""
+        if not ranked.is_sure or ranked.gain < LEAST_GAIN:
+            return False
+        gains = (before**2 - ranked.fit.residuals**2)[self.held]
+        group = self._misfit.bins.signal[self.held] * len(REGIMES) + self._misfit.bins.regime[self.held]
+        counts = np.bincount(group, minlength=len(SIGNALS) * len(REGIMES))
+        means = np.bincount(group, gains, counts.size) / np.maximum(counts, 1)
+        return bool(np.max(means[counts >= 10], initial=0.0) > visible)
+
+
+def _names(singles: Sequence[Ranked]) -> list[Candidate]:
+    return [single.fit.candidates[0] for single in singles]
+
+
+def _plainest(fit: Fit) -> int:
+    return fit.free
+
+
+def _priced(ranked: list[Ranked], count: Callable[[Fit], int]) -> list[Ranked]:
+    """Ranked by gain less the price of the free parameters; the best variant of each combination of names."""
+    most = max((r.gain for r in ranked), default=0.0)
+    priced = [
+        Ranked(fit=r.fit, gain=r.gain, score=r.gain - PRICE * most * count(r.fit), by_cycle=r.by_cycle)
+        for r in ranked
+    ]
+    best: dict[tuple[str, ...], Ranked] = {}
+    for r in sorted(priced, key=lambda r: -r.score):
+        best.setdefault(tuple(sorted(r.fit.names)), r)
+    return list(best.values())

@@ -1,0 +1,93 @@
+"""Where residuals are taken: means over short bins, one signal, pump, regime and cycle each."""
+
+from dataclasses import dataclass, fields
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+Signal = Literal["flow", "head", "power", "level", "start_level", "stop_level", "telemetry"]
+SIGNALS: tuple[Signal, ...] = get_args(Signal)
+FLOW, HEAD, POWER, LEVEL, START_LEVEL, STOP_LEVEL, TELEMETRY = range(7)
+NO_PUMP = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bins:
+    """What each residual speaks of and what it weighs; (bins,) arrays.
+
+    Attributes
+    ----------
+    signal, regime, cycle, pump, second : arrays
+        Indices into `SIGNALS` and `REGIMES`; cycle as in `Regimes`; pump from 0 or `NO_PUMP`; middle of the bin.
+    deviation : array
+        Standard deviation of the bin's mean, in the unit of its signal: noise and what a right model may be off.
+    floor : array
+        Mean square that noise alone makes of the residual, at most 1.
+    """
+
+    signal: Integers
+    regime: Integers
+    cycle: Integers
+    pump: Integers
+    second: Integers
+    deviation: Floats
+    floor: Floats
+
+    @property
+    def size(self) -> int:
+        """Number of bins."""
+        return self.signal.size
+
+
+def joined(parts: list[Bins]) -> Bins:
+    """Bins one after the other."""
+    return Bins(
+        **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Bins)}
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seconds:
+    """Seconds that count, the bin that each goes to, and how many go to each bin."""
+
+    second: Integers
+    bin: Integers
+    counts: Floats
+
+    def means(self, values: Floats) -> Floats:
+        """(bins,) means of (n,) values, all seconds of a recording."""
+        return self.means_of(values[self.second])
+
+    def means_of(self, values: Floats) -> Floats:
+        """(bins,) means of values of the seconds that count."""
+        return np.asarray(np.bincount(self.bin, values, self.counts.size) / self.counts, dtype=np.float64)
+
+    def first(self, values: Integers) -> Integers:
+        """(bins,) value of the first second of each bin."""
+        begins = np.r_[True, self.bin[1:] != self.bin[:-1]] if self.bin.size else np.zeros(0, dtype=bool)
+        return values[self.second[begins]]
+
+
+def binned(counted: npt.NDArray[np.bool_], key: Integers, length_s: Integers) -> Seconds:
+    """Bins of consecutive seconds with one key, each at most `length_s` long.
+
+    Parameters
+    ----------
+    counted : (n,) array
+        Seconds that count.
+    key : (n,) array
+        A change of it begins a new bin.
+    length_s : (n,) array
+        [s]
+    """
+    place = np.arange(counted.size)
+    changed = np.r_[True, key[1:] != key[:-1]]
+    since = place - np.maximum.accumulate(np.where(changed, place, 0))
+    number = np.cumsum(changed | (since % length_s == 0))
+    second = np.flatnonzero(counted)
+    _, inverse = np.unique(number[second], return_inverse=True)
+    return Seconds(second=second, bin=inverse.ravel(), counts=np.bincount(inverse.ravel()).astype(np.float64))

@@ -1,0 +1,145 @@
+"""Candidates of the diagnosis: each effect of the library, with what its class says can be varied."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.simulator.effects import EFFECTS, effect_table
+from wetwell.simulator.effects.effect import Component, Effect
+
+Floats = npt.NDArray[np.float64]
+
+WIDE = 50.0
+"""Ratio of a range's ends from which a parameter is varied on a logarithmic scale."""
+TRIALS = (0.002, 0.01, 0.04, 0.12, 0.3)
+"""Strengths that are tried first, as shares of the way from neutral to either end of the range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Freedom:
+    """A free parameter of an effect: its range, unit, start, and its neutral value if it is a strength."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    neutral: float | None
+
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether it is varied on a logarithmic scale."""
+        return self.low > 0.0 and self.high / self.low >= WIDE
+
+    def share(self, value: float) -> float:
+        """Place of a value in the range, 0 to 1."""
+        if self.is_logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def value(self, share: float) -> float:
+        """Value at a place in the range."""
+        share = min(max(share, 0.0), 1.0)
+        if self.is_logarithmic:
+            return float(self.low * (self.high / self.low) ** share)
+        return self.low + (self.high - self.low) * share
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """An effect with what is fixed (a pump, a channel) and what is free."""
+
+    name: str
+    fixed: tuple[tuple[str, Any], ...]
+    free: tuple[Freedom, ...]
+
+    @property
+    def component(self) -> Component:
+        """Component that the effect belongs to."""
+        return EFFECTS[self.name].component
+
+    def effect(self, shares: Floats) -> Effect:
+        """Effect with its free parameters at places in their ranges."""
+        values = {free.name: free.value(float(share)) for free, share in zip(self.free, shares, strict=True)}
+        return EFFECTS[self.name].model_validate(dict(self.fixed) | values)
+
+    def starts(self, hints: Mapping[str, float]) -> list[Floats]:
+        """Places to begin at: the hints, and each strength tried alone on both sides of neutral."""
+        base = np.array(
+            [free.share(min(max(hints.get(free.name, free.start), free.low), free.high)) for free in self.free]
+        )
+        if not any(free.neutral is not None for free in self.free):
+            return [base, *([np.full(base.size, 0.5)] if base.size else [])]
+        places = [base] if any(free.name in hints for free in self.free) else []
+        for k, free in enumerate(self.free):
+            if free.neutral is None:
+                continue
+            neutral = free.share(free.neutral)
+            for end, trial in product((0.0, 1.0), TRIALS):
+                if abs(end - neutral) > 1e-9:
+                    place = base.copy()
+                    place[k] = neutral + trial * (end - neutral)
+                    places.append(place)
+        return places
+
+
+def candidates_of(
+    pumps: int, *, only: Iterable[str] | None = None, without: Iterable[str] = ()
+) -> tuple[Candidate, ...]:
+    """Candidates for a station.
+
+    Parameters
+    ----------
+    pumps : int
+    only, without : names of effects
+        Restrict the library.
+
+    Raises
+    ------
+    ValueError
+        If a name is not in the library, or nothing is left.
+    """
+    wanted = set(EFFECTS) if only is None else set(only)
+    dropped = set(without)
+    for name in wanted | dropped:
+        if name not in EFFECTS:
+            raise ValueError(f"effect '{name}' is not in the library: see wetwell effects")
+    if not wanted - dropped:
+        raise ValueError("no effect of the library is left")
+    found: list[Candidate] = []
+    for row in effect_table():
+        if row["name"] not in wanted - dropped:
+            continue
+        choices = {
+            parameter["name"]: parameter.get("choices") or _pump_numbers(pumps)
+            for parameter in row["parameters"]
+            if "unit" not in parameter
+        }
+        free = tuple(_freedom(parameter) for parameter in row["parameters"] if "unit" in parameter)
+        found += [
+            Candidate(name=row["name"], fixed=tuple(zip(choices, picked, strict=True)), free=free)
+            for picked in product(*choices.values())
+        ]
+    return tuple(found)
+
+
+def _pump_numbers(pumps: int) -> list[int]:
+    return [0, *(range(1, pumps + 1) if pumps > 1 else ())]
+
+
+def _freedom(parameter: Mapping[str, Any]) -> Freedom:
+    neutral = parameter.get("neutral")
+    start = parameter.get("default", neutral)
+    return Freedom(
+        name=parameter["name"],
+        unit=parameter["unit"],
+        low=parameter["low"],
+        high=parameter["high"],
+        start=float(parameter["low"] if start is None else start),
+        neutral=neutral,
+    )

@@ -1,0 +1,79 @@
+"""Which component a gap points to when no effect explains it: by its signals and how they move together."""
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.bins import FLOW, HEAD, LEVEL, POWER, SIGNALS, START_LEVEL, STOP_LEVEL, TELEMETRY, Bins
+from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP
+from wetwell.simulator.effects.effect import Component
+from wetwell.simulator.plant import PlantParameters
+
+Floats = npt.NDArray[np.float64]
+
+ALONE = 0.7
+"""Share of the gap from which it is in one kind of signal alone."""
+
+
+def culprit(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters) -> Component:
+    """Component that is held responsible.
+
+    Flow and head that move along the pump curve say that the main has changed, along the system curve the pump (in
+    ramps alone, the drive), flow alone its meter, head alone its sensor.
+
+    Parameters
+    ----------
+    excess : (bins,) array
+        What of the square of each residual is beyond noise.
+    residuals : (bins,) array
+    bins : Bins
+    plant : PlantParameters
+        Of the station as it is.
+    """
+    by_signal = np.maximum(np.bincount(bins.signal, excess, len(SIGNALS)), 0.0)
+    total = max(by_signal.sum(), 1e-12)
+    hydraulic = by_signal[FLOW] + by_signal[HEAD]
+    if hydraulic > (1.0 - ALONE) * total:
+        return _hydraulic(excess, residuals, bins, plant)
+    if by_signal[POWER] > 0.5 * total:
+        return "drive"
+    if by_signal[TELEMETRY] > 0.5 * total:
+        return "telemetry"
+    if by_signal[START_LEVEL] + by_signal[STOP_LEVEL] > by_signal[LEVEL]:
+        return "controller"
+    level = bins.signal == LEVEL
+    ramp = level & ((bins.regime == START_RAMP) | (bins.regime == STOP_RAMP))
+    calm = level & ((bins.regime == IDLE) | (bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
+    in_ramps, in_calm = (float(np.mean(excess[rows])) if rows.any() else 0.0 for rows in (ramp, calm))
+    return "level_sensor" if in_ramps > 3.0 * in_calm else "sump"
+
+
+def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters) -> Component:
+    stamp = (bins.second * 64 + bins.pump + 1) * 8 + bins.regime
+    flow, head = np.flatnonzero(bins.signal == FLOW), np.flatnonzero(bins.signal == HEAD)
+    if flow.size == 0 or head.size == 0:
+        return "rising_main" if head.size == 0 else "head_sensor"
+    _, of_flow, of_head = np.intersect1d(stamp[flow], stamp[head], return_indices=True)
+    flow, head = flow[of_flow], head[of_head]
+    calm = (bins.regime[flow] == STEADY) | (bins.regime[flow] == MULTI_PUMP)
+    weight = np.maximum(excess[flow] + excess[head], 0.0)
+    is_steady = bool(weight[calm].mean() > 0.3 * weight[~calm].mean()) if calm.any() and not calm.all() else True
+    if is_steady:
+        flow, head = flow[calm], head[calm]
+    pump = bins.pump[flow]
+    _, c1, c2 = plant.curves[pump].T
+    rated_m3h = plant.rated_flow_m3h[pump]
+    on_curve = c1 + 2.0 * c2 * rated_m3h
+    on_system = 2.0 * plant.friction_h2_m5 * rated_m3h
+    scale = bins.deviation[flow] / bins.deviation[head]
+    directions: dict[Component, tuple[Floats, Floats]] = {
+        "rising_main": (np.ones(flow.size), on_curve * scale),
+        "pump": (np.ones(flow.size), on_system * scale),
+        "flow_meter": (np.ones(flow.size), np.zeros(flow.size)),
+        "head_sensor": (np.zeros(flow.size), np.ones(flow.size)),
+    }
+    found: dict[Component, float] = {
+        name: float(np.sum((residuals[flow] * x + residuals[head] * y) ** 2 / (x**2 + y**2)))
+        for name, (x, y) in directions.items()
+    }
+    best = max(found, key=lambda name: found[name])
+    return "drive" if best == "pump" and not is_steady else best

@@ -1,0 +1,276 @@
+"""The diagnosis: verdict, where the gap lies, which effects cause it, and how far it shrinks with them."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.recording import Recording
+from wetwell.protocols.station import EffectTable, Station
+from wetwell.sim2real.attribution import CLASS_SHARE, Attribution, Attributor, Ranked
+from wetwell.sim2real.bins import SIGNALS, Bins
+from wetwell.sim2real.candidates import Candidate, Freedom, candidates_of
+from wetwell.sim2real.culprit import culprit
+from wetwell.sim2real.fitting import Fit
+from wetwell.sim2real.misfit import Misfit
+from wetwell.sim2real.regimes import REGIMES, Regimes, regimes_of
+from wetwell.sim2real.replay import Replay
+from wetwell.sim2real.shrinkage import Interval, Shrinkage, bootstrap, shrinkage_of
+from wetwell.sim2real.structure import explained, repeating
+from wetwell.sim2real.sureness import is_sure
+from wetwell.sim2real.traces import Traces, traces_of
+from wetwell.simulator.effects import effects_of
+from wetwell.simulator.effects.effect import Component, Effect
+
+Floats = npt.NDArray[np.float64]
+
+Verdict = Literal["effect", "none", "unknown"]
+KEPT = 1.0 / 3.0
+"""Share of its gap that a signal may keep under the accepted effects."""
+HARDLY = 0.3
+"""Share of the whole gap that is left when the effects found so far hardly matter."""
+SEEN = 0.6
+"""Repeating mean square of a signal in one regime, in units of noise, from which it is a gap."""
+LARGE = 4.0
+"""Mean square of half of the cycles, in units of noise, that no noise has."""
+MIN_BINS = 12
+TWO_SIDED = 1.96
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A cell of the map of the gap: its size (1 is noise), the interval of it, and its share of the whole."""
+
+    component: Component
+    signal: str
+    regime: str
+    gap: float
+    ci: Interval
+    share: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """A fitted parameter with its 95 % interval."""
+
+    name: str
+    value: float
+    ci: Interval
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cause:
+    """An accepted effect; `equivalent` names those that these data cannot tell from it."""
+
+    name: str
+    component: Component
+    equivalent: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    fixed: dict[str, str | int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosis:
+    """All that is found; `station` has the effects added. `fit` and what it rests on are for drawings."""
+
+    verdict: Verdict
+    where: tuple[Place, ...]
+    causes: tuple[Cause, ...]
+    ranking: tuple[tuple[str, float, float, Interval], ...]
+    gap: Shrinkage
+    station: Station
+    attribution: Attribution
+    bins: Bins
+    traces: Traces
+    regimes: Regimes
+    replay: Replay
+
+
+def diagnose(
+    recording: Recording,
+    station: Station,
+    *,
+    only: Iterable[str] | None = None,
+    without: Iterable[str] = (),
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Diagnosis:
+    """Diagnose the gap between a station and its recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Prepared: times rise. Columns of truth are not read.
+    station : Station
+        What the simulator runs with; its own effects stay.
+    only, without : names of effects
+        Restrict the library.
+    seed : int
+        Of the bootstrap.
+    progress : callable
+        Gets the share of the work that is done.
+
+    Raises
+    ------
+    ValueError
+        If recording and station do not fit, the recording is too short, or a name is not in the library.
+    """
+    candidates = candidates_of(len(station.pump), only=only, without=without)
+    traces = traces_of(recording, station)
+    regimes = regimes_of(traces, station)
+    replay = Replay(traces, station, effects_of(station))
+    plain = replay.run()
+    misfit = Misfit(traces, station, regimes, plain)
+    found = Attributor(replay, misfit, candidates, progress).search()
+    bins, pumps = misfit.bins, traces.pumps
+    rng = np.random.default_rng(seed)
+    before = _repeating_gap(found.plain, bins, found, pumps)
+    accepted = found.accepted
+    after_residuals = found.plain if accepted is None else accepted.residuals
+    after = before if accepted is None else _repeating_gap(after_residuals, bins, found, pumps)
+    verdict: Verdict = "none" if accepted is None else "effect"
+    if _is_unexplained(before, after, after_residuals, bins, found):
+        verdict = "unknown"
+    causes = _causes(found)
+    where: tuple[Place, ...] = ()
+    if verdict == "unknown":
+        explains_little = float(after.sum()) > HARDLY * float(before.sum())
+        residuals = found.plain if explains_little else after_residuals
+        left = np.where(found.held, residuals**2 - bins.floor, 0.0)
+        where = _places(residuals, left, bins, found, culprit(left, residuals, bins, plain.plant), rng)
+    elif verdict == "effect":
+        where = _places(found.plain, before, bins, found, causes[0].component, rng)
+    effects = accepted.effects if accepted is not None and verdict == "effect" else ()
+    tables = tuple(EffectTable.model_validate(effect.model_dump()) for effect in effects)
+    return Diagnosis(
+        verdict=verdict,
+        where=where,
+        causes=causes if verdict == "effect" else (),
+        ranking=tuple(_ranking(found, bins, rng)),
+        gap=shrinkage_of(found.plain, after_residuals if effects else found.plain, bins, found.held, rng),
+        station=station.model_copy(update={"effect": (*station.effect, *tables)}),
+        attribution=found,
+        bins=bins,
+        traces=traces,
+        regimes=regimes,
+        replay=replay,
+    )
+
+
+def _repeating_gap(residuals: Floats, bins: Bins, found: Attribution, pumps: int) -> Floats:
+    """(bins,) what of each square repeats from the fitted cycles to the held ones, so is no noise; 0 elsewhere."""
+    expected = repeating(residuals, bins, found.fitted, pumps)
+    return np.where(found.held, explained(residuals, expected), 0.0)
+
+
+def _is_unexplained(before: Floats, after: Floats, residuals: Floats, bins: Bins, found: Attribution) -> bool:
+    """Whether a signal keeps a gap that is sure, or large, and more than a third of what it was."""
+    swinging = _swinging(bins, found)
+    for signal in range(len(SIGNALS)):
+        rows = found.held & (bins.signal == signal)
+        was = max(float(before[rows].sum()), float(np.sum(found.plain[rows] ** 2 - bins.floor[rows])))
+        left = float(after[rows].sum())
+        is_left = False
+        for regime in range(len(REGIMES)):
+            cell = rows & (bins.regime == regime)
+            if cell.sum() < MIN_BINS:
+                continue
+            cycles = np.unique(bins.cycle[cell], return_inverse=True)[1]
+            is_repeating = float(after[cell].mean()) > SEEN and is_sure(
+                np.bincount(cycles, after[cell]).astype(np.float64)
+            )
+            is_large = (
+                signal not in swinging
+                and float(np.median(np.bincount(cycles, residuals[cell] ** 2) / np.bincount(cycles))) > LARGE
+            )
+            if is_large:
+                left = max(left, float(np.sum(residuals[rows] ** 2 - bins.floor[rows])))
+            is_left |= is_repeating or is_large
+        if is_left and left > KEPT * was:
+            return True
+    return False
+
+
+def _swinging(bins: Bins, found: Attribution) -> set[int]:
+    """Signals that an accepted effect lets swing with time: how they swing beyond its form is no news."""
+    if found.accepted is None or all(type(effect).force is Effect.force for effect in found.accepted.effects):
+        return set()
+    gains = np.bincount(bins.signal, found.plain**2 - found.accepted.residuals**2, len(SIGNALS))
+    return {int(np.argmax(gains))}
+
+
+def _places(
+    residuals: Floats,
+    excess: Floats,
+    bins: Bins,
+    found: Attribution,
+    component: Component,
+    rng: np.random.Generator,
+) -> tuple[Place, ...]:
+    total = float(np.maximum(np.bincount(bins.signal * len(REGIMES) + bins.regime, excess), 0.0).sum())
+    places = []
+    for signal, signal_name in enumerate(SIGNALS):
+        for regime, regime_name in enumerate(REGIMES):
+            rows = found.held & (bins.signal == signal) & (bins.regime == regime)
+            energy = float(excess[rows].sum())
+            if rows.sum() < MIN_BINS or energy <= 0.0:
+                continue
+            squares = np.sinh(residuals[rows] / 5.0) ** 2 * 25.0 - bins.floor[rows]
+            gap, ci = bootstrap(squares, bins.cycle[rows], rng)
+            places.append(
+                Place(
+                    component=component,
+                    signal=signal_name,
+                    regime=regime_name,
+                    gap=gap,
+                    ci=ci,
+                    share=energy / max(total, 1e-12),
+                )
+            )
+    return tuple(sorted(places, key=lambda place: -place.share))
+
+
+def _causes(found: Attribution) -> tuple[Cause, ...]:
+    if found.accepted is None:
+        return ()
+    spreads = np.split(found.spread, np.cumsum([place.size for place in found.accepted.places])[:-1])
+    return tuple(
+        Cause(
+            name=candidate.name,
+            component=candidate.component,
+            equivalent=_equivalent(candidate, found.accepted, found.singles),
+            parameters=tuple(
+                _parameter(free, float(share), float(sd))
+                for free, share, sd in zip(candidate.free, place, spread, strict=True)
+            ),
+            fixed=dict(candidate.fixed),
+        )
+        for candidate, place, spread in zip(found.accepted.candidates, found.accepted.places, spreads, strict=True)
+    )
+
+
+def _parameter(free: Freedom, share: float, spread: float) -> Parameter:
+    ends = sorted(free.value(share + side * TWO_SIDED * spread) for side in (-1.0, 1.0))
+    return Parameter(name=free.name, value=free.value(share), ci=(ends[0], ends[1]), unit=free.unit)
+
+
+def _equivalent(candidate: Candidate, accepted: Fit, singles: tuple[Ranked, ...]) -> tuple[str, ...]:
+    if len(accepted.candidates) > 1:
+        return ()
+    best = singles[0].gain
+    return tuple(
+        single.fit.names[0]
+        for single in singles
+        if single.fit.names[0] != candidate.name and single.gain > (1.0 - CLASS_SHARE) * best
+    )
+
+
+def _ranking(
+    found: Attribution, bins: Bins, rng: np.random.Generator
+) -> Iterable[tuple[str, float, float, Interval]]:
+    for single in found.singles:
+        gap = shrinkage_of(found.plain, single.fit.residuals, bins, found.held, rng)
+        yield single.fit.names[0], single.score, gap.shrinkage, gap.shrinkage_ci

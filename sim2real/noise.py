@@ -1,0 +1,78 @@
+"""Noise of the signals of a recording, from the recording itself: how a perfect model would still miss it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+SEGMENT_S = 20
+MIN_SEGMENTS = 8
+MIN_POINTS = 5
+GAUSSIAN_MAD = 0.6745
+MOST = 1.5
+"""Noise over the configured one, beyond which it is taken for a gap."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noise:
+    """Standard deviations of one signal: of a single value, and of the part that a mean does not average away."""
+
+    single: float
+    slow: float
+
+    def of_mean(self, count: Floats) -> Floats:
+        """Standard deviation of means over `count` seconds."""
+        fast = max(self.single**2 - self.slow**2, 0.0)
+        return np.asarray(np.sqrt(fast / np.maximum(count, 1.0) + self.slow**2), dtype=np.float64)
+
+
+def noise_of(stretches: list[Floats], configured: float, tolerance: float) -> Noise:
+    """Noise from stretches in which nothing is switched.
+
+    What means over twenty seconds scatter about a straight line, beyond what white noise explains, is slow noise;
+    constant errors and trends do not count as noise.
+
+    Parameters
+    ----------
+    stretches : list of (k,) arrays
+        Values on consecutive seconds, over what is expected; NaN is "no value".
+    configured : float
+        Standard deviation of the sensor by the station file.
+    tolerance : float
+        What a model may always be off.
+    """
+    fine = _robust_sd([np.diff(values, n=2) for values in stretches], np.sqrt(6.0))
+    coarse = [_means(values) for values in stretches]
+    moved = _robust_sd([_without_line(values) for values in coarse], 1.0)
+    spread = _robust_sd([_without_line(values) for values in stretches], 1.0)
+    if not np.isfinite(fine):
+        return Noise(single=float(np.hypot(configured, tolerance)), slow=tolerance)
+    most = MOST * configured if configured > 0.0 else np.inf
+    single = min(max(fine, spread if np.isfinite(spread) else 0.0, 0.5 * configured), most)
+    slow = min(max(moved**2 - fine**2 / SEGMENT_S, 0.0), (most / MOST) ** 2) if np.isfinite(moved) else 0.0
+    return Noise(single=float(np.hypot(single, tolerance)), slow=float(np.sqrt(slow + tolerance**2)))
+
+
+def _robust_sd(pieces: list[Floats], gain: float) -> float:
+    values = np.concatenate(pieces) if pieces else np.zeros(0)
+    values = values[np.isfinite(values)]
+    if values.size < MIN_SEGMENTS:
+        return float("nan")
+    return float(np.median(np.abs(values)) / GAUSSIAN_MAD / gain)
+
+
+def _means(values: Floats) -> Floats:
+    count = values.size // SEGMENT_S
+    blocks = values[: count * SEGMENT_S].reshape(count, SEGMENT_S)
+    known = np.isfinite(blocks)
+    sums = np.where(known, blocks, 0.0).sum(axis=1)
+    return np.where(known.sum(axis=1) > SEGMENT_S // 2, sums / np.maximum(known.sum(axis=1), 1), np.nan)
+
+
+def _without_line(values: Floats) -> Floats:
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < MIN_POINTS:
+        return np.zeros(0)
+    return np.asarray(values[known] - np.polyval(np.polyfit(known, values[known], 1), known), dtype=np.float64)

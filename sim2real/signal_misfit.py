@@ -1,0 +1,194 @@
+"""Residuals of flow, head and power of each pump, and of the level."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.station import Station
+from wetwell.sim2real.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
+from wetwell.sim2real.noise import Noise, noise_of
+from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
+from wetwell.sim2real.replay import LEVEL_TIME_S, UNKNOWN_INFLOW_TIME_S, Prediction
+from wetwell.sim2real.telemetry_misfit import Pattern
+from wetwell.sim2real.traces import Traces, repeated
+from wetwell.simulator.channels import Quantity, channels_of
+from wetwell.simulator.plant import PlantParameters
+
+Floats = npt.NDArray[np.float64]
+
+SIGNAL_OF: dict[str, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
+STEADY_BIN_S = 20
+IDLE_LEVEL_BIN_S = 30
+RAMP_LEVEL_BIN_S = 5
+TOLERANCE = 0.0025
+"""Share by which a right model may be off: the fit of a curve, the length of a step."""
+FLOOR = 0.005
+"""The same near zero, as a share of the rated value."""
+TIMING_S = 0.2
+"""Skew between signals that is nobody's fault: a scan takes its time."""
+BALANCE_TOLERANCE = 0.004
+"""Share of the rated flow by which a right balance may not close."""
+MIN_STRETCH_S = 60
+QUANTUM_SHARE = 0.75
+"""Share of a quantum by which a rounded value may be off: half of it, and the same if it is cut off instead."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalMisfit:
+    """Residuals of one signal of one pump, or of the level."""
+
+    bins: Bins
+    name: Quantity
+    pump: int
+    seconds: Seconds
+    recorded: Floats
+    is_repeated: npt.NDArray[np.bool_]
+    pattern: Pattern | None
+
+    def residuals(self, prediction: Prediction) -> Floats:
+        """(bins,) means of recorded minus predicted, over their standard deviation.
+
+        Where the telemetry holds or rounds values, only what that cannot explain counts.
+        """
+        values = prediction.level_m if self.pump == NO_PUMP else prediction.signals[self.name][self.pump]
+        error = self.recorded - values[self.seconds.second]
+        sensors, channel = prediction.plant.sensors, _channel(prediction.plant, self.name, self.pump)
+        if self.pattern is not None:
+            held = min(sensors.deadband[channel], self.pattern.deadband) * self.is_repeated
+            allowed = held + QUANTUM_SHARE * min(sensors.quantum[channel], self.pattern.quantum)
+            error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
+        return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
+
+
+def _channel(plant: PlantParameters, name: Quantity, pump: int) -> int:
+    return channels_of(name, plant.nominal_frequency_hz.size, None if pump == NO_PUMP else pump + 1)[0]
+
+
+def pump_misfits(
+    traces: Traces, station: Station, regimes: Regimes, plain: Prediction, patterns: Mapping[Quantity, Pattern]
+) -> list[SignalMisfit]:
+    """Of every measured signal of every pump.
+
+    Parameters
+    ----------
+    plain : Prediction
+        Of the station as it is: what the noise is relative to, the same for every candidate.
+    """
+    configured = {
+        "flow_m3h": station.sensors.flow_noise,
+        "head_m": station.sensors.head_noise,
+        "power_kw": station.sensors.power_noise,
+    }
+    misfits = []
+    for name, recorded in traces.signals.items():
+        expected = plain.signals[name]
+        quantity: Quantity = name  # type: ignore[assignment]
+        noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
+        for pump in range(traces.pumps):
+            misfit = _pump_misfit(name, pump, recorded[pump], expected[pump], regimes, noise, patterns.get(quantity))
+            if misfit is not None:
+                misfits.append(misfit)
+    return misfits
+
+
+def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list[Floats]:
+    stretches: list[Floats] = []
+    for pump in range(recorded.shape[0]):
+        regime = regimes.of_pumps[pump]
+        edges = np.flatnonzero(np.diff(regime)) + 1
+        stretches += [
+            recorded[pump, rows] / np.maximum(expected[pump, rows], 1e-9)
+            for rows in np.split(np.arange(regime.size), edges)
+            if regime[rows[0]] == STEADY and rows.size >= MIN_STRETCH_S
+        ]
+    return stretches
+
+
+def _pump_misfit(
+    name: str,
+    pump: int,
+    recorded: Floats,
+    expected: Floats,
+    regimes: Regimes,
+    noise: Noise,
+    pattern: Pattern | None,
+) -> SignalMisfit | None:
+    regime = regimes.of_pumps[pump]
+    counted = np.isfinite(recorded) & (regime != IDLE)
+    if not counted.any():
+        return None
+    is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
+    length_s = np.where(is_ramp, 1, STEADY_BIN_S)
+    seconds = binned(counted, regime + 10 * regimes.cycle, length_s)
+    running = counted & ((regime == STEADY) | (regime == MULTI_PUMP))
+    rated = float(np.median(np.abs(recorded[running if running.any() else counted])))
+    slope = np.gradient(expected)
+    size = np.abs(np.where(counted, recorded, 0.0))
+    noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
+    deviation = np.sqrt(
+        noise_alone**2
+        + (FLOOR * rated) ** 2 / np.maximum(seconds.counts, 4.0)
+        + (TIMING_S * seconds.means(slope)) ** 2
+    )
+    return SignalMisfit(
+        bins=Bins(
+            signal=np.full(seconds.counts.size, SIGNAL_OF[name]),
+            regime=seconds.first(regime),
+            cycle=seconds.first(regimes.cycle),
+            pump=np.full(seconds.counts.size, pump),
+            second=seconds.first(np.arange(regime.size)),
+            deviation=deviation,
+            floor=(noise_alone / deviation) ** 2,
+        ),
+        name=name,  # type: ignore[arg-type]
+        pump=pump,
+        seconds=seconds,
+        recorded=recorded[seconds.second],
+        is_repeated=repeated(recorded)[seconds.second],
+        pattern=pattern,
+    )
+
+
+def level_misfit(
+    traces: Traces, station: Station, regimes: Regimes, plain: Prediction, patterns: Mapping[Quantity, Pattern]
+) -> SignalMisfit:
+    """Of the level."""
+    counted = np.isfinite(traces.level_m)
+    regime = regimes.of_station
+    is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
+    seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
+    follow_s = UNKNOWN_INFLOW_TIME_S if traces.inflow_m3h is None else LEVEL_TIME_S
+    rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
+    balance_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * follow_s
+    noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
+    if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know
+        error_m = np.abs(seconds.means_of(traces.level_m[seconds.second] - plain.level_m[seconds.second]))
+        is_idle = seconds.first(regime) == IDLE
+        balance_m = float(np.hypot(balance_m, np.median(error_m[is_idle]) / 0.6745 if is_idle.any() else 0.0))
+    return SignalMisfit(
+        bins=Bins(
+            signal=np.full(seconds.counts.size, LEVEL),
+            regime=seconds.first(regime),
+            cycle=seconds.first(regimes.cycle),
+            pump=np.full(seconds.counts.size, NO_PUMP),
+            second=seconds.first(np.arange(regime.size)),
+            deviation=np.sqrt(noise_m2 + balance_m**2),
+            floor=noise_m2 / (noise_m2 + balance_m**2),
+        ),
+        name="level_m",
+        pump=NO_PUMP,
+        seconds=seconds,
+        recorded=traces.level_m[seconds.second],
+        is_repeated=repeated(traces.level_m)[seconds.second],
+        pattern=patterns.get("level_m"),
+    )
+
+
+def level_noise_m(traces: Traces, station: Station) -> float:
+    """Standard deviation of the level sensor's noise. [m]."""
+    bends = np.diff(traces.level_m, n=2)
+    bends = np.abs(bends[np.isfinite(bends)])
+    seen_m = float(np.median(bends)) / 0.6745 / np.sqrt(6.0) if bends.size else 0.0
+    return max(seen_m, 0.5 * station.sensors.level_noise_m, 1e-4)

@@ -1,0 +1,123 @@
+"""Residuals of the telemetry itself: values that are held, values that lie on a lattice."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.station import Sensors, Station
+from wetwell.sim2real.bins import NO_PUMP, TELEMETRY, Bins
+from wetwell.sim2real.regimes import STEADY, Regimes
+from wetwell.sim2real.replay import Prediction
+from wetwell.sim2real.traces import Traces
+from wetwell.simulator.channels import Quantity, channels_of
+
+Floats = npt.NDArray[np.float64]
+
+MIN_MOVES = 30
+HELD_SHARE = 0.15
+"""Share of repeated values from which a channel counts as held; noise repeats nothing."""
+DEAD_ZONE = 0.35
+"""Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
+LATTICE_SHARE = 0.98
+COARSE = 0.75
+"""Step of a lattice, over the noise, from which it is more than the resolution of a file."""
+MIN_QUANTUM_M = 0.0015
+STRENGTH = 12.0
+"""Residual of a pattern, in each cycle, that an effect leaves unexplained."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pattern:
+    """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither."""
+
+    quantity: Quantity
+    deadband: float = 0.0
+    quantum: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TelemetryMisfit:
+    """One residual a cycle for each pattern that was found."""
+
+    bins: Bins
+    patterns: tuple[Pattern, ...]
+    cycles: int
+
+    def residuals(self, prediction: Prediction) -> Floats:
+        """(patterns * cycles,) nothing where the plant holds or rounds the channel so, else `STRENGTH`."""
+        sensors, pumps = prediction.plant.sensors, prediction.plant.nominal_frequency_hz.size
+        left = []
+        for pattern in self.patterns:
+            channel = channels_of(pattern.quantity, pumps)[0]
+            acting = float(sensors.deadband[channel] if pattern.deadband > 0.0 else sensors.quantum[channel])
+            seen = max(pattern.deadband, pattern.quantum)
+            left.append(STRENGTH * min(abs(acting / seen - 1.0) / 0.3, 1.0))
+        return np.repeat(np.array(left), self.cycles)
+
+
+def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> TelemetryMisfit:
+    """Patterns of all channels that carry noise; a recording without noise shows none."""
+    cycle, first = np.unique(regimes.cycle, return_index=True)
+    patterns = tuple(_patterns(traces, station.sensors))
+    count = len(patterns)
+    return TelemetryMisfit(
+        bins=Bins(
+            signal=np.full(cycle.size * count, TELEMETRY),
+            regime=np.full(cycle.size * count, STEADY),
+            cycle=np.tile(cycle, count),
+            pump=np.full(cycle.size * count, NO_PUMP),
+            second=np.tile(first, count),
+            deviation=np.ones(cycle.size * count),
+            floor=np.zeros(cycle.size * count),
+        ),
+        patterns=patterns,
+        cycles=cycle.size,
+    )
+
+
+def _patterns(traces: Traces, sensors: Sensors) -> list[Pattern]:
+    running = traces.frequency_hz > 0.0
+    found = []
+    series: list[tuple[Quantity, list[Floats]]] = [("level_m", [traces.level_m])]
+    if traces.inflow_m3h is not None:
+        series.append(("inflow_m3h", [traces.inflow_m3h]))
+    for name, values in traces.signals.items():
+        quantity: Quantity = name  # type: ignore[assignment]
+        series.append((quantity, [np.where(running[i], values[i], np.nan) for i in range(traces.pumps)]))
+    noise = {
+        "level_m": sensors.level_noise_m,
+        "inflow_m3h": sensors.inflow_noise,
+        "flow_m3h": sensors.flow_noise,
+        "head_m": sensors.head_noise,
+        "power_kw": sensors.power_noise,
+    }
+    for quantity, parts in series:
+        if noise[quantity] <= 0.0:
+            continue
+        moves = np.concatenate([np.diff(part) for part in parts])
+        moves = np.abs(moves[np.isfinite(moves)])
+        jumps = moves[moves > 0.0]
+        if jumps.size < MIN_MOVES:
+            continue
+        quantum = _lattice(np.concatenate(parts))
+        if quantity == "level_m" and quantum >= MIN_QUANTUM_M:
+            found.append(Pattern(quantity=quantity, quantum=quantum))
+            continue
+        smallest = float(np.quantile(jumps, 0.1))
+        is_apart = smallest > DEAD_ZONE * float(np.median(jumps)) and smallest > 2.5 * quantum
+        if 1.0 - jumps.size / moves.size > HELD_SHARE and is_apart:
+            found.append(Pattern(quantity=quantity, deadband=smallest))
+    return found
+
+
+def _lattice(values: Floats) -> float:
+    """Step of the lattice that values lie on, 0 without one."""
+    levels = np.unique(np.round(values[np.isfinite(values)], 9))
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-7]
+    if steps.size == 0 or levels.size > 0.2 * np.isfinite(values).sum():
+        return 0.0
+    step = float(np.median(steps[steps < 1.5 * steps.min()]))
+    off = np.abs(steps / step - np.round(steps / step))
+    return step if float(np.mean(off < 0.02)) > LATTICE_SHARE else 0.0

@@ -1,0 +1,144 @@
+"""The diagnosis on recordings of the built-in simulator, whose effects it is told nothing of."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.recording import Recording, read_recording, write_recording
+from wetwell.protocols.station import EffectTable, load_station
+from wetwell.services.gap import diagnose_file, replay_file
+from wetwell.services.presets import find_scenario
+from wetwell.sim2real.diagnosis import diagnose
+from wetwell.sim2real.gap_report import GapReport, report_of
+from wetwell.simulator.simulation import Simulation
+
+LENGTH_S = 21_600
+MODERATE = {
+    "friction_bias": {"factor": 1.25},
+    "head_sensor_offset": {"offset_m": 0.8},
+    "threshold_shift": {"start_m": 0.08},
+    "flow_meter_gain": {"factor": 0.94},
+    "water_inertia": {"inertia_s2_m2": 1200.0},
+}
+
+
+def record(station, effects=(), seconds=LENGTH_S, seed=11):
+    tables = tuple(EffectTable.model_validate(effect) for effect in effects)
+    true = station.model_copy(update={"effect": tables})
+    return Simulation(true, find_scenario("nominal"), seed).advance(seconds, truth=False)
+
+
+@pytest.fixture(scope="module")
+def plain(alpha):
+    return record(alpha)
+
+
+def test_without_a_gap_it_is_silent(alpha, plain):
+    report = report_of(diagnose(plain, alpha))
+    assert (report.verdict, report.effects, report.where) == ("none", (), ())
+    assert report.gap.before < 1.1
+
+
+@pytest.mark.parametrize("name", MODERATE)
+def test_a_single_effect_is_named_with_its_size(alpha, name):
+    diagnosis = diagnose(record(alpha, [{"name": name, **MODERATE[name]}]), alpha)
+    report = report_of(diagnosis)
+    assert report.verdict == "effect"
+    assert [effect.name for effect in report.effects] == [name]
+    for parameter, value in MODERATE[name].items():
+        assert report.effects[0].parameters[parameter].value == pytest.approx(value, rel=0.05)
+    assert report.gap.shrinkage > 0.9
+    assert report.where[0].component == report.effects[0].component
+    assert diagnosis.station.effect[0].name == name
+    assert GapReport.model_validate_json(report.model_dump_json(by_alias=True)) == report
+
+
+def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
+    recording = record(alpha, [{"name": "flow_meter_gain", "factor": 0.94}])
+    report = report_of(diagnose(recording, alpha, without=["flow_meter_gain"]))
+    assert report.verdict == "unknown"
+    assert report.effects == ()
+    assert report.where[0].component == "flow_meter"
+
+
+@pytest.mark.parametrize("missing", ["inflow_m3h", "power_kw", "head_m"])
+def test_it_works_without_a_channel(alpha, missing):
+    recording = record(alpha, [{"name": "friction_bias", "factor": 1.3}])
+    kept = {name: values for name, values in recording.columns.items() if not name.endswith(missing)}
+    report = report_of(diagnose(replace(recording, columns=kept), alpha))
+    assert report.verdict == "effect"
+    assert report.effects[0].component == "rising_main"
+
+
+def test_columns_of_truth_change_nothing(alpha, plain):
+    marked = replace(plain, truth={"truth_state": np.full(len(plain), "pump_fault")})
+    assert report_of(diagnose(marked, alpha)) == report_of(diagnose(plain, alpha))
+
+
+def _rows(recording, rows):
+    return Recording(time_ns=recording.time_ns[rows], columns={n: v[rows] for n, v in recording.columns.items()})
+
+
+def _standing(recording):
+    zero = {n: 0.0 * v if n.startswith("pump") else v for n, v in recording.columns.items()}
+    return Recording(time_ns=recording.time_ns, columns=zero)
+
+
+def _single(recording):
+    return Recording(
+        time_ns=recording.time_ns,
+        columns={n: v for n, v in recording.columns.items() if not n.startswith(("pump2", "pump3"))},
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda r: _rows(r, slice(0, 900)), "is 900 s long, a diagnosis needs at least 1800 s"),
+        (lambda r: _rows(r, slice(0, 0)), "has no rows"),
+        (_standing, "has 0 starts of pumps"),
+        (_single, "the recording has 1 pumps, station 'alpha' 3"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_said(alpha, plain, change, message):
+    with pytest.raises(ValueError, match=message):
+        diagnose(change(plain), alpha)
+
+
+def test_a_name_that_is_not_in_the_library_is_refused(alpha, plain):
+    with pytest.raises(ValueError, match="effect 'gravity' is not in the library"):
+        diagnose(plain, alpha, without=["gravity"])
+
+
+def test_the_command_writes_report_page_and_station(alpha, tmp_path):
+    recording = tmp_path / "field.parquet"
+    write_recording(record(alpha, [{"name": "head_sensor_offset", "offset_m": 0.8}]), recording)
+    report = diagnose_file(alpha, recording, tmp_path / "out", only=["head_sensor_offset", "friction_bias"])
+    assert [effect.name for effect in report.effects] == ["head_sensor_offset"]
+    assert GapReport.model_validate_json((tmp_path / "out" / "report.json").read_text(encoding="utf-8")) == report
+    assert load_station(tmp_path / "out" / "station.toml").effect[0].name == "head_sensor_offset"
+    assert "<svg" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_nothing_is_written_where_nothing_can_be_diagnosed(alpha, plain, tmp_path):
+    recording = tmp_path / "short.parquet"
+    write_recording(_rows(plain, slice(0, 900)), recording)
+    with pytest.raises(RecordingError, match=r"short\.parquet: the recording is 900 s long"):
+        diagnose_file(alpha, recording, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("closed_loop", [False, True])
+def test_a_replay_has_the_rows_and_columns_of_the_recording(alpha, plain, tmp_path, closed_loop):
+    recording, out = tmp_path / "field.parquet", tmp_path / "predicted.parquet"
+    write_recording(plain, recording)
+    replay_file(alpha, recording, out, closed_loop=closed_loop)
+    predicted = read_recording(out)
+    assert np.array_equal(predicted.time_ns, plain.time_ns)
+    assert set(predicted.columns) == set(plain.columns)
+    if not closed_loop:
+        running = plain.column("pump1_frequency_hz") == 50.0
+        ratio = plain.column("pump1_flow_m3h")[running] / predicted.column("pump1_flow_m3h")[running]
+        assert ratio.mean() == pytest.approx(1.0, abs=0.002)
