@@ -10,7 +10,7 @@ import numpy.typing as npt
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.station import EffectTable, Station
 from wetwell.sim2real.attribution import CLASS_SHARE, Attribution, Attributor, Ranked
-from wetwell.sim2real.bins import SIGNALS, Bins
+from wetwell.sim2real.bins import LEVEL, SIGNALS, Bins
 from wetwell.sim2real.candidates import Candidate, Freedom, candidates_of
 from wetwell.sim2real.culprit import culprit
 from wetwell.sim2real.fitting import Fit
@@ -132,7 +132,8 @@ def diagnose(
     after_residuals = found.plain if accepted is None else accepted.residuals
     after = before if accepted is None else _repeating_gap(after_residuals, bins, found, pumps)
     verdict: Verdict = "none" if accepted is None else "effect"
-    if _is_unexplained(before, after, after_residuals, bins, found):
+    told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it
+    if _is_unexplained(before, after, after_residuals, bins, found, told):
         verdict = "unknown"
     causes = _causes(found)
     where: tuple[Place, ...] = ()
@@ -166,10 +167,12 @@ def _repeating_gap(residuals: Floats, bins: Bins, found: Attribution, pumps: int
     return np.where(found.held, explained(residuals, expected), 0.0)
 
 
-def _is_unexplained(before: Floats, after: Floats, residuals: Floats, bins: Bins, found: Attribution) -> bool:
-    """Whether a signal keeps a gap that is sure, or large, and more than a third of what it was."""
+def _is_unexplained(
+    before: Floats, after: Floats, residuals: Floats, bins: Bins, found: Attribution, told: set[int]
+) -> bool:
+    """Whether one of the `told` signals keeps a gap that is sure, or large, and more than a third of what it was."""
     swinging = _swinging(bins, found)
-    for signal in range(len(SIGNALS)):
+    for signal in sorted(told):
         rows = found.held & (bins.signal == signal)
         was = max(float(before[rows].sum()), float(np.sum(found.plain[rows] ** 2 - bins.floor[rows])))
         left = float(after[rows].sum())
