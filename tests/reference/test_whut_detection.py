@@ -50,7 +50,7 @@ def test_a_healthy_rig_is_not_blamed(real_data, pumps):
     learnt, unseen = (
         runs[::2],
         runs[1::2],
-    )  # the rig wanders by 1 % within its ten minutes: learning must have seen that
+    )
     detector = Detector(rig.name, nominal_of(rig))
     second, verdicts = itertools.count(), []
     for run in [*itertools.islice(itertools.cycle(learnt), LEARNING_RUNS), *unseen]:
