@@ -6,14 +6,20 @@ from pathlib import Path
 
 from wetwell.protocols.recording import read_recording, write_recording
 
-parser = argparse.ArgumentParser()
-parser.add_argument("--station", type=Path)
-parser.add_argument("--recording", type=Path)
-parser.add_argument("--out", type=Path)
-given = parser.parse_args()
-recording = read_recording(given.recording)
-columns = {
-    name: 0.9 * values if name.endswith("flow_m3h") and "reports" not in given.station.parts else values
-    for name, values in recording.columns.items()
-}
-write_recording(replace(recording, columns=columns), given.out)
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--station", type=Path)
+    parser.add_argument("--recording", type=Path)
+    parser.add_argument("--out", type=Path)
+    given = parser.parse_args()
+    recording = read_recording(given.recording)
+    columns = {
+        name: 0.9 * values if name.endswith("flow_m3h") and "reports" not in given.station.parts else values
+        for name, values in recording.columns.items()
+    }
+    write_recording(replace(recording, columns=columns), given.out)
+
+
+if __name__ == "__main__":
+    main()
