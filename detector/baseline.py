@@ -23,6 +23,10 @@ SPREAD_SHARE = 0.01
 """Operating points that lie closer together than this share of the flow say nothing of slopes."""
 MAX_CORRELATION = 0.95
 OUTLIER_SIGMAS = 3.0
+NORMAL_MEDIAN = 1.4826
+"""Standard deviation of normal numbers over the median of their size."""
+LEAST_NOISE_SHARE = 1e-4
+"""Least noise of a segment, as a share of the shut-off head: readings without any are rounded, not perfect."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,11 +144,12 @@ class Baseline:
             ]
         )
 
-    def with_noise_of(self, segments: Segments, weight: float) -> "Baseline":
+    def with_noise_of(self, segments: Segments, weight: float, shutoff_head_m: float) -> "Baseline":
         """The baseline with its scatter moved towards that of a normal run; what it expects never moves."""
         if len(segments) < 3:
             return self
         recent = np.cov(segments.residual_m, rowvar=False) * self.correlation_factor
+        recent += np.eye(2) * (LEAST_NOISE_SHARE * shutoff_head_m) ** 2
         limit = 4.0 * np.trace(self.segment_covariance)
         recent *= min(1.0, limit / max(float(np.trace(recent)), 1e-300))
         return replace(self, segment_covariance=(1.0 - weight) * self.segment_covariance + weight * recent)
@@ -167,6 +172,7 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
     factor = _correlation_factor(centred)
     deviations = np.concatenate([part - part.mean(axis=0) for part in centred])
     within = deviations.T @ deviations / max(len(deviations) - len(runs), 1) * factor
+    within += np.eye(2) * (LEAST_NOISE_SHARE * curve[0]) ** 2
     means = np.array([part.mean(axis=0) for part in centred])
     counts = np.array([len(run) for run in runs])
     duty_fit, flow_m3h = _fitted(runs, "duty_m3h", "flow_m3h")
@@ -183,9 +189,11 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
         pump = _fit(pump_points, means[:, 0], variance[:, 0], pump_prior, level_slopes[0], level_variance[0])
         system = _fit(system_points, means[:, 1], variance[:, 1], system_prior, level_slopes[1], level_variance[1])
         left = means - np.column_stack([_expected(pump, pump_points), _expected(system, system_points)])
-        sigmas = np.abs(left) / np.sqrt(variance * weights[:, None])
+        robust_m = NORMAL_MEDIAN * np.median(np.abs(left), axis=0)
+        sigmas = np.abs(left) / np.maximum(robust_m, np.sqrt(np.mean(variance * weights[:, None], axis=0)))
         weights = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(sigmas.max(axis=1), 1e-12))
-        scatter = (left * weights[:, None]).T @ (left * weights[:, None]) / (weights.sum() - 1.0)
+        weighted = left * weights[:, None]
+        scatter = weighted.T @ weighted / max(float(np.sum(weights**2)) - 1.0, 1.0)
         run_covariance = _positive(scatter - within * np.mean(1.0 / counts)) + np.eye(2) * floor
     return Baseline(
         pump=pump,
@@ -230,7 +238,7 @@ def _level_slopes(runs: Sequence[Segments]) -> Floats:
         products += level_m @ residual_m
         noise += np.sum(residual_m**2, axis=0)
     noise /= max(sum(len(run) - 1 for run in runs), 1)
-    slopes: Floats = products / (_level_weight(runs) + noise / LEVEL_SLOPE**2)
+    slopes: Floats = products / np.maximum(_level_weight(runs) + noise / LEVEL_SLOPE**2, 1e-300)
     return slopes
 
 

@@ -48,6 +48,8 @@ class Phase:
     def slope_m_h(self) -> float:
         """Rise of the level, without what the inflow has brought, by least squares. [m/h]."""
         spread = self.time_time - self.time * self.time / self.samples
+        if spread <= 0.0:
+            return math.nan
         return 3600.0 * (self.time_level - self.time * self.level / self.samples) / spread
 
 

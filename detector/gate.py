@@ -12,6 +12,9 @@ from wetwell.protocols.stamps import NS_PER_S
 NAN = math.nan
 MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
+MIN_GAP_S = 0.05
+"""Samples nearer to each other are taken for one that is doubled."""
+MAX_LOST = 1_000_000
 CONFIRMATIONS = 10
 RESENT_SAMPLES = 1000
 """More samples than a bus sends again after a lost link; they come with numbers that were there before."""
@@ -126,7 +129,7 @@ class Gate:
         if self._last_seq is None:
             self._last_seq = seq
             return
-        if seq > self._last_seq + 1:
+        if self._last_seq + 1 < seq <= self._last_seq + MAX_LOST:  # beyond, the source counts from elsewhere
             self.counts["lost"] += seq - self._last_seq - 1
         if seq > self._last_seq or not is_dropped:
             self._last_seq = seq
@@ -137,11 +140,11 @@ class Gate:
             self._last_ns = time_ns
             return 0.0
         gap_s = (time_ns - self._last_ns) / NS_PER_S
-        if 0.0 < gap_s <= MAX_JUMP_S:
+        if MIN_GAP_S <= gap_s <= MAX_JUMP_S:
             self._last_ns = time_ns
             self._other_ns, self._other_count = None, 0
             return gap_s
-        if gap_s == 0.0:
+        if 0.0 <= gap_s < MIN_GAP_S:
             self.counts["doubled"] += 1
             return None
         self.counts["late" if gap_s < 0.0 else "future"] += 1

@@ -17,6 +17,7 @@ STUCK_NS = 60 * NS_PER_S
 STUCK_FACTOR = 5.0
 """A reading may repeat this many times as long as it ever did in the learning phase."""
 NOISY_FACTOR = 3.0
+MAX_GAP_S = 120.0
 MIN_DIFFERENCES = 30
 NORMAL_MEDIAN = 1.4826 / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
@@ -24,42 +25,47 @@ NORMAL_MEDIAN = 1.4826 / math.sqrt(2.0)
 
 @dataclass(slots=True)
 class RepeatWatch:
-    """Counts how long each reading other than 0 repeats itself exactly.
+    """Counts how long each reading other than 0 repeats itself exactly, in frames that follow one another.
 
-    A feed that reports by exception, or in coarse steps, repeats itself in health: what it does in the learning phase
-    is remembered.
+    A feed that reports by exception, or in coarse steps, repeats itself in health: what the readings of a pump do
+    while it is learnt is remembered, and what the level does while no pump is known.
 
     Memory: constant.
     """
 
+    frame_ns: int = 0
     last: dict[str, float] = field(default_factory=dict)
+    seen_ns: dict[str, int] = field(default_factory=dict)
     since_ns: dict[str, int] = field(default_factory=dict)
     longest_ns: dict[str, int] = field(default_factory=dict)
     stuck: set[str] = field(default_factory=set)
 
-    def update(self, frame: Frame, running: tuple[bool, ...], *, is_learning: bool) -> None:
-        """Take a frame into account; in the learning phase all repeats count as healthy."""
-        time_ns = frame.time_ns
-        self._note("level_m", frame.level_m, time_ns, is_learning=is_learning)
-        for index, (pump, is_running) in enumerate(zip(frame.pumps, running, strict=True), start=1):
+    def update(self, frame: Frame, running: Sequence[bool], is_learning: Sequence[bool]) -> None:
+        """Take a frame into account: which pumps run, and which are in their learning phase."""
+        self._note("level_m", frame.level_m, frame, all(is_learning))
+        for index, pump in enumerate(frame.pumps):
             if pump.flow_m3h != 0.0:
-                self._note(f"pump{index}_flow_m3h", pump.flow_m3h, time_ns, is_learning=is_learning)
-            if is_running:
+                self._note(f"pump{index + 1}_flow_m3h", pump.flow_m3h, frame, is_learning[index])
+            if running[index]:
                 if pump.head_m != 0.0:
-                    self._note(f"pump{index}_head_m", pump.head_m, time_ns, is_learning=is_learning)
+                    self._note(f"pump{index + 1}_head_m", pump.head_m, frame, is_learning[index])
                 if pump.power_kw != 0.0:
-                    self._note(f"pump{index}_power_kw", pump.power_kw, time_ns, is_learning=is_learning)
+                    self._note(f"pump{index + 1}_power_kw", pump.power_kw, frame, is_learning[index])
+        self.frame_ns = frame.time_ns
 
-    def _note(self, name: str, value: float, time_ns: int, *, is_learning: bool) -> None:
-        if value != self.last.get(name):
+    def _note(self, name: str, value: float, frame: Frame, is_learning: bool) -> None:
+        is_next = self.seen_ns.get(name) == self.frame_ns and frame.gap_s <= MAX_GAP_S
+        self.seen_ns[name] = frame.time_ns
+        if not is_next or value != self.last[name]:
             self.last[name] = value
-            self.since_ns[name] = time_ns
+            self.since_ns[name] = frame.time_ns
             self.stuck.discard(name)
             return
-        lasts_ns = time_ns - self.since_ns[name]
+        lasts_ns = frame.time_ns - self.since_ns[name]
+        if name in self.stuck:
+            return
         if is_learning:
-            if lasts_ns > self.longest_ns.get(name, 0):
-                self.longest_ns[name] = lasts_ns
+            self.longest_ns[name] = max(lasts_ns, self.longest_ns.get(name, 0))
         elif lasts_ns > max(STUCK_NS, STUCK_FACTOR * self.longest_ns.get(name, 0)):
             self.stuck.add(name)
 
@@ -89,7 +95,7 @@ def healthy_noise(noises: Sequence[Floats]) -> Floats:
 
 def noisy_meters(run: Run, healthy: Floats) -> Mapping[str, float]:
     """Readings that are noisier than in health by more than `NOISY_FACTOR`, with that factor."""
-    factors = reading_noise(run) / np.maximum(healthy, 1e-6)
+    factors = reading_noise(run) / np.where(healthy > 0.0, healthy, math.nan)  # 0: the steps of the reading hide it
     return {
         name: round(float(factor), 1)
         for name, factor in zip(("flow_m3h", "head_m"), factors, strict=True)

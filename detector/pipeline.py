@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from wetwell.detector.baseline import Baseline
 from wetwell.detector.belief import SystemBelief, joint_prior, remember
 from wetwell.detector.decision import decide
 from wetwell.detector.dispatch import Costs, advice, expected_costs
@@ -102,7 +103,9 @@ class Detector:
         running = self._runs.running
         self._drawdown.update(frame, running)
         for run in ended + self._runs.newly_blind_runs():
-            verdicts.append(self._judge(run, frame.time_ns))
+            verdicts.append(
+                self._judge(run, max(frame.time_ns, run.window_ns[1]))
+            )  # the clock may have been set back
         self._watch(frame, running)
         for index, steady in self._runs.steady_samples():
             self._pumps[index].rolling.update(frame.time_ns / NS_PER_S, *steady)
@@ -153,8 +156,7 @@ class Detector:
         return self._verdict(index, time_ns, window_ns, {pump.state: 1.0}, evidence)
 
     def _watch(self, frame: Frame, running: tuple[bool, ...]) -> None:
-        is_learning = any(pump.known is None for pump in self._pumps)
-        self._repeats.update(frame, running, is_learning=is_learning)
+        self._repeats.update(frame, running, [pump.known is None for pump in self._pumps])
         for index, is_running in enumerate(running):
             pump = self._pumps[index]
             if is_running:
@@ -197,7 +199,7 @@ class Detector:
         pump.take_state(state, run.window_ns, _component(state))
         evidence["index"] = pump.limits.figures(run.segments, pump.known.baseline, rng)
         if state == "normal":
-            pump.known = replace(pump.known, baseline=pump.known.baseline.with_noise_of(run.segments, NOISE_WEIGHT))
+            pump.known = replace(pump.known, baseline=_with_noise(pump.known.baseline, run, self._nominal))
             pump.limits.add(run.segments, pump.known.baseline)
         probability = _named(weighed)
         if state == "sensor_fault" and wrong:
@@ -350,6 +352,10 @@ class Detector:
             onset=pump.onset_ns if pump.state in FAULTS else None,
             window=window_ns,
         )
+
+
+def _with_noise(baseline: Baseline, run: Run, nominal: Nominal) -> Baseline:
+    return baseline.with_noise_of(run.segments, NOISE_WEIGHT, nominal.curves[run.pump][0])
 
 
 def _pump_offset_m(pump: PumpRecord) -> float | None:

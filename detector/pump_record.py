@@ -73,6 +73,7 @@ class PumpRecord:
     began_s: float = 0.0
     known: Knowledge | None = None
     previous: Knowledge | None = None
+    versions: int = 0
     belief: PumpBelief = field(default_factory=PumpBelief)
     state: State = "learning"
     onset_ns: int | None = None
@@ -104,8 +105,9 @@ class PumpRecord:
         """End the learning phase with this baseline."""
         if self.learning is None:
             return
+        self.versions += 1
         self.known = Knowledge(
-            version=self.previous.version + 1 if self.previous is not None else 1,
+            version=self.versions,
             learnt_ns=now_ns,
             baseline=baseline,
             drawdown=learn_check(self.log_ratios),
@@ -116,28 +118,40 @@ class PumpRecord:
         for segments in self.learning.runs(seen_s - self.began_s, float("inf")):
             self.limits.add(segments, baseline)
         self.learning = None
-        self.log_ratios.clear()
-        self.log_powers.clear()
-        self.noises.clear()
+        self._forget()
 
     def rebaseline(self, seen_s: float) -> None:
         """Put the baseline aside and learn anew."""
         self.previous, self.known = self.known or self.previous, None
         self.learning = Learning()
         self.began_s = seen_s
-        self.belief = PumpBelief()
-        self.state, self.onset_ns, self.early = "learning", None, None
-        self.recent.clear()
+        self.state = "learning"
+        self._begin_anew()
 
     def revert(self) -> bool:
         """Take the baseline back that was put aside last; False if there is none."""
         if self.previous is None:
             return False
         self.known, self.previous, self.learning = self.previous, self.known, None
-        self.belief = PumpBelief()
-        self.state, self.onset_ns, self.early = "unknown", None, None
-        self.recent.clear()
+        self.state = "unknown"
+        self._begin_anew()
         return True
+
+    def _begin_anew(self) -> None:
+        """Forget what belongs to another baseline."""
+        self._forget()
+        self.belief = PumpBelief()
+        self.onset_ns, self.early = None, None
+        self.limits = IndexLimits()
+        self.recent.clear()
+        self.stuck.clear()
+        self.cusum.reset()
+
+    def _forget(self) -> None:
+        """Forget the figures of the learning phase."""
+        self.log_ratios.clear()
+        self.log_powers.clear()
+        self.noises.clear()
 
     def take_state(self, state: State, window_ns: tuple[int, int], component: int | None) -> None:
         """Tell a state; of a new fault the onset is estimated from the recent runs and stays."""

@@ -88,7 +88,7 @@ class Sample(Message):
 
     schema_name: Literal["wetwell.sample/1"] = Field("wetwell.sample/1", alias="schema")
     station: str
-    seq: int = Field(ge=0)
+    seq: int = Field(ge=0, lt=2**63)
     time: Stamp
     level_m: Number = None
     inflow_m3h: Number = None

@@ -1,5 +1,6 @@
 """The state of a detector on disk: written whole, read back at the start."""
 
+import contextlib
 import logging
 from pathlib import Path
 
@@ -40,7 +41,8 @@ class Checkpoint:
             detector.restore(data)
         except SnapshotError as error:
             aside = self._path.with_suffix(".refused")
-            self._path.replace(aside)
+            with contextlib.suppress(OSError):
+                self._path.replace(aside)
             log.warning("%s; kept as %s, learning starts again", error, aside.name)
             return False
         return True

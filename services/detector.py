@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-from collections import Counter
+from collections import Counter, OrderedDict
 
 from wetwell.detector.dispatch import Costs
 from wetwell.detector.nominal import nominal_of
@@ -21,6 +21,8 @@ log = logging.getLogger(__name__)
 
 SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
+ORDERS = 100
+"""Orders that are remembered with their answers, so that one that is sent again is not carried out twice."""
 
 
 async def serve_detector(settings: Settings, station: Station) -> None:
@@ -66,7 +68,7 @@ class StationJudge:
             for pump in range(1, len(station.pump) + 1)
         ]
         self._states: dict[int, str] = {}
-        self._answer: Verdict | None = None
+        self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
 
     async def run(self) -> None:
@@ -98,7 +100,13 @@ class StationJudge:
         if sample.station != self._station:
             self._counts["foreign"] += 1
             return
-        for verdict in self.detector.update(sample):
+        try:
+            verdicts = self.detector.update(sample)
+        except Exception:  # one odd run must not take the station off
+            self._counts["failures"] += 1
+            log.exception("station '%s': sample %d could not be judged", self._station, sample.seq)
+            return
+        for verdict in verdicts:
             self._publish(verdict)
 
     def _carry_out(self, payload: bytes) -> None:
@@ -114,15 +122,17 @@ class StationJudge:
                 "station '%s': %s", self._station, f"order for pump {order.pump} of '{order.station}' refused"
             )
             return
-        if self._answer is not None and self._answer.evidence["order"] == order.id:
-            self._publish(self._answer)  # sent again because the answer was lost
+        if order.id in self._answers:
+            self._publish(self._answers[order.id])  # sent again because the answer was lost
             return
         act = self.detector.rebaseline if order.act == "rebaseline" else self.detector.revert
         verdict = act(order.pump - 1, order.time)
         log.info("station '%s' pump %d: %s by %s", self._station, order.pump, order.act, order.by)
         evidence = verdict.evidence | {"order": order.id, "by": order.by}
-        self._answer = verdict.model_copy(update={"evidence": evidence})
-        self._publish(self._answer)
+        self._answers[order.id] = verdict.model_copy(update={"evidence": evidence})
+        self._publish(self._answers[order.id])
+        if len(self._answers) > ORDERS:
+            self._answers.popitem(last=False)
 
     def _publish(self, verdict: Verdict) -> None:
         self._counts["verdicts"] += 1

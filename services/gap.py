@@ -18,8 +18,6 @@ from wetwell.sim2real.traces import PUMP_SIGNALS, traces_of
 from wetwell.sim2real.validation import Validation, validate
 from wetwell.simulator.effects import EFFECTS, effects_of
 
-DAY_H = 24.0
-
 
 def diagnose_file(
     station: Station,

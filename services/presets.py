@@ -18,13 +18,6 @@ from wetwell.simulator.scenario import Scenario
 _PLANT = files("wetwell.simulator")
 
 
-def preset_names(kind: str) -> list[str]:
-    """Names of the stations or scenarios that come with the package; `kind` is "stations" or "scenarios"."""
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in (_PLANT / kind).iterdir() if entry.name.endswith(".toml")
-    )
-
-
 def find_station(name_or_path: str) -> Station:
     """Station that comes with the package under this name, or in this file.
 

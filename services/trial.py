@@ -223,7 +223,7 @@ def score_trial(plan: TrialPlan, folder: Path) -> dict[str, Any]:
     }
     if plan.has_recalibration:
         again = [
-            score_case(label, _answer(folder / "reports" / label.case / "recalibration"))
+            score_case(label, _answer(folder / "recalibrated" / label.case))
             for label, _ in pairs
             if label.kind in {"single", "pair"}
         ]
@@ -266,7 +266,7 @@ def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> di
 
 def _diagnose(plan: TrialPlan, case: TrialCase, is_recalibration: bool, folder: Path) -> None:
     """Diagnose a case in a process that is given copies of its two published files and nothing else."""
-    reports = folder / "reports" / case.name / ("recalibration" if is_recalibration else "")
+    reports = folder / ("recalibrated" if is_recalibration else "reports") / case.name
     if (reports / REPORT_FILE).is_file():
         return
     published = folder / "published" / case.name

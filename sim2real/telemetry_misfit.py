@@ -20,8 +20,6 @@ HELD_SHARE = 0.15
 DEAD_ZONE = 0.35
 """Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
 LATTICE_SHARE = 0.98
-COARSE = 0.75
-"""Step of a lattice, over the noise, from which it is more than the resolution of a file."""
 MIN_QUANTUM_M = 0.0015
 STRENGTH = 12.0
 """Residual of a pattern, in each cycle, that an effect leaves unexplained."""

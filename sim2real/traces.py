@@ -17,6 +17,8 @@ STANDING_HZ = 0.5
 """A frequency under this is a drive at rest."""
 MIN_LENGTH_S = 1800
 MIN_STARTS = 6
+MAX_SPAN = 10
+"""Seconds to a row at the most."""
 PUMP_SIGNALS = ("flow_m3h", "head_m", "power_kw")
 
 
@@ -77,9 +79,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     if np.any(np.diff(recording.time_ns) <= 0):
         raise ValueError("times must rise: prepare the recording first")
     second = (recording.time_ns - recording.time_ns[0] + NS_PER_S // 2) // NS_PER_S
-    seconds = int(second[-1]) + 1
-    if seconds < MIN_LENGTH_S:
-        raise ValueError(f"the recording is {seconds} s long, a diagnosis needs at least {MIN_LENGTH_S} s")
+    seconds = _length_s(second)
 
     def on_seconds(name: str) -> Floats:
         values = np.full(seconds, np.nan)
@@ -133,3 +133,15 @@ def repeated(values: Floats) -> npt.NDArray[np.bool_]:
     same = np.zeros(values.shape, dtype=bool)
     same[..., 1:] = (values[..., 1:] == values[..., :-1]) & (values[..., 1:] != 0.0)
     return same
+
+
+def _length_s(second: npt.NDArray[np.int64]) -> int:
+    """Length of a recording with rows at these seconds."""
+    seconds = int(second[-1]) + 1
+    if seconds < MIN_LENGTH_S:
+        raise ValueError(f"the recording is {seconds} s long, a diagnosis needs at least {MIN_LENGTH_S} s")
+    if seconds > MAX_SPAN * len(second):
+        raise ValueError(
+            f"the recording has {len(second)} rows over {seconds} s: a stamp is wrong, or it is sampled too slowly"
+        )
+    return seconds

@@ -228,8 +228,8 @@ def test_the_noise_follows_recent_runs_with_its_correlation_and_the_offset_does_
     assert 2.0 < baseline.correlation_factor < 4.0
     followed = baseline
     for _ in range(200):
-        followed = followed.with_noise_of(runs[rng.integers(20)], 0.05)
+        followed = followed.with_noise_of(runs[rng.integers(20)], 0.05, 36.0)
     assert 0.6 < np.trace(followed.segment_covariance) / np.trace(baseline.segment_covariance) < 1.6
-    noisier = baseline.with_noise_of(segments_of(np.array([9.0, 0.0]) + rng.normal(size=(10, 2))), 0.5)
+    noisier = baseline.with_noise_of(segments_of(np.array([9.0, 0.0]) + rng.normal(size=(10, 2))), 0.5, 36.0)
     assert (noisier.offset_m == baseline.offset_m).all()
     assert np.trace(noisier.segment_covariance) <= 2.5 * np.trace(baseline.segment_covariance) * (1.0 + 1e-9)

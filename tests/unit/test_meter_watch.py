@@ -17,7 +17,7 @@ def feed(watch, *, level_m, flow_m3h, head_m, is_learning=False, is_running=True
     stuck = []
     for second, (level, flow, head) in enumerate(zip(level_m, flow_m3h, head_m, strict=True)):
         frame = Frame(second * NS_PER_S, 1.0, level, NAN, (PumpFrame(50.0, flow, head, NAN, is_running),))
-        watch.update(frame, (is_running,), is_learning=is_learning)
+        watch.update(frame, (is_running,), (is_learning,))
         stuck.append(set(watch.stuck))
     return stuck
 
