@@ -251,6 +251,27 @@ def test_rolling_is_the_window_computed_from_scratch_at_every_step_with_a_spike_
         assert math.isfinite(tests.pump.log_p + tests.pump.aic_null + tests.system.log_p + tests.system.aic_null)
 
 
+@pytest.mark.parametrize("spiked", ["flow", "head", "both"])
+def test_rolling_agrees_with_statsmodels_after_a_spike_has_left(spiked):
+    window = 60
+    time_s, flow, head, speed = station_window(12, 200, loss_m_per_s=0.002)
+    seen_flow, seen_head = flow.copy(), head.copy()
+    if spiked != "head":
+        seen_flow[99] = 1e7
+    if spiked != "flow":
+        seen_head[99] = 1e7
+    rolling = RollingFTest(window)
+    for n in range(200):
+        rolling.update(time_s[n], seen_flow[n], seen_head[n], speed[n])
+        if n < 99 + window or (n + 1) % 10:
+            continue
+        part = slice(n + 1 - window, n + 1)
+        tests = rolling.value()
+        pump_head = head[part] / speed[part] ** 2
+        assert_same(tests.pump, *drift_designs(time_s[part], flow[part] / speed[part], 2), pump_head)
+        assert_same(tests.system, *drift_designs(time_s[part], flow[part] ** 2, 1), head[part])
+
+
 def test_a_spike_that_has_left_leaves_no_trace_and_a_refused_sample_none_either():
     time_s, flow, head, speed = station_window(9, 160)
     clean, hit = RollingFTest(60), RollingFTest(60)
