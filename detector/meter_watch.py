@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,11 @@ NOISY_FACTOR = 3.0
 MIN_DIFFERENCES = 30
 NORMAL_MEDIAN = 1.4826 / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
+
+
+@cache
+def _names(pump: int) -> tuple[str, str, str]:
+    return f"pump{pump}_flow_m3h", f"pump{pump}_head_m", f"pump{pump}_power_kw"
 
 
 @dataclass(slots=True)
@@ -42,13 +48,16 @@ class RepeatWatch:
         time_ns = frame.time_ns
         self._note("level_m", frame.level_m, time_ns, is_learning=is_learning)
         for index, (pump, is_running) in enumerate(zip(frame.pumps, running, strict=True), start=1):
+            if not is_running and pump.flow_m3h == 0.0:
+                continue
+            flow, head, power = _names(index)
             if pump.flow_m3h != 0.0:
-                self._note(f"pump{index}_flow_m3h", pump.flow_m3h, time_ns, is_learning=is_learning)
+                self._note(flow, pump.flow_m3h, time_ns, is_learning=is_learning)
             if is_running:
                 if pump.head_m != 0.0:
-                    self._note(f"pump{index}_head_m", pump.head_m, time_ns, is_learning=is_learning)
+                    self._note(head, pump.head_m, time_ns, is_learning=is_learning)
                 if pump.power_kw != 0.0:
-                    self._note(f"pump{index}_power_kw", pump.power_kw, time_ns, is_learning=is_learning)
+                    self._note(power, pump.power_kw, time_ns, is_learning=is_learning)
 
     def _note(self, name: str, value: float, time_ns: int, *, is_learning: bool) -> None:
         if value != self.last.get(name):
