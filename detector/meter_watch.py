@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,11 @@ MAX_GAP_S = 120.0
 MIN_DIFFERENCES = 30
 NORMAL_MEDIAN = 1.4826 / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
+
+
+@cache
+def _names(pump: int) -> tuple[str, str, str]:
+    return f"pump{pump}_flow_m3h", f"pump{pump}_head_m", f"pump{pump}_power_kw"
 
 
 @dataclass(slots=True)
@@ -44,13 +50,16 @@ class RepeatWatch:
         """Take a frame into account: which pumps run, and which are in their learning phase."""
         self._note("level_m", frame.level_m, frame, all(is_learning))
         for index, pump in enumerate(frame.pumps):
+            if not running[index] and pump.flow_m3h == 0.0:
+                continue
+            flow, head, power = _names(index + 1)
             if pump.flow_m3h != 0.0:
-                self._note(f"pump{index + 1}_flow_m3h", pump.flow_m3h, frame, is_learning[index])
+                self._note(flow, pump.flow_m3h, frame, is_learning[index])
             if running[index]:
                 if pump.head_m != 0.0:
-                    self._note(f"pump{index + 1}_head_m", pump.head_m, frame, is_learning[index])
+                    self._note(head, pump.head_m, frame, is_learning[index])
                 if pump.power_kw != 0.0:
-                    self._note(f"pump{index + 1}_power_kw", pump.power_kw, frame, is_learning[index])
+                    self._note(power, pump.power_kw, frame, is_learning[index])
         self.frame_ns = frame.time_ns
 
     def _note(self, name: str, value: float, frame: Frame, is_learning: bool) -> None:

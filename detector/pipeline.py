@@ -101,12 +101,14 @@ class Detector:
             self._seen_s += frame.gap_s
         ended = self._runs.update(frame)
         running = self._runs.running
+        is_any_running = True in running
         self._drawdown.update(frame, running)
-        for run in ended + self._runs.newly_blind_runs():
-            verdicts.append(
-                self._judge(run, max(frame.time_ns, run.window_ns[1]))
-            )  # the clock may have been set back
+        for run in ended + self._runs.newly_blind_runs() if is_any_running else ended:
+            told_ns = max(frame.time_ns, run.window_ns[1])  # the clock may have been set back
+            verdicts.append(self._judge(run, told_ns))
         self._watch(frame, running)
+        if not is_any_running:
+            return tuple(verdicts)
         for index, steady in self._runs.steady_samples():
             self._pumps[index].rolling.update(frame.time_ns / NS_PER_S, *steady)
             verdicts += self._look_early(index, frame.time_ns)
@@ -158,8 +160,8 @@ class Detector:
     def _watch(self, frame: Frame, running: tuple[bool, ...]) -> None:
         self._repeats.update(frame, running, [pump.known is None for pump in self._pumps])
         for index, is_running in enumerate(running):
-            pump = self._pumps[index]
             if is_running:
+                pump = self._pumps[index]
                 pump.run_s += frame.gap_s if math.isfinite(frame.gap_s) else 0.0
                 if self._repeats.stuck:
                     prefixes = ("level_m", f"pump{index + 1}_")

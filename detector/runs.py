@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.gate import Frame
+from wetwell.detector.gate import Frame, PumpFrame
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.residuals import level_residuals
 from wetwell.protocols.stamps import NS_PER_S
@@ -133,7 +133,12 @@ class RunTracker:
     def update(self, frame: Frame) -> list[Run]:
         """Runs that this frame ends."""
         ended = self.finish() if frame.gap_s > BREAK_S else []
-        running = tuple([self._is_running(frame, pump) for pump in range(self._nominal.pumps)])
+        running = tuple(
+            [
+                self._is_running(reading, pump) if reading.running is None else reading.running
+                for pump, reading in enumerate(frame.pumps)
+            ]
+        )
         if running != self._running:
             self._running = running
             for going_on in self._open:
@@ -179,10 +184,8 @@ class RunTracker:
             raise ValueError(f"pump {pump} has no open run")
         return self._as_run(pump, run, len(run.rows) - segments * SEGMENT_SAMPLES)
 
-    def _is_running(self, frame: Frame, pump: int) -> bool:
-        reading = frame.pumps[pump]
-        if reading.running is not None:
-            return reading.running
+    def _is_running(self, reading: PumpFrame, pump: int) -> bool:
+        """Whether a pump runs that does not say so."""
         if not math.isnan(reading.frequency_hz):
             return reading.frequency_hz > RUNNING_SHARE * self._nominal.frequencies_hz[pump]
         if not math.isnan(reading.flow_m3h):
