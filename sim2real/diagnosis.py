@@ -29,10 +29,14 @@ Floats = npt.NDArray[np.float64]
 Verdict = Literal["effect", "none", "unknown"]
 KEPT = 1.0 / 3.0
 """Share of its gap that a signal may keep under the accepted effects."""
+KEPT_OF_ONE_FORM = 0.1
+"""The same of a signal in one regime, where no accepted effect could have another form that explains the rest."""
 HARDLY = 0.3
 """Share of the whole gap that is left when the effects found so far hardly matter."""
 SEEN = 0.6
 """Repeating mean square of a signal in one regime, in units of noise, from which it is a gap."""
+CLEAR = 1.0
+"""The same where another form of an effect is no excuse."""
 LARGE = 4.0
 """Mean square of half of the cycles, in units of noise, that no noise has."""
 MIN_BINS = 12
@@ -170,11 +174,16 @@ def _repeating_gap(residuals: Floats, bins: Bins, found: Attribution, pumps: int
 def _is_unexplained(
     before: Floats, after: Floats, residuals: Floats, bins: Bins, found: Attribution, told: set[int]
 ) -> bool:
-    """Whether one of the `told` signals keeps a gap that is sure, or large, and more than a third of what it was."""
+    """Whether one of the `told` signals keeps a gap that is sure, or large, and more than a third of what it was.
+
+    A tenth, in one regime, where each accepted effect has but one form.
+    """
     swinging = _swinging(bins, found)
+    has_one_form = found.accepted is not None and all(effect.has_one_form for effect in found.accepted.effects)
+    excess, plain_excess = residuals**2 - bins.floor, found.plain**2 - bins.floor
     for signal in sorted(told):
         rows = found.held & (bins.signal == signal)
-        was = max(float(before[rows].sum()), float(np.sum(found.plain[rows] ** 2 - bins.floor[rows])))
+        was = max(float(before[rows].sum()), float(plain_excess[rows].sum()))
         left = float(after[rows].sum())
         is_left = False
         for regime in range(len(REGIMES)):
@@ -190,8 +199,13 @@ def _is_unexplained(
                 and float(np.median(np.bincount(cycles, residuals[cell] ** 2) / np.bincount(cycles))) > LARGE
             )
             if is_large:
-                left = max(left, float(np.sum(residuals[rows] ** 2 - bins.floor[rows])))
+                left = max(left, float(excess[rows].sum()))
             is_left |= is_repeating or is_large
+            in_cell = excess if is_large else after
+            if has_one_form and (is_repeating or is_large) and float(in_cell[cell].mean()) > CLEAR:
+                cell_was = max(float(before[cell].sum()), float(plain_excess[cell].sum()))
+                if float(in_cell[cell].sum()) > KEPT_OF_ONE_FORM * cell_was:
+                    return True
         if is_left and left > KEPT * was:
             return True
     return False

@@ -23,6 +23,7 @@ class FlowMeterGain(Effect):
     """
 
     component: ClassVar[Component] = "flow_meter"
+    has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"factor": 1.0}
 
     name: Literal["flow_meter_gain"] = "flow_meter_gain"

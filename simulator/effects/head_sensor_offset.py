@@ -23,6 +23,7 @@ class HeadSensorOffset(Effect):
     """
 
     component: ClassVar[Component] = "head_sensor"
+    has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"offset_m": 0.0}
 
     name: Literal["head_sensor_offset"] = "head_sensor_offset"

@@ -23,6 +23,7 @@ class StaticHeadBias(Effect):
     """
 
     component: ClassVar[Component] = "rising_main"
+    has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"offset_m": 0.0}
 
     name: Literal["static_head_bias"] = "static_head_bias"

@@ -26,6 +26,7 @@ class ThresholdShift(Effect):
     """
 
     component: ClassVar[Component] = "controller"
+    has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"start_m": 0.0, "stop_m": 0.0}
 
     name: Literal["threshold_shift"] = "threshold_shift"

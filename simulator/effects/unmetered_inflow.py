@@ -23,6 +23,7 @@ class UnmeteredInflow(Effect):
     """
 
     component: ClassVar[Component] = "sump"
+    has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"flow_m3h": 0.0}
 
     name: Literal["unmetered_inflow"] = "unmetered_inflow"

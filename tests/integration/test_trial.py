@@ -1,5 +1,6 @@
 """A small trial end to end, with diagnosers whose scores are known before."""
 
+import hashlib
 import json
 import sys
 from pathlib import Path
@@ -57,6 +58,24 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     assert "<script" not in page
     assert "Truth against answer" in page
     assert len(json.loads((folder / "trial.json").read_text())["cases"]) == COUNT
+
+
+def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_path):
+    plan = trial.TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
+    result = trial.run_trial(plan, tmp_path, workers=1)
+    single, none = (plan.case(number).name for number in range(2))
+    reports = {name: json.loads((tmp_path / "reports" / name / "report.json").read_text()) for name in (single, none)}
+    assert [reports[name]["verdict"] for name in (single, none)] == ["effect", "none"]
+    assert reports[none]["effects"] == []
+    assert result["all"]["failed"] == 0
+    assert result["all"]["verdict_right"]["value"] == 1.0
+    assert result["all"]["top_2"]["value"] == 1.0
+    assert result["all"]["component_right"]["value"] == 1.0
+    for name in (single, none):
+        sealed = (tmp_path / "sealed" / f"{name}.json").read_bytes()
+        seal = (tmp_path / "published" / name / "seal.sha256").read_text().strip()
+        assert seal == hashlib.sha256(sealed).hexdigest()
+    assert json.loads((tmp_path / "sealed" / f"{single}.json").read_text())["names"] == ["static_head_bias"]
 
 
 def test_always_none_scores_what_it_deserves(folder, monkeypatch):
