@@ -189,7 +189,7 @@ def test_a_replayed_rig_without_head_and_frequency_gets_no_confident_fault(
             if verdict["state"] != "learning":
                 break
         assert states == ["learning", "unknown"]
-        assert verdict["evidence"]["missing"] == ["frequency_hz", "head_m", "level_m"]
+        assert verdict["evidence"]["missing"] == ["frequency_hz", "head_m", "level_m", "power_kw"]
         assert stop(detector)[0] == 0
 
 
