@@ -12,14 +12,14 @@ import importlib.metadata
 import json
 import os
 import platform
-import time
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from timing import least_s
 
 from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.gate import Gate
@@ -39,16 +39,6 @@ MEMORY_DAYS = (1, 10, 40)
 TESTS = 200
 
 Floats = npt.NDArray[np.float64]
-
-
-def least_s(run: Callable[[], object], repeats: int) -> float:
-    """Shortest of some times of a run, as the processor counts them: waiting for other programs is no part."""
-    times_s = []
-    for _ in range(repeats):
-        started_s = time.process_time()
-        run()
-        times_s.append(time.process_time() - started_s)
-    return min(times_s)
 
 
 def judge(nominal: Nominal, recording: Recording) -> None:

@@ -29,6 +29,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 from swmm_station import INFLOW_STEP_S, swmm_input
+from timing import least_s
 
 from wetwell.protocols.station import EffectTable, Station
 from wetwell.services.presets import find_scenario, find_station
@@ -60,16 +61,6 @@ SIX_EFFECTS: tuple[dict[str, Any], ...] = (
 
 Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
-
-
-def least_s(run: Callable[[], object], repeats: int) -> float:
-    """Shortest of some times of a run, as the processor counts them: waiting for other programs is no part."""
-    times_s = []
-    for _ in range(repeats):
-        started_s = time.process_time()
-        run()
-        times_s.append(time.process_time() - started_s)
-    return min(times_s)
 
 
 def one_pump(station: Station) -> Station:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.detector.robust import NORMAL_MEDIAN
 from wetwell.detector.runs import Segments
 
 Floats = npt.NDArray[np.float64]
@@ -23,8 +24,6 @@ SPREAD_SHARE = 0.01
 """Operating points that lie closer together than this share of the flow say nothing of slopes."""
 MAX_CORRELATION = 0.95
 OUTLIER_SIGMAS = 3.0
-NORMAL_MEDIAN = 1.4826
-"""Standard deviation of normal numbers over the median of their size."""
 LEAST_NOISE_SHARE = 1e-4
 """Least noise of a segment, as a share of the shut-off head: readings without any are rounded, not perfect."""
 
@@ -39,14 +38,11 @@ class Model:
     ----------
     origin : (p,) array
         x0: where it was learnt.
-    slope_prior : (p,) array
-        Prior variances of the slopes.
     mean, covariance : (p + 1,), (p + 1, p + 1) arrays
         Of the offset and the slopes.
     """
 
     origin: Floats
-    slope_prior: Floats
     mean: Floats
     covariance: Floats
 
@@ -282,7 +278,6 @@ def _fit(
     full[-1, -1] = min(level_variance, LEVEL_SLOPE**2)
     return Model(
         origin=origin,
-        slope_prior=np.append(slope_prior, LEVEL_SLOPE**2),
         mean=np.append(mean, level_slope),
         covariance=full,
     )

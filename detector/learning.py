@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import FLOOR_SHARE, MIN_RUNS, MIN_SEGMENTS, Baseline, Curve, learn
 from wetwell.detector.meter_faults import flow_meter_direction
+from wetwell.detector.robust import step_variance
 from wetwell.detector.runs import Segments
 
 Floats = npt.NDArray[np.float64]
@@ -15,8 +16,6 @@ Floats = npt.NDArray[np.float64]
 LEARNING_S = 6.0 * 3600.0
 DAY_S = 24.0 * 3600.0
 DRIFT_SIGMAS = 5.0
-STEP_MEDIAN = 0.91
-"""Median of the square of the difference of two standard normal numbers."""
 WANDERING_SHARE = 0.02
 """A flow meter may wander by this standard deviation over a day and still be a healthy one."""
 SIBLING_SHARE = 0.1
@@ -123,7 +122,7 @@ def objection(
     """
     floor = (FLOOR_SHARE * shutoff_head_m) ** 2
     segments = np.mean([len(run) for run in runs])
-    neighbours = np.median(np.diff(deviations_m, axis=0) ** 2, axis=0) / STEP_MEDIAN
+    neighbours = step_variance(deviations_m)
     variance = np.maximum(np.diag(baseline.segment_covariance) / segments + floor, neighbours)
     for split in range(1, len(runs)):
         shift_m = deviations_m[split:].mean(axis=0) - deviations_m[:split].mean(axis=0)

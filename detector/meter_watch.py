@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.detector.gate import Frame
+from wetwell.detector.robust import NORMAL_MEDIAN
 from wetwell.detector.runs import Run
 from wetwell.protocols.stamps import NS_PER_S
 
@@ -20,7 +21,7 @@ STUCK_FACTOR = 5.0
 NOISY_FACTOR = 3.0
 MAX_GAP_S = 120.0
 MIN_DIFFERENCES = 30
-NORMAL_MEDIAN = 1.4826 / math.sqrt(2.0)
+DIFFERENCE_MEDIAN = NORMAL_MEDIAN / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
 
 
@@ -90,7 +91,7 @@ def reading_noise(run: Run) -> Floats:
     if np.count_nonzero(is_next) < MIN_DIFFERENCES:
         return np.full(2, math.nan)
     noise = [
-        NORMAL_MEDIAN * float(np.median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
+        DIFFERENCE_MEDIAN * float(np.median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
         for values in (run.flow_m3h, run.head_m)
     ]
     return np.array(noise)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import MIN_RUNS, Baseline, Curve
 from wetwell.detector.meter_faults import flow_meter_direction, head_sensor_direction
+from wetwell.detector.robust import NORMAL_MEDIAN, step_variance
 from wetwell.detector.runs import Run
 
 Floats = npt.NDArray[np.float64]
@@ -20,8 +21,6 @@ COMPONENTS = ("pump", "system", "drawdown", "power")
 CHECK_FLOOR = 0.004
 """Least standard deviation of the logarithm of drawdown and power between runs."""
 MIN_STEPS = 4
-STEP_MEDIAN = 0.91
-"""Median of the square of the difference of two standard normal numbers."""
 NOISIER_FACTOR = 3.0
 """A run's own variance counts where it is larger than this times the learnt one."""
 POWER_EXPONENT = 2.0
@@ -42,7 +41,7 @@ def learn_check(values: Sequence[float]) -> Check:
     if len(known) < MIN_RUNS:
         return Check(mean=math.nan, variance=math.nan)
     middle = float(np.median(known))
-    deviation = 1.4826 * float(np.median(np.abs(known - middle)))
+    deviation = NORMAL_MEDIAN * float(np.median(np.abs(known - middle)))
     return Check(mean=middle, variance=max(deviation, CHECK_FLOOR) ** 2 * (1.0 + 1.0 / len(known)))
 
 
@@ -149,7 +148,7 @@ def _noise(shifts_m: Floats, baseline: Baseline) -> Floats:
     """Covariance of the median of the segments of a run."""
     covariance = baseline.segment_covariance
     if len(shifts_m) >= MIN_STEPS:
-        own = np.median(np.diff(shifts_m, axis=0) ** 2, axis=0) / STEP_MEDIAN * baseline.correlation_factor
+        own = step_variance(shifts_m) * baseline.correlation_factor
         covariance = covariance * max(1.0, float(np.max(own / np.diag(covariance))) / NOISIER_FACTOR)
     noise: Floats = covariance * (np.pi / 2.0 / len(shifts_m))
     return noise
