@@ -81,9 +81,11 @@ def test_messages_come_in_order(buses):
 
 def test_late_joiner_gets_the_kept_messages(buses):
     here, there = buses
+    early = there.subscribe("wetwell/alpha/sample", history=8)
     publisher = here.publisher("wetwell/alpha/sample", history=5)
     for number in range(8):
         publisher.put(b"%d" % number)
+        assert collect(early, 1) == [b"%d" % number]  # none is on the way any more when the late ones join
     assert collect(there.subscribe("wetwell/alpha/sample", history=600), 5) == [b"3", b"4", b"5", b"6", b"7"]
     assert collect(there.subscribe("wetwell/alpha/sample", history=2), 2) == [b"6", b"7"]
 
