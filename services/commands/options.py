@@ -1,0 +1,124 @@
+"""What the commands share: options, settings from flags, how a result is printed."""
+
+import asyncio
+import re
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from wetwell.protocols.errors import ConfigError
+from wetwell.services.settings import Settings, load_settings
+
+if TYPE_CHECKING:
+    from wetwell.simulator.scenario import Scenario
+    from wetwell.simulator.simulation import Simulation
+
+StationOption = Annotated[
+    str, typer.Option("--station", metavar="FILE", help="Station file, or the name of a built-in station.")
+]
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", metavar="NAME", help="Built-in scenario, or a scenario file.")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
+SpeedOption = Annotated[
+    float | None, typer.Option(help="Seconds of the station in a second on the wall; default: the scenario's.")
+]
+ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file with settings.")]
+ZenohOption = Annotated[str | None, typer.Option("--zenoh", metavar="ENDPOINT", help="Such as tcp/127.0.0.1:7447.")]
+ModbusOption = Annotated[
+    str | None, typer.Option("--modbus", metavar="HOST:PORT", help="Address of the Modbus TCP server.")
+]
+WordOrderOption = Annotated[
+    Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
+]
+RecordingOption = Annotated[Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.")]
+PreparationOption = Annotated[
+    Path | None, typer.Option("--preparation", metavar="FILE", help="TOML file: scale, offset, max_gap_s.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+def parse_duration_s(text: str) -> float:
+    """Seconds in a text such as 90, 90s, 10m or 2h.
+
+    Raises
+    ------
+    ConfigError
+        If the text is none.
+
+    Examples
+    --------
+    >>> parse_duration_s("90"), parse_duration_s("10m"), parse_duration_s("1.5h")
+    (90.0, 600.0, 5400.0)
+    """
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh]?)", text)
+    if match is None:
+        raise ConfigError(f"--for: got '{text}', must be a time such as 90s, 10m or 2h")
+    return float(match[1]) * {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}[match[2]]
+
+
+def settings_of(
+    config: Path | None,
+    zenoh: str | None = None,
+    modbus: str | None = None,
+    word_order: Literal["ABCD", "CDAB"] | None = None,
+) -> Settings:
+    """Settings from file, environment and flags."""
+    flags: dict[str, Any] = {}
+    if zenoh is not None:
+        flags["zenoh"] = {"endpoint": zenoh}
+    if modbus is not None:
+        host, colon, port = modbus.rpartition(":")
+        if not colon or not port.isdecimal():
+            raise ConfigError(f"--modbus: got '{modbus}', must be HOST:PORT such as 127.0.0.1:5020")
+        flags["modbus"] = {"host": host, "port": int(port)}
+    if word_order is not None:
+        flags.setdefault("modbus", {})["word_order"] = word_order
+    return load_settings(config, flags)
+
+
+def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":
+    """Simulation of a scenario on a station that can run it."""
+    from wetwell.services.presets import find_station
+    from wetwell.simulator.simulation import Simulation
+
+    try:
+        return Simulation(find_station(station), scenario, seed, start_ns)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def live_plant(station: str, scenario: str, seed: int, speed: float | None) -> tuple["Simulation", float]:
+    """Simulation and its speed; at the speed of life it starts now, else at a fixed date."""
+    from wetwell.services.clock import this_second_ns
+    from wetwell.services.presets import find_scenario
+    from wetwell.simulator.scenario import DEFAULT_START_NS
+
+    plan = find_scenario(scenario)
+    speed = plan.clock_speed if speed is None else positive(speed, "--speed")
+    return plant_of(station, plan, seed, this_second_ns() if speed == 1.0 else DEFAULT_START_NS), speed
+
+
+def positive(value: float, flag: str) -> float:
+    """The value of a flag that must be positive."""
+    if not 0.0 < value < float("inf"):
+        raise ConfigError(f"{flag}: got {value:g}, must be positive")
+    return value
+
+
+def run(settings: Settings, service: Coroutine[Any, Any, None]) -> None:
+    """Run a service until it ends, with its logs on standard error."""
+    from wetwell.services.daemon import start_logging
+
+    start_logging(settings.log.level)
+    asyncio.run(service)
+
+
+def print_result(result: dict[str, object], *, as_json: bool) -> None:
+    """Print a result, for people or as JSON."""
+    from wetwell.services.terminal import as_json as to_json
+    from wetwell.services.terminal import as_lines
+
+    typer.echo(to_json(result) if as_json else as_lines(result))
