@@ -18,6 +18,7 @@ import zenoh
 import zenoh.ext
 
 from wetwell.protocols.errors import ConfigError, LinkError
+from wetwell.protocols.link import Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 from wetwell.protocols.messages import JSON_ENCODING
 
@@ -28,6 +29,9 @@ RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_facto
 
 LAST_LOSS_S = 1.0
 """So long after it a message that was lost, and that no other followed, is noticed."""
+
+REQUESTS = 1_000
+"""Most questions, or changes of presence, that wait for one reader."""
 
 
 class ZenohPublisher:
@@ -65,6 +69,21 @@ class ZenohPublisher:
         with query:
             if self._last is not None:
                 query.reply(self._key, self._last, encoding=JSON_ENCODING)
+
+
+class ZenohRequest:
+    """Question that came over Zenoh."""
+
+    def __init__(self, query: zenoh.Query, reply_key: str) -> None:
+        self.key = str(query.key_expr)
+        self.payload = b"" if query.payload is None else query.payload.to_bytes()
+        self._query = query
+        self._reply_key = reply_key
+
+    def reply(self, payload: bytes) -> None:
+        """Answer it; nothing happens if who asked is gone."""
+        with contextlib.suppress(zenoh.ZError), self._query:
+            self._query.reply(self._reply_key, payload, encoding=JSON_ENCODING)
 
 
 class ZenohBus:
@@ -127,7 +146,7 @@ class ZenohBus:
         self._declared.append(publisher)
         return publisher
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox:
+    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
         Raises
@@ -135,7 +154,7 @@ class ZenohBus:
         LinkError
             If the key is not a key expression or the bus is closed.
         """
-        mailbox = Mailbox(capacity)
+        mailbox: Mailbox[bytes] = Mailbox(capacity)
 
         def deliver(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
@@ -153,6 +172,76 @@ class ZenohBus:
         except zenoh.ZError as error:
             raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
         self._declared.append(subscriber)
+        return mailbox
+
+    def answer(self, key: str) -> Mailbox[Request]:
+        """Questions that are asked on a key from now on; each is to be answered.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Request] = Mailbox(REQUESTS)
+
+        def deliver(query: zenoh.Query) -> None:
+            mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
+
+        try:
+            self._declared.append(self._session.declare_queryable(key, deliver))
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot answer '{key}': {_reason(error)}") from error
+        return mailbox
+
+    async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
+        """Answers to a question; of a key with a publisher also its last message. None in time: an empty list.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        loop, ended, answers = asyncio.get_running_loop(), asyncio.Event(), list[bytes]()
+
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.append(reply.ok.payload.to_bytes())
+
+        def end() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits
+                loop.call_soon_threadsafe(ended.set)
+
+        try:
+            self._session.get(
+                key,
+                zenoh.handlers.Callback(take, end),
+                payload=payload,
+                encoding=JSON_ENCODING,
+                target=zenoh.QueryTarget.ALL,
+                timeout=timeout_s,
+            )
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot ask '{key}': {_reason(error)}") from error
+        await ended.wait()
+        return answers
+
+    def watch(self, key: str) -> Mailbox[Presence]:
+        """Services that are announced under a key expression: those that live now, then each change.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Presence] = Mailbox(REQUESTS)
+
+        def deliver(sample: zenoh.Sample) -> None:
+            mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
+
+        try:
+            self._declared.append(self._session.liveliness().declare_subscriber(key, deliver, history=True))
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot watch '{key}': {_reason(error)}") from error
         return mailbox
 
     def announce(self, key: str) -> None:

@@ -12,7 +12,7 @@ from wetwell.protocols.keys import order_key, sample_key, verdict_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Order, Sample, Verdict
 from wetwell.protocols.station import Station
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.bus import connect
 from wetwell.services.checkpoint import Checkpoint
 from wetwell.services.daemon import report_health, stop_event, until
 from wetwell.services.settings import Settings
@@ -33,7 +33,7 @@ async def serve_detector(settings: Settings, station: Station) -> None:
 
 
 async def _run(settings: Settings, station: Station, stack: contextlib.AsyncExitStack) -> None:
-    bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
+    bus = stack.enter_context(await connect(settings))
     checkpoint = Checkpoint(settings.detector.state_dir, station.name)
     judge = StationJudge(bus, station, settings.detector.costs)
     if checkpoint.restore(judge.detector):

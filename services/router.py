@@ -2,7 +2,7 @@
 
 import logging
 
-from wetwell.protocols.zenoh_link import open_router
+from wetwell.services.bus import listen
 from wetwell.services.daemon import stop_event
 from wetwell.services.settings import Settings
 
@@ -18,6 +18,6 @@ async def serve_router(settings: Settings) -> None:
         If the endpoint cannot be opened.
     """
     async with stop_event() as stop:
-        with open_router(settings.zenoh.endpoint):
+        with listen(settings):
             log.info("router on %s", settings.zenoh.endpoint)
             await stop.wait()

@@ -10,7 +10,7 @@ from wetwell.protocols.link import Bus
 from wetwell.protocols.modbus_server import ModbusServer
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.bus import connect
 from wetwell.services.clock import due_seconds, tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
 from wetwell.services.settings import Settings
@@ -56,7 +56,7 @@ async def _run(
 ) -> None:
     async with asyncio.TaskGroup() as group:
         if zenoh:
-            bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
+            bus = stack.enter_context(await connect(settings))
             sinks.append(_zenoh_sink(bus, simulation))
             group.create_task(
                 report_health(

@@ -11,7 +11,7 @@ from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.keys import verdict_key
 from wetwell.protocols.link import Bus, Subscription
 from wetwell.protocols.messages import MessageError, Verdict
-from wetwell.protocols.zenoh_link import open_router
+from wetwell.services.bus import listen
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
 from wetwell.services.settings import Settings
 
@@ -54,7 +54,7 @@ async def serve_all(
         If a child ends before it was asked to.
     """
     async with stop_event() as stop:
-        with open_router(settings.zenoh.endpoint) as bus:
+        with listen(settings) as bus:
             running = asyncio.create_task(_run(settings, bus, station, commands, show), name="up.run")
             if limit_s is not None:
                 asyncio.get_running_loop().call_later(limit_s, stop.set)
@@ -81,7 +81,7 @@ async def _run(
                 task.cancel()
 
 
-async def _show(verdicts: Subscription, show: Callable[[Verdict], None]) -> None:
+async def _show(verdicts: Subscription[bytes], show: Callable[[Verdict], None]) -> None:
     while True:
         for payload in await verdicts.receive():
             try:
