@@ -38,7 +38,7 @@ class History(Message):
     station: str
     kind: Kind
     time: tuple[Stamp, ...] = ()
-    columns: dict[str, tuple[Number, ...]] = {}
+    columns: dict[str, tuple[Number, ...]] = Field(default_factory=dict)
     messages: tuple[dict[str, Any], ...] = ()
     more: bool = False
     error: str = ""
