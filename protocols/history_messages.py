@@ -14,7 +14,8 @@ class HistoryQuery(Message):
 
     Of samples and KPI at most `points` rows come: means, least and largest of equal spans if there are more (columns
     `level_m`, `level_m_min`, `level_m_max`, ...). Of verdicts and alarms the last `points` come. `raw` asks for the
-    samples themselves, oldest first, up to `points`; the answer then says whether there are `more`.
+    samples as they came, with `seq` and `quality`: the first `points` of them as messages, oldest first, and whether
+    there are `more` (ask again from after the last one).
     """
 
     schema_name: Literal["wetwell.history-query/1"] = Field("wetwell.history-query/1", alias="schema")
@@ -32,7 +33,7 @@ class HistoryQuery(Message):
 
 
 class History(Message):
-    """Answer to a `HistoryQuery`: columns for samples and KPI, messages for verdicts and alarms, or an error."""
+    """Answer to a `HistoryQuery`: columns of samples and KPI, messages of all else (raw samples too), or an error."""
 
     schema_name: Literal["wetwell.history/1"] = Field("wetwell.history/1", alias="schema")
     station: str
