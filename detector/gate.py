@@ -77,6 +77,11 @@ class Gate:
         ]
         self.counts: Counter[str] = Counter()
 
+    @property
+    def last_ns(self) -> int | None:
+        """Time of the last sample that was let through."""
+        return self._last_ns
+
     def update(self, sample: Readings) -> Frame | None:
         """Frame of a sample, or None where it is dropped."""
         self.counts["samples"] += 1

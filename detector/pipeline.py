@@ -88,6 +88,11 @@ class Detector:
         """How many samples and values the gate has let through, marked or dropped."""
         return dict(self._gate.counts)
 
+    @property
+    def seen_until_ns(self) -> int:
+        """Time of the last sample that was let through; 0 before the first."""
+        return self._gate.last_ns or 0
+
     def update(self, sample: Readings) -> tuple[Verdict, ...]:
         """Verdicts that a sample brings."""
         frame = self._gate.update(sample)

@@ -118,18 +118,21 @@ app.add_typer(detector_app, name="detector")
 @detector_app.callback()
 def detector(
     context: typer.Context,
-    station: StationOption = "alpha",
+    station: Annotated[
+        list[str] | None,
+        typer.Option("--station", metavar="FILE", help="Station file or built-in station; may be given again."),
+    ] = None,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
 ) -> None:
-    """Judge the samples of a station on Zenoh and publish verdicts."""
+    """Judge the samples of stations on Zenoh and publish verdicts."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.services.detector import serve_detector
-    from wetwell.services.presets import find_station
+    from wetwell.services.detector.serve import serve_detector
+    from wetwell.services.presets import find_stations
 
     settings = settings_of(config, zenoh)
-    run(settings, serve_detector(settings, find_station(station)))
+    run(settings, serve_detector(settings, find_stations(station or ["alpha"])))
 
 
 @detector_app.command()
@@ -143,7 +146,7 @@ def rebaseline(
     as_json: JsonOption = False,
 ) -> None:
     """Order a running detector to learn a pump anew, after a repair; what it knew is put aside."""
-    from wetwell.services.orders import send_order
+    from wetwell.services.detector.orders import send_order
     from wetwell.services.presets import find_station
 
     name = find_station(station).name
