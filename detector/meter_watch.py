@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.detector.block import FIRST_PUMP, FLOW, LEVEL, PUMP_VALUES
-from wetwell.detector.robust import NORMAL_MEDIAN
+from wetwell.detector.robust import NORMAL_MEDIAN, median
 from wetwell.detector.runs import Run
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
@@ -108,7 +108,7 @@ def reading_noise(run: Run) -> Floats:
     if np.count_nonzero(is_next) < MIN_DIFFERENCES:
         return np.full(2, math.nan)
     noise = [
-        DIFFERENCE_MEDIAN * float(np.median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
+        DIFFERENCE_MEDIAN * float(median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
         for values in (run.flow_m3h, run.head_m)
     ]
     return np.array(noise)
@@ -117,7 +117,7 @@ def reading_noise(run: Run) -> Floats:
 def healthy_noise(noises: Sequence[Floats]) -> Floats:
     """(2,) median of the noise of healthy runs, NaN where it was never known."""
     known = np.array([noise for noise in noises if np.isfinite(noise).all()])
-    return np.median(known, axis=0) if len(known) else np.full(2, math.nan)
+    return median(known) if len(known) else np.full(2, math.nan)
 
 
 def noisy_meters(run: Run, healthy: Floats) -> Mapping[str, float]:

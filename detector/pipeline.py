@@ -34,6 +34,7 @@ from wetwell.detector.posterior import (
     weigh,
 )
 from wetwell.detector.pump_record import ROLLING_SAMPLES, Knowledge, PumpRecord
+from wetwell.detector.robust import median
 from wetwell.detector.rolling_f_test import RollingFTest
 from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, SEGMENT_SAMPLES, Run, RunTracker
 from wetwell.detector.severity import severity
@@ -223,7 +224,7 @@ class Detector:
             return self._verdict(run.pump, time_ns, run.window_ns, {"learning": 1.0}, evidence)
         weighed = self._weigh(run, pump.known, log_ratio, evidence)
         remember(weighed.probability, pump.belief, self._system)
-        state, remark = decide(weighed, float(np.median(run.head_m)))
+        state, remark = decide(weighed, float(median(run.head_m)))
         pump.recent.append((sum(run.window_ns) // 2, weighed.shift_m))
         wrong = self._doubtful_meters(run, pump.known, stuck)
         evidence |= wrong
@@ -294,12 +295,12 @@ class Detector:
             pump.early = None
             return []
         run = self._runs.last_segments(index, min(since, filled))
-        is_dry = np.median(run.total_flow_m3h) < NO_FLOW_SHARE * self._nominal.runout_flow_m3h(index)
+        is_dry = median(run.total_flow_m3h) < NO_FLOW_SHARE * self._nominal.runout_flow_m3h(index)
         if is_dry and math.isfinite(pump.known.drawdown.mean):
             return []  # the drawdown will tell at the end of the run whether the flow meter is dead
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
         weighed = self._weigh(run, pump.known, math.nan, evidence)
-        state, remark = decide(weighed, float(np.median(run.head_m)))
+        state, remark = decide(weighed, float(median(run.head_m)))
         is_sure = state in FAULTS and weighed.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum() > EARLY_PROBABILITY
         previous, pump.early = pump.early, state if is_sure else None
         if pump.early is None or pump.early != previous or state == pump.state:
@@ -346,8 +347,8 @@ class Detector:
     ) -> dict[str, Any]:
         """Severity, advice and expected costs."""
         known, segments = self._pumps[run.pump].known, run.segments
-        flow_m3h = float(np.median(segments.flow_m3h))
-        friction_m = self._nominal.friction_h2_m5 * float(np.median(segments.total_m3h)) ** 2
+        flow_m3h = float(median(segments.flow_m3h))
+        friction_m = self._nominal.friction_h2_m5 * float(median(segments.total_m3h)) ** 2
         healthy_m3h = known.baseline.explained_flows(segments)[0] if known is not None else flow_m3h
         power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
         run_share = float(self._runs.pumps["run_s"][run.pump]) / max(self._seen_s, 1.0)
