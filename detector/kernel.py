@@ -26,7 +26,7 @@ DONE, FULL, ENDED, BLIND, LOOK = range(5)
 """Why the loop stops: no sample is left, rows are full, runs have ended, one is blind, a segment is full."""
 BEGIN, COLLECT, WATCH = range(3)
 """Where it begins within a sample."""
-GOES_ON = {DONE: BEGIN, FULL: COLLECT, ENDED: COLLECT, BLIND: WATCH, LOOK: BEGIN}
+GOES_ON = {FULL: COLLECT, ENDED: COLLECT, BLIND: WATCH, LOOK: BEGIN}
 """Where it has to go on after a stop."""
 
 

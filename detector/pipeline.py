@@ -102,17 +102,14 @@ class Detector:
         if not self._gate.state["is_begun"][0] and len(block.time_ns):
             begin_ns = int(block.time_ns[0])
             verdicts += [self._told(pump, begin_ns, (begin_ns, begin_ns), "begins") for pump in self._every()]
-        row, stage, stop = 0, BEGIN, FULL
+        row, stop = advance(0, BEGIN, *block, *self._arrays())
         while stop != DONE:
-            row, stop = advance(row, stage, *block, *self._arrays())
-            stage = GOES_ON[stop]
             verdicts += self._stopped(stop)
+            row, stop = advance(row, GOES_ON[stop], *block, *self._arrays())
         return verdicts
 
     def _stopped(self, stop: int) -> list[Verdict]:
         """Verdicts where the loop over the samples has stopped."""
-        if stop == DONE:
-            return []
         now_ns = int(self._gate.state["time_ns"][0])
         if stop == FULL:
             self._runs.make_room()
