@@ -14,7 +14,7 @@ up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C 
 	@exec $(BIN)/wetwell up --scenario $(SCENARIO)
 
 test: lint types imports  ## Lint, types, import contract, all tests
-	@find simulator -name '*.nb[ci]' -delete  # kernels know changes of their own file only
+	@find simulator detector -name '*.nb[ci]' -delete  # kernels know changes of their own file only
 	$(BIN)/pytest -q --durations=5
 
 lint: $(VENV)/.dev  ## ruff

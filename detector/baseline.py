@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.robust import NORMAL_MEDIAN
+from wetwell.detector.robust import NORMAL_MEDIAN, median
 from wetwell.detector.runs import Segments
 
 Floats = npt.NDArray[np.float64]
@@ -102,10 +103,10 @@ class Baseline:
     def shifts(self, segments: Segments) -> Floats:
         """(m, 2) distance of segments from what the baseline expects at their operating points. [m]."""
         level_m = self._levels(segments.level_m)
-        pump = _pump_points(segments.flow_m3h, level_m) - self.pump.origin
-        system = _system_points(segments.total_m3h, level_m) - self.system.origin
-        expected = (pump @ self.pump.mean[1:], system @ self.system.mean[1:])
-        shifts: Floats = segments.residual_m - self.offset_m - np.column_stack(expected)
+        flow_m3h, total_m3h = segments.flow_m3h, segments.total_m3h
+        shifts: Floats = segments.residual_m.copy()
+        shifts[:, 0] -= _at(self.pump, flow_m3h, flow_m3h * flow_m3h, level_m)
+        shifts[:, 1] -= _at(self.system, total_m3h * total_m3h, level_m)
         return shifts
 
     def deviations(self, runs: Sequence[Segments]) -> Floats:
@@ -126,8 +127,8 @@ class Baseline:
     def explained_flows(self, segments: Segments) -> tuple[float, float]:
         """Q/N and Q_tot that the running pumps and their speeds explain, without any fault. [m³/h]."""
         return (
-            float(self.duty_fit @ (1.0, np.median(segments.duty_m3h))),
-            float(self.duty_total_fit @ (1.0, np.median(segments.duty_total_m3h))),
+            float(self.duty_fit @ (1.0, median(segments.duty_m3h))),
+            float(self.duty_total_fit @ (1.0, median(segments.duty_total_m3h))),
         )
 
     def variances(self, flow_m3h: float, total_m3h: float, level_m: float) -> Floats:
@@ -202,6 +203,14 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
         correlation_factor=factor,
         run_covariance=run_covariance,
     )
+
+
+def _at(model: Model, *point: Floats) -> Floats:
+    """What a model expects at points of which these are the coordinates."""
+    expected: Any = model.mean[0]
+    for value, origin, slope in zip(point, model.origin, model.mean[1:], strict=True):
+        expected = expected + slope * (value - origin)
+    return np.asarray(expected)
 
 
 def _pump_points(flow_m3h: Floats, level_m: Floats) -> Floats:

@@ -3,6 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.detector.robust import quantiles
+
 
 def block_bootstrap_interval(
     psi_p: npt.ArrayLike,
@@ -79,5 +81,5 @@ def block_bootstrap_interval(
     total = pump + system
     index = np.full(resamples, 0.5)
     np.divide(pump, total, out=index, where=total > 0.0)
-    low, high = np.quantile(index, [(1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0])
-    return float(low), float(high)
+    low, high = quantiles(index, ((1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0))
+    return low, high

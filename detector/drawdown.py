@@ -1,12 +1,28 @@
-"""Drawdown: what a pump takes out of the wet well, against what its flow meter says."""
+r"""Drawdown: what a pump takes out of the wet well, against what its flow meter says.
+
+The ratio of the metered flow to the drawdown flow, for runs of one pump alone after a time without any:
+
+$$\rho = \ln \frac{Q}{A (\dot Y_{idle} - \dot Y_{run})}, \qquad Y = L - \frac{1}{A} \int Q_{in}\, dt$$
+
+Where the inflow is not measured it is left out of Y: then it has to be the same before and during the run, and
+the time without any pump must lie just before. Only changes of ρ count, so that A need not be right.
+"""
 
 import math
-from dataclasses import dataclass, field
+from typing import Any
 
-from wetwell.detector.gate import Frame
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.block import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
+from wetwell.detector.gate import seconds_between
+from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 
+Floats = npt.NDArray[np.float64]
+
 SETTLED_S = 15.0
+SETTLED_NS = int(SETTLED_S * NS_PER_S)
 MIN_SAMPLES = 45
 MAX_SAMPLES = 600
 """A longer phase begins anew, so that the inflow before a run is that just before it."""
@@ -15,101 +31,107 @@ MAX_GAP_S = 10.0
 DEAD_RATIO = 0.01
 """Metered over drawdown flow of a meter that reads nothing."""
 
-
-@dataclass(slots=True)
-class Phase:
-    """Running sums while the same pumps run; the slope of the level comes from them."""
-
-    running: tuple[bool, ...]
-    begin_ns: int
-    end_ns: int = 0
-    samples: int = 0
-    time: float = 0.0
-    level: float = 0.0
-    time_time: float = 0.0
-    time_level: float = 0.0
-    came_m: float = 0.0
-    flow: float = 0.0
-
-    def add(self, time_ns: int, level_m: float, inflow_m_s: float, flow_m3h: float) -> None:
-        """Take one reading into account."""
-        time_s = (time_ns - self.begin_ns) / NS_PER_S
-        self.came_m += inflow_m_s * (time_ns - self.end_ns) / NS_PER_S if self.samples else 0.0
-        level_m -= self.came_m
-        self.end_ns = time_ns
-        self.samples += 1
-        self.time += time_s
-        self.level += level_m
-        self.time_time += time_s * time_s
-        self.time_level += time_s * level_m
-        self.flow += flow_m3h
-
-    @property
-    def slope_m_h(self) -> float:
-        """Rise of the level, without what the inflow has brought, by least squares. [m/h]."""
-        spread = self.time_time - self.time * self.time / self.samples
-        if spread <= 0.0:
-            return math.nan
-        return 3600.0 * (self.time_level - self.time * self.level / self.samples) / spread
+NOW, IDLE = 0, 1
+PHASE = np.dtype(
+    [(name, np.int64) for name in ("running", "begin_ns", "end_ns", "samples")]
+    + [(name, np.float64) for name in ("time", "level", "time_time", "time_level", "came_m", "flow")]
+)
+"""Running sums while the same pumps run (one bit each); the slope of the level comes from them."""
+NO_PHASE = -1
 
 
-@dataclass(slots=True)
-class Drawdown:
-    r"""Ratio of the metered flow to the drawdown flow, for runs of one pump alone after a time without any.
+def new_phases() -> npt.NDArray[np.void]:
+    """The phase that goes on, and the last one without any pump."""
+    phases = np.zeros(2, dtype=PHASE)
+    phases["running"] = NO_PHASE
+    return phases
 
-    $$\rho = \ln \frac{Q}{A (\dot Y_{idle} - \dot Y_{run})}, \qquad Y = L - \frac{1}{A} \int Q_{in}\, dt$$
 
-    Where the inflow is not measured it is left out of Y: then it has to be the same before and during the run, and
-    the time without any pump must lie just before. Only changes of ρ count, so that A need not be right.
+@compiled
+def _slope_m_h(phase: Any) -> float:
+    """Rise of the level, without what the inflow has brought, by least squares. [m/h]."""
+    samples = phase["samples"]
+    spread: float = phase["time_time"] - phase["time"] * phase["time"] / samples
+    if spread <= 0.0:
+        return math.nan
+    product: float = phase["time_level"] - phase["time"] * phase["level"] / samples
+    return 3600.0 * product / spread
 
-    Memory: constant.
+
+@compiled
+def _begin(phase: Any, running: int, begin_ns: int) -> None:
+    phase["running"], phase["begin_ns"], phase["end_ns"], phase["samples"] = running, begin_ns, 0, 0
+    phase["time"] = phase["level"] = phase["time_time"] = phase["time_level"] = 0.0
+    phase["came_m"] = phase["flow"] = 0.0
+
+
+@compiled
+def _end(phases: Any, area_m2: float, pumps: Any) -> None:
+    """Keep what the phase that ends has told."""
+    phase, idle = phases[NOW], phases[IDLE]
+    running = phase["running"]
+    if running == NO_PHASE or phase["samples"] < MIN_SAMPLES:
+        return
+    if running == 0:
+        phases[IDLE] = phases[NOW]
+        return
+    is_alone = running & (running - 1) == 0
+    if not is_alone or idle["running"] == NO_PHASE or seconds_between(idle["end_ns"], phase["begin_ns"]) > MAX_AGE_S:
+        return
+    drawn_m3h = area_m2 * (_slope_m_h(idle) - _slope_m_h(phase))
+    flow_m3h = phase["flow"] / phase["samples"]
+    if drawn_m3h > 0.0:
+        for pump in range(pumps.shape[0]):
+            if running == 1 << pump:
+                pumps[pump]["log_ratio"] = math.log(max(flow_m3h / drawn_m3h, DEAD_RATIO))
+
+
+@compiled
+def _add(phase: Any, time_ns: int, level_m: float, inflow_m_s: float, flow_m3h: float) -> None:
+    """Take one reading into account."""
+    time_s = (time_ns - phase["begin_ns"]) / NS_PER_S
+    if phase["samples"]:
+        phase["came_m"] += inflow_m_s * (time_ns - phase["end_ns"]) / NS_PER_S
+    level_m -= phase["came_m"]
+    phase["end_ns"] = time_ns
+    phase["samples"] += 1
+    phase["time"] += time_s
+    phase["level"] += level_m
+    phase["time_time"] += time_s * time_s
+    phase["time_level"] += time_s * level_m
+    phase["flow"] += flow_m3h
+
+
+@compiled
+def draw_down(phases: Any, area_m2: float, time_ns: int, gap_s: float, frame: Floats, pumps: Any) -> None:
+    """Take a frame into account.
 
     Parameters
     ----------
+    phases : new_phases()
     area_m2 : float
         A. [m²]
+    time_ns, gap_s, frame
+        A sample that has passed the gate.
+    pumps : (pumps,) records
+        `is_running` is read; `log_ratio` becomes the ρ of a run that ends.
     """
-
-    area_m2: float
-    _phase: Phase | None = None
-    _idle: Phase | None = None
-    _log_ratio: dict[int, float] = field(default_factory=dict)
-
-    def update(self, frame: Frame, running: tuple[bool, ...]) -> None:
-        """Take a frame into account, in which these pumps ran."""
-        phase = self._phase
-        if phase is None or phase.running != running or not frame.gap_s <= MAX_GAP_S:
-            self._end()
-            phase = self._phase = Phase(running, frame.time_ns)
-        elif phase.samples >= MAX_SAMPLES and not any(running):
-            self._end()
-            phase = self._phase = Phase(running, frame.time_ns - int(SETTLED_S * NS_PER_S))
-        if frame.time_ns - phase.begin_ns < SETTLED_S * NS_PER_S or math.isnan(frame.level_m):
-            return
-        flow_m3h = 0.0
-        for pump, is_running in zip(frame.pumps, running, strict=True):
-            if is_running:
-                flow_m3h += pump.flow_m3h
-        inflow_m_s = 0.0 if math.isnan(frame.inflow_m3h) else frame.inflow_m3h / 3600.0 / self.area_m2
-        phase.add(frame.time_ns, frame.level_m, inflow_m_s, flow_m3h)
-
-    def take(self, pump: int) -> float:
-        """ρ of the last run of a pump, once; NaN where there is none."""
-        return self._log_ratio.pop(pump, math.nan)
-
-    def _end(self) -> None:
-        """Keep what the phase that ends has told."""
-        phase = self._phase
-        if phase is None or phase.samples < MIN_SAMPLES:
-            return
-        if not any(phase.running):
-            self._idle = phase
-            return
-        idle = self._idle
-        is_alone = sum(phase.running) == 1
-        if not is_alone or idle is None or (phase.begin_ns - idle.end_ns) / NS_PER_S > MAX_AGE_S:
-            return
-        drawn_m3h = self.area_m2 * (idle.slope_m_h - phase.slope_m_h)
-        flow_m3h = phase.flow / phase.samples
-        if drawn_m3h > 0.0:
-            self._log_ratio[phase.running.index(True)] = math.log(max(flow_m3h / drawn_m3h, DEAD_RATIO))
+    running = 0
+    for pump in range(pumps.shape[0]):
+        if pumps[pump]["is_running"]:
+            running |= 1 << pump
+    phase = phases[NOW]
+    if phase["running"] != running or not gap_s <= MAX_GAP_S:
+        _end(phases, area_m2, pumps)
+        _begin(phase, running, time_ns)
+    elif phase["samples"] >= MAX_SAMPLES and running == 0:
+        _end(phases, area_m2, pumps)
+        _begin(phase, running, time_ns - SETTLED_NS)
+    if time_ns - phase["begin_ns"] < SETTLED_NS or math.isnan(frame[LEVEL]):
+        return
+    flow_m3h = 0.0
+    for pump in range(pumps.shape[0]):
+        if pumps[pump]["is_running"]:
+            flow_m3h += frame[FIRST_PUMP + PUMP_VALUES * pump + FLOW]
+    inflow_m_s = 0.0 if math.isnan(frame[INFLOW]) else frame[INFLOW] / 3600.0 / area_m2
+    _add(phase, time_ns, frame[LEVEL], inflow_m_s, flow_m3h)

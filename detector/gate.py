@@ -2,14 +2,30 @@
 
 import math
 from collections import Counter
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.block import (
+    FIRST_PUMP,
+    FLOW,
+    FREQUENCY,
+    HEAD,
+    INFLOW,
+    LEVEL,
+    POWER,
+    PUMP_VALUES,
+    RUNNING,
+    LiveBlock,
+)
 from wetwell.detector.nominal import Nominal
-from wetwell.protocols.readings import PumpReadings, Readings
+from wetwell.protocols.jit import compiled
+from wetwell.protocols.readings import Readings
 from wetwell.protocols.stamps import NS_PER_S
 
-NAN = math.nan
+Floats = npt.NDArray[np.float64]
+
 MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
 MIN_GAP_S = 0.05
@@ -20,8 +36,30 @@ RESENT_SAMPLES = 1000
 """More samples than a bus sends again after a lost link; they come with numbers that were there before."""
 LEVEL_RANGE_M = (-1.0, 100.0)
 POWER_RANGE_KW = (-1.0, 1.0e6)
+CENTURY_S = 3.2e9
 
-Range = tuple[float, float]
+COUNTS = (
+    "samples",
+    "doubled",
+    "late",
+    "future",
+    "clock_steps",
+    "gaps",
+    "lost",
+    "bad_quality",
+    "wrong_pump_count",
+    "missing_values",
+    "out_of_range_values",
+)
+STATE = np.dtype(
+    [(name, np.int64) for name in ("is_begun", "time_ns", "seq", "other_ns", "other_count", *COUNTS)]
+    + [(name, np.float64) for name in ("gap_s", "seen_s")]
+)
+"""Stamp and number of the last sample let through, of the last one that disagreed, counts, time since the sample
+before, and the time in all that the station has been seen."""
+RANGES = np.dtype(
+    [(f"{end}_{name}", np.float64) for name in ("frequency_hz", "flow_m3h", "head_m") for end in ("low", "high")]
+)
 
 
 class PumpFrame(NamedTuple):
@@ -46,6 +84,14 @@ class Frame(NamedTuple):
     inflow_m3h: float
     pumps: tuple[PumpFrame, ...]
 
+    def values(self) -> list[float]:
+        """The values in the order of a block."""
+        return [
+            self.level_m,
+            self.inflow_m3h,
+            *(math.nan if v is None else float(v) for pump in self.pumps for v in pump),
+        ]
+
 
 class Gate:
     """Lets samples through in the order of their time, with values that can be.
@@ -63,19 +109,15 @@ class Gate:
     """
 
     def __init__(self, nominal: Nominal) -> None:
-        self._last_ns: int | None = None
-        self._other_ns: int | None = None
-        self._other_count = 0
-        self._last_seq: int | None = None
-        self._ranges: list[tuple[Range, Range, Range]] = [
-            (
-                (-0.5, 2.0 * nominal.frequencies_hz[pump]),
-                (-0.1 * nominal.runout_flow_m3h(pump), 2.0 * nominal.runout_flow_m3h(pump)),
-                (-10.0, 3.0 * nominal.curves[pump][0]),
-            )
-            for pump in range(nominal.pumps)
-        ]
-        self.counts: Counter[str] = Counter()
+        self.state = np.zeros(1, dtype=STATE)
+        self.ranges = np.array([_ranges(nominal, pump) for pump in range(nominal.pumps)], dtype=RANGES)
+        self.frame = np.full(FIRST_PUMP + PUMP_VALUES * nominal.pumps, math.nan)
+        self._live = LiveBlock(nominal.pumps)
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many samples and values were let through, marked or dropped; those that are not 0."""
+        return Counter({name: int(self.state[name][0]) for name in COUNTS if self.state[name][0]})
 
     @property
     def last_ns(self) -> int | None:
@@ -84,85 +126,123 @@ class Gate:
 
     def update(self, sample: Readings) -> Frame | None:
         """Frame of a sample, or None where it is dropped."""
-        self.counts["samples"] += 1
-        gap_s = self._gap_s(sample.time, sample.seq)
-        self._count_lost(sample.seq, is_dropped=gap_s is None)
-        if gap_s is None:
+        time_ns, seq, values, pumps, is_bad = self._live.fill(sample)
+        if not let_through(self.state[0], self.ranges, time_ns[0], seq[0], values[0], pumps, is_bad, self.frame):
             return None
-        if gap_s > MAX_GAP_S:
-            self.counts["gaps"] += 1
-        if sample.quality == "bad":
-            self.counts["bad_quality"] += 1
-            return Frame(sample.time, gap_s, NAN, NAN, tuple(_NOTHING for _ in self._ranges))
-        if len(sample.pumps) != len(self._ranges):
-            self.counts["wrong_pump_count"] += 1
+        level_m, inflow_m3h, *rest = self.frame.tolist()
+        readings = (rest[first : first + PUMP_VALUES] for first in range(0, len(rest), PUMP_VALUES))
         return Frame(
             sample.time,
-            gap_s,
-            self._checked(sample.level_m, LEVEL_RANGE_M),
-            NAN if sample.inflow_m3h is None or not math.isfinite(sample.inflow_m3h) else sample.inflow_m3h,
-            self._pump_frames(sample.pumps),
+            float(self.state["gap_s"][0]),
+            level_m,
+            inflow_m3h,
+            tuple(PumpFrame(f, q, h, p, None if math.isnan(on) else on > 0.0) for f, q, h, p, on in readings),
         )
 
-    def _pump_frames(self, readings: Sequence[PumpReadings]) -> tuple[PumpFrame, ...]:
-        frames = []
-        for reading, (frequency_range, flow_range, head_range) in zip(readings, self._ranges, strict=False):
-            frequency_hz, flow_m3h = reading.frequency_hz, reading.flow_m3h
-            head_m, power_kw = reading.head_m, reading.power_kw
-            if frequency_hz is None or not frequency_range[0] <= frequency_hz <= frequency_range[1]:
-                frequency_hz = self._refused(frequency_hz)
-            if flow_m3h is None or not flow_range[0] <= flow_m3h <= flow_range[1]:
-                flow_m3h = self._refused(flow_m3h)
-            if head_m is None or not head_range[0] <= head_m <= head_range[1]:
-                head_m = self._refused(head_m)
-            if power_kw is None or not POWER_RANGE_KW[0] <= power_kw <= POWER_RANGE_KW[1]:
-                power_kw = self._refused(power_kw)
-            frames.append(PumpFrame(frequency_hz, flow_m3h, head_m, power_kw, reading.running))
-        frames += [_NOTHING] * (len(self._ranges) - len(frames))
-        return tuple(frames)
 
-    def _checked(self, value: float | None, limits: Range) -> float:
-        return value if value is not None and limits[0] <= value <= limits[1] else self._refused(value)
-
-    def _refused(self, value: float | None) -> float:
-        """Count a value that is absent or cannot be; it becomes NaN."""
-        is_missing = value is None or not math.isfinite(value)
-        self.counts["missing_values" if is_missing else "out_of_range_values"] += 1
-        return NAN
-
-    def _count_lost(self, seq: int, *, is_dropped: bool) -> None:
-        if self._last_seq is None:
-            self._last_seq = seq
-            return
-        if self._last_seq + 1 < seq <= self._last_seq + MAX_LOST:  # beyond, the source counts from elsewhere
-            self.counts["lost"] += seq - self._last_seq - 1
-        if seq > self._last_seq or not is_dropped:
-            self._last_seq = seq
-
-    def _gap_s(self, time_ns: int, seq: int) -> float | None:
-        """Seconds since the last sample let through; None if this one is to be dropped."""
-        if self._last_ns is None:
-            self._last_ns = time_ns
-            return 0.0
-        gap_s = (time_ns - self._last_ns) / NS_PER_S
-        if MIN_GAP_S <= gap_s <= MAX_JUMP_S:
-            self._last_ns = time_ns
-            self._other_ns, self._other_count = None, 0
-            return gap_s
-        if 0.0 <= gap_s < MIN_GAP_S:
-            self.counts["doubled"] += 1
-            return None
-        self.counts["late" if gap_s < 0.0 else "future"] += 1
-        follows = self._other_ns is not None and 0.0 < (time_ns - self._other_ns) / NS_PER_S <= MAX_JUMP_S
-        self._other_count = self._other_count + 1 if follows else 1
-        self._other_ns = time_ns
-        is_new = self._last_seq is None or seq > self._last_seq
-        if self._other_count < (CONFIRMATIONS if is_new else RESENT_SAMPLES):
-            return None
-        self.counts["clock_steps"] += 1
-        self._last_ns = time_ns
-        self._other_ns, self._other_count = None, 0
-        return math.inf
+def _ranges(nominal: Nominal, pump: int) -> tuple[float, ...]:
+    """Lowest and highest frequency, flow and head that a pump can show."""
+    runout_m3h = nominal.runout_flow_m3h(pump)
+    return (
+        -0.5,
+        2.0 * nominal.frequencies_hz[pump],
+        -0.1 * runout_m3h,
+        2.0 * runout_m3h,
+        -10.0,
+        3.0 * nominal.curves[pump][0],
+    )
 
 
-_NOTHING = PumpFrame(NAN, NAN, NAN, NAN, None)
+@compiled
+def seconds_between(earlier_ns: int, later_ns: int) -> float:
+    """Time between stamps, to the nanosecond but for those that lie so far apart that their difference overflows."""
+    about_s = later_ns / NS_PER_S - earlier_ns / NS_PER_S
+    if abs(about_s) > CENTURY_S:
+        return about_s
+    return (later_ns - earlier_ns) / NS_PER_S
+
+
+@compiled
+def _is_in_order(state: Any, time_ns: int, seq: int) -> bool:
+    """Whether a sample is let through; its gap is noted."""
+    if not state["is_begun"]:
+        state["gap_s"] = 0.0
+        return True
+    gap_s = seconds_between(state["time_ns"], time_ns)
+    if MIN_GAP_S <= gap_s <= MAX_JUMP_S:
+        state["gap_s"] = gap_s
+        return True
+    if 0.0 <= gap_s < MIN_GAP_S:
+        state["doubled"] += 1
+        return False
+    if gap_s < 0.0:
+        state["late"] += 1
+    else:
+        state["future"] += 1
+    follows = state["other_count"] > 0 and 0.0 < seconds_between(state["other_ns"], time_ns) <= MAX_JUMP_S
+    state["other_count"] = state["other_count"] + 1 if follows else 1
+    state["other_ns"] = time_ns
+    if state["other_count"] < (CONFIRMATIONS if seq > state["seq"] else RESENT_SAMPLES):
+        return False
+    state["clock_steps"] += 1
+    state["gap_s"] = math.inf
+    return True
+
+
+@compiled
+def _count_lost(state: Any, seq: int, is_let_through: bool) -> None:
+    last = state["seq"]
+    if state["is_begun"] and 1 < seq - last <= MAX_LOST:  # beyond, the source counts from elsewhere
+        state["lost"] += seq - last - 1
+    if seq > last or is_let_through:
+        state["seq"] = seq
+
+
+@compiled
+def _checked(state: Any, value: float, low: float, high: float) -> float:
+    """The value, or NaN, and counted, where it is absent or cannot be."""
+    if low <= value <= high:
+        return value
+    if math.isfinite(value):
+        state["out_of_range_values"] += 1
+    else:
+        state["missing_values"] += 1
+    return math.nan
+
+
+@compiled
+def let_through(
+    state: Any, ranges: Any, time_ns: int, seq: int, values: Floats, pumps: int, is_bad: bool, frame: Floats
+) -> bool:
+    """Whether a sample passes; then `frame` holds its values."""
+    state["samples"] += 1
+    is_let_through = _is_in_order(state, time_ns, seq)
+    _count_lost(state, seq, is_let_through)
+    if not is_let_through:
+        return False
+    state["is_begun"] = 1
+    state["time_ns"] = time_ns
+    state["other_count"] = 0
+    if state["gap_s"] > MAX_GAP_S:
+        state["gaps"] += 1
+    if math.isfinite(state["gap_s"]):
+        state["seen_s"] += state["gap_s"]
+    frame[:] = math.nan
+    if is_bad:
+        state["bad_quality"] += 1
+        return True
+    if pumps != ranges.shape[0]:
+        state["wrong_pump_count"] += 1
+    frame[LEVEL] = _checked(state, values[LEVEL], LEVEL_RANGE_M[0], LEVEL_RANGE_M[1])
+    if math.isfinite(values[INFLOW]):
+        frame[INFLOW] = values[INFLOW]
+    for pump in range(min(pumps, ranges.shape[0])):
+        limits, at = ranges[pump], FIRST_PUMP + PUMP_VALUES * pump
+        frame[at + FREQUENCY] = _checked(
+            state, values[at + FREQUENCY], limits["low_frequency_hz"], limits["high_frequency_hz"]
+        )
+        frame[at + FLOW] = _checked(state, values[at + FLOW], limits["low_flow_m3h"], limits["high_flow_m3h"])
+        frame[at + HEAD] = _checked(state, values[at + HEAD], limits["low_head_m"], limits["high_head_m"])
+        frame[at + POWER] = _checked(state, values[at + POWER], POWER_RANGE_KW[0], POWER_RANGE_KW[1])
+        frame[at + RUNNING] = values[at + RUNNING]
+    return True

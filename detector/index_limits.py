@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.evidence import index_figures
+from wetwell.detector.robust import quantiles
 from wetwell.detector.runs import Segments
 from wetwell.detector.tangent import attribution_index
 
@@ -40,8 +41,8 @@ class IndexLimits:
         """(system below, pump above)."""
         if not self._healthy:
             return SYSTEM_BELOW, PUMP_ABOVE
-        low, high = np.quantile(np.array(self._healthy), [OUTER_SHARE, 1.0 - OUTER_SHARE])
-        return min(float(low), SYSTEM_BELOW), max(float(high), PUMP_ABOVE)
+        low, high = quantiles(np.array(self._healthy), (OUTER_SHARE, 1.0 - OUTER_SHARE))
+        return min(low, SYSTEM_BELOW), max(high, PUMP_ABOVE)
 
     def figures(self, segments: Segments, baseline: Baseline, rng: np.random.Generator) -> dict[str, Any]:
         """Index, its interval, the limits, and what the index alone says: "pump", "system" or nothing."""

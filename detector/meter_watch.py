@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.gate import Frame
-from wetwell.detector.robust import NORMAL_MEDIAN
+from wetwell.detector.block import FIRST_PUMP, FLOW, LEVEL, PUMP_VALUES
+from wetwell.detector.robust import NORMAL_MEDIAN, median
 from wetwell.detector.runs import Run
+from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 
 Floats = npt.NDArray[np.float64]
@@ -25,59 +25,76 @@ DIFFERENCE_MEDIAN = NORMAL_MEDIAN / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
 
 
-@cache
-def _names(pump: int) -> tuple[str, str, str]:
-    return f"pump{pump}_flow_m3h", f"pump{pump}_head_m", f"pump{pump}_power_kw"
+METERS = ("flow_m3h", "head_m", "power_kw")
+"""Of a pump, watched beside the level."""
+METER = np.dtype(
+    [(name, np.int64) for name in ("is_followed", "is_stuck", "since_ns", "longest_ns")] + [("last", np.float64)]
+)
+"""Whether the frame before had a reading too, whether that is stuck, since when it repeats itself, how long it ever
+did while it was learnt."""
 
 
-@dataclass(slots=True)
-class RepeatWatch:
-    """Counts how long each reading other than 0 repeats itself exactly, in frames that follow one another.
+def new_meters(pumps: int) -> npt.NDArray[np.void]:
+    """State of the level and of three meters a pump."""
+    return np.zeros(1 + len(METERS) * pumps, dtype=METER)
+
+
+def stuck_names(pump: int, bits: int) -> list[str]:
+    """Names of the readings that were stuck in a run of a pump (from 0)."""
+    names = ("level_m", *(f"pump{pump + 1}_{name}" for name in METERS))
+    return sorted(name for bit, name in enumerate(names) if bits >> bit & 1)
+
+
+@compiled
+def _note(meter: Any, value: float, time_ns: int, gap_s: float, is_learning: bool) -> None:
+    is_next = meter["is_followed"] and gap_s <= MAX_GAP_S
+    meter["is_followed"] = 1
+    if not is_next or value != meter["last"]:
+        meter["last"] = value
+        meter["since_ns"] = time_ns
+        meter["is_stuck"] = 0
+        return
+    lasts_ns = time_ns - meter["since_ns"]
+    if meter["is_stuck"]:
+        return
+    if is_learning:
+        meter["longest_ns"] = max(lasts_ns, meter["longest_ns"])
+    elif lasts_ns > max(STUCK_NS, STUCK_FACTOR * meter["longest_ns"]):
+        meter["is_stuck"] = 1
+
+
+@compiled
+def watch_meters(meters: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any) -> None:
+    """Note how long each reading other than 0 repeats itself exactly, in frames that follow one another.
 
     A feed that reports by exception, or in coarse steps, repeats itself in health: what the readings of a pump do
     while it is learnt is remembered, and what the level does while no pump is known.
 
-    Memory: constant.
+    Parameters
+    ----------
+    meters : new_meters(pumps)
+    time_ns, gap_s, frame
+        A sample that has passed the gate.
+    pumps : (pumps,) records
+        `is_running` and `is_learning` are read; `stuck` gathers, while a pump runs, a bit for each that is stuck.
     """
-
-    frame_ns: int = 0
-    last: dict[str, float] = field(default_factory=dict)
-    seen_ns: dict[str, int] = field(default_factory=dict)
-    since_ns: dict[str, int] = field(default_factory=dict)
-    longest_ns: dict[str, int] = field(default_factory=dict)
-    stuck: set[str] = field(default_factory=set)
-
-    def update(self, frame: Frame, running: Sequence[bool], is_learning: Sequence[bool]) -> None:
-        """Take a frame into account: which pumps run, and which are in their learning phase."""
-        self._note("level_m", frame.level_m, frame, all(is_learning))
-        for index, pump in enumerate(frame.pumps):
-            if not running[index] and pump.flow_m3h == 0.0:
-                continue
-            flow, head, power = _names(index + 1)
-            if pump.flow_m3h != 0.0:
-                self._note(flow, pump.flow_m3h, frame, is_learning[index])
-            if running[index]:
-                if pump.head_m != 0.0:
-                    self._note(head, pump.head_m, frame, is_learning[index])
-                if pump.power_kw != 0.0:
-                    self._note(power, pump.power_kw, frame, is_learning[index])
-        self.frame_ns = frame.time_ns
-
-    def _note(self, name: str, value: float, frame: Frame, is_learning: bool) -> None:
-        is_next = self.seen_ns.get(name) == self.frame_ns and frame.gap_s <= MAX_GAP_S
-        self.seen_ns[name] = frame.time_ns
-        if not is_next or value != self.last[name]:
-            self.last[name] = value
-            self.since_ns[name] = frame.time_ns
-            self.stuck.discard(name)
-            return
-        lasts_ns = frame.time_ns - self.since_ns[name]
-        if name in self.stuck:
-            return
-        if is_learning:
-            self.longest_ns[name] = max(lasts_ns, self.longest_ns.get(name, 0))
-        elif lasts_ns > max(STUCK_NS, STUCK_FACTOR * self.longest_ns.get(name, 0)):
-            self.stuck.add(name)
+    is_learning = True
+    for pump in range(pumps.shape[0]):
+        is_learning = is_learning and pumps[pump]["is_learning"] != 0
+    _note(meters[0], frame[LEVEL], time_ns, gap_s, is_learning)
+    for pump in range(pumps.shape[0]):
+        state, at = pumps[pump], FIRST_PUMP + PUMP_VALUES * pump + FLOW
+        for number in range(len(METERS)):
+            meter, value = meters[1 + len(METERS) * pump + number], frame[at + number]
+            if value != 0.0 and (state["is_running"] or number == 0):
+                _note(meter, value, time_ns, gap_s, state["is_learning"] != 0)
+            else:
+                meter["is_followed"] = 0
+        if state["is_running"]:
+            bits = meters[0]["is_stuck"]
+            for number in range(len(METERS)):
+                bits |= meters[1 + len(METERS) * pump + number]["is_stuck"] << (1 + number)
+            state["stuck"] |= bits
 
 
 def reading_noise(run: Run) -> Floats:
@@ -91,7 +108,7 @@ def reading_noise(run: Run) -> Floats:
     if np.count_nonzero(is_next) < MIN_DIFFERENCES:
         return np.full(2, math.nan)
     noise = [
-        DIFFERENCE_MEDIAN * float(np.median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
+        DIFFERENCE_MEDIAN * float(median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
         for values in (run.flow_m3h, run.head_m)
     ]
     return np.array(noise)
@@ -100,7 +117,7 @@ def reading_noise(run: Run) -> Floats:
 def healthy_noise(noises: Sequence[Floats]) -> Floats:
     """(2,) median of the noise of healthy runs, NaN where it was never known."""
     known = np.array([noise for noise in noises if np.isfinite(noise).all()])
-    return np.median(known, axis=0) if len(known) else np.full(2, math.nan)
+    return median(known) if len(known) else np.full(2, math.nan)
 
 
 def noisy_meters(run: Run, healthy: Floats) -> Mapping[str, float]:

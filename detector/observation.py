@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import MIN_RUNS, Baseline, Curve
 from wetwell.detector.meter_faults import flow_meter_direction, head_sensor_direction
-from wetwell.detector.robust import NORMAL_MEDIAN, step_variance
+from wetwell.detector.robust import NORMAL_MEDIAN, median, step_variance
 from wetwell.detector.runs import Run
 
 Floats = npt.NDArray[np.float64]
@@ -40,8 +40,8 @@ def learn_check(values: Sequence[float]) -> Check:
     known = np.array([value for value in values if math.isfinite(value)])
     if len(known) < MIN_RUNS:
         return Check(mean=math.nan, variance=math.nan)
-    middle = float(np.median(known))
-    deviation = NORMAL_MEDIAN * float(np.median(np.abs(known - middle)))
+    middle = float(median(known))
+    deviation = NORMAL_MEDIAN * float(median(np.abs(known - middle)))
     return Check(mean=middle, variance=max(deviation, CHECK_FLOOR) ** 2 * (1.0 + 1.0 / len(known)))
 
 
@@ -114,8 +114,8 @@ def observe(
     """
     segments = run.segments
     shifts_m = baseline.shifts(segments)
-    flow_m3h, total_m3h = float(np.median(segments.flow_m3h)), float(np.median(segments.total_m3h))
-    level_m = float(np.median(segments.level_m))
+    flow_m3h, total_m3h = float(median(segments.flow_m3h)), float(median(segments.total_m3h))
+    level_m = float(median(segments.level_m))
     healthy_flow_m3h, healthy_total_m3h = baseline.explained_flows(segments)
     healthy_variance = baseline.variances(
         _towards(healthy_flow_m3h, flow_m3h, baseline.flow_scatter),
@@ -127,10 +127,10 @@ def observe(
     covariance[:2, :2] = _noise(shifts_m, baseline) + baseline.run_covariance + np.diag(healthy_variance)
     covariance[DRAWDOWN, DRAWDOWN] = drawdown[1].variance
     covariance[POWER, POWER] = power.variance
-    speed_ratio = float(np.median(segments.speed_ratio))
+    speed_ratio = float(median(segments.speed_ratio))
     direction = flow_meter_direction(flow_m3h, flow_m3h * speed_ratio, total_m3h, curve, friction_h2_m5)
     return Observation(
-        mean=np.array([*np.median(shifts_m, axis=0), drawdown[0] - drawdown[1].mean, log_power(run) - power.mean]),
+        mean=np.array([*median(shifts_m), drawdown[0] - drawdown[1].mean, log_power(run) - power.mean]),
         covariance=covariance,
         slope_variance=slope_variance,
         flow_meter=np.array([*direction, 1.0, 0.0]),

@@ -6,16 +6,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.belief import SystemBelief, joint_prior, remember
+from wetwell.detector.block import Block, LiveBlock
 from wetwell.detector.decision import decide
 from wetwell.detector.dispatch import Costs, advice, expected_costs
-from wetwell.detector.drawdown import Drawdown
+from wetwell.detector.drawdown import new_phases
 from wetwell.detector.evidence import f_test_figures, run_evidence, shift_evidence
-from wetwell.detector.gate import Frame, Gate
+from wetwell.detector.gate import Gate
+from wetwell.detector.kernel import BEGIN, DONE, ENDED, FULL, GOES_ON, LOOK, advance
 from wetwell.detector.learning import sibling_objection
-from wetwell.detector.meter_watch import RepeatWatch, noisy_meters
+from wetwell.detector.meter_watch import new_meters, noisy_meters, stuck_names
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.observation import PUMP, SYSTEM, observe
 from wetwell.detector.posterior import (
@@ -30,13 +33,14 @@ from wetwell.detector.posterior import (
     fault_scales,
     weigh,
 )
-from wetwell.detector.pump_record import Knowledge, PumpRecord
+from wetwell.detector.pump_record import ROLLING_SAMPLES, Knowledge, PumpRecord
+from wetwell.detector.robust import median
+from wetwell.detector.rolling_f_test import RollingFTest
 from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, SEGMENT_SAMPLES, Run, RunTracker
 from wetwell.detector.severity import severity
 from wetwell.detector.snapshot import decode_snapshot, encode_snapshot
 from wetwell.protocols.messages import State, Verdict
 from wetwell.protocols.readings import Readings
-from wetwell.protocols.stamps import NS_PER_S
 
 EARLY_PROBABILITY = 0.999
 EARLY_SEGMENTS = 2
@@ -45,7 +49,7 @@ WRONG = ("stuck", "dead", "lost", "noisy")
 """What a meter can be without any doubt."""
 DEAD_LOG_RATIO = -1.5
 """A flow meter that shows less than a fifth of what leaves the wet well, against health, is dead."""
-_STATE = ("_gate", "_runs", "_drawdown", "_repeats", "_system", "_pumps", "_seen_s", "_is_new")
+_ARRAYS = ("gate", "pumps", "rows", "phases", "meters", "windows", "moments", "counts")
 
 
 class Detector:
@@ -76,12 +80,12 @@ class Detector:
         self._costs = costs or Costs()
         self._gate = Gate(nominal)
         self._runs = RunTracker(nominal)
-        self._drawdown = Drawdown(nominal.area_m2)
-        self._repeats = RepeatWatch()
+        self._phases = new_phases()
+        self._meters = new_meters(nominal.pumps)
+        self._rolling = RollingFTest(ROLLING_SAMPLES, nominal.pumps)
+        self._live = LiveBlock(nominal.pumps)
         self._system = SystemBelief()
         self._pumps = [PumpRecord() for _ in range(nominal.pumps)]
-        self._seen_s = 0.0
-        self._is_new = True
 
     @property
     def counts(self) -> dict[str, int]:
@@ -95,29 +99,39 @@ class Detector:
 
     def update(self, sample: Readings) -> tuple[Verdict, ...]:
         """Verdicts that a sample brings."""
-        frame = self._gate.update(sample)
-        if frame is None:
-            return ()
+        return tuple(self.take(self._live.fill(sample)))
+
+    def take(self, block: Block) -> list[Verdict]:
+        """Verdicts that a block of samples brings; the same as if they came one by one."""
         verdicts: list[Verdict] = []
-        if self._is_new:
-            self._is_new = False
-            verdicts += [self._told(pump, frame.time_ns, (frame.time_ns,) * 2, "begins") for pump in self._every()]
-        if math.isfinite(frame.gap_s):
-            self._seen_s += frame.gap_s
-        ended = self._runs.update(frame)
-        running = self._runs.running
-        is_any_running = True in running
-        self._drawdown.update(frame, running)
-        for run in ended + self._runs.newly_blind_runs() if is_any_running else ended:
-            told_ns = max(frame.time_ns, run.window_ns[1])  # the clock may have been set back
-            verdicts.append(self._judge(run, told_ns))
-        self._watch(frame, running)
-        if not is_any_running:
-            return tuple(verdicts)
-        for index, steady in self._runs.steady_samples():
-            self._pumps[index].rolling.update(frame.time_ns / NS_PER_S, *steady)
-            verdicts += self._look_early(index, frame.time_ns)
-        return tuple(verdicts)
+        if not self._gate.state["is_begun"][0] and len(block.time_ns):
+            begin_ns = int(block.time_ns[0])
+            verdicts += [self._told(pump, begin_ns, (begin_ns, begin_ns), "begins") for pump in self._every()]
+        row, stop = advance(0, BEGIN, *block, *self._arrays())
+        while stop != DONE:
+            verdicts += self._stopped(stop)
+            row, stop = advance(row, GOES_ON[stop], *block, *self._arrays())
+        return verdicts
+
+    def _stopped(self, stop: int) -> list[Verdict]:
+        """Verdicts where the loop over the samples has stopped."""
+        now_ns = int(self._gate.state["time_ns"][0])
+        if stop == FULL:
+            self._runs.make_room()
+            return []
+        if stop == LOOK:
+            return [verdict for pump in self._runs.full_pumps() for verdict in self._look_early(pump, now_ns)]
+        runs = self._runs.take_ended(now_ns) if stop == ENDED else self._runs.newly_blind_runs()
+        return [self._judge(run, max(now_ns, run.window_ns[1])) for run in runs]  # the clock may have been set back
+
+    def _arrays(self) -> tuple[Any, ...]:
+        """The state that the loop over the samples changes."""
+        gate, runs, rolling = self._gate, self._runs, self._rolling
+        return (
+            *(runs.table, gate.state, gate.ranges, gate.frame, runs.pumps, runs.rows),
+            *(self._phases, self._nominal.area_m2, self._meters),
+            *(rolling.windows, rolling.moments, rolling.counts),
+        )
 
     def finish(self) -> tuple[Verdict, ...]:
         """Verdicts on the runs that are still open at the end of a recording."""
@@ -126,7 +140,8 @@ class Detector:
 
     def snapshot(self) -> bytes:
         """The whole state, from which `restore` goes on bit for bit."""
-        state = {name: getattr(self, name) for name in _STATE}
+        arrays = dict(zip(_ARRAYS, self._stateful_arrays(), strict=True))
+        state = {"arrays": arrays, "system": self._system, "pumps": self._pumps}
         return encode_snapshot(self._station, self._nominal, state)
 
     def restore(self, data: bytes) -> None:
@@ -137,20 +152,43 @@ class Detector:
         SnapshotError
             If it is damaged, of another format or station; this detector is left as it was.
         """
-        for name, value in decode_snapshot(data, self._station, self._nominal).items():
-            setattr(self, name, value)
+        state = decode_snapshot(data, self._station, self._nominal)
+        self._runs.rows = np.empty_like(state["arrays"]["rows"])
+        for name, array in zip(_ARRAYS, self._stateful_arrays(), strict=True):
+            array[...] = state["arrays"][name]
+        self._system, self._pumps = state["system"], state["pumps"]
+
+    def _stateful_arrays(self) -> tuple[npt.NDArray[Any], ...]:
+        gate, runs, rolling = self._gate, self._runs, self._rolling
+        return (
+            *(gate.state, runs.pumps, runs.rows, self._phases, self._meters),
+            *(rolling.windows, rolling.moments, rolling.counts),
+        )
 
     def rebaseline(self, pump: int, now_ns: int) -> Verdict:
         """Learn a pump (from 0) anew; what was learnt before is put aside and can be taken back."""
         self._pumps[pump].rebaseline(self._seen_s)
+        self._begin_anew(pump)
         self._system = SystemBelief()
         return self._told(pump, now_ns, (now_ns, now_ns), "re-baselined by an operator")
 
     def revert(self, pump: int, now_ns: int) -> Verdict:
         """Take the baseline of a pump (from 0) back that was put aside last; without one nothing changes."""
         is_back = self._pumps[pump].revert()
+        if is_back:
+            self._begin_anew(pump)
         reason = "baseline taken back by an operator" if is_back else "no baseline was put aside"
         return self._told(pump, now_ns, (now_ns, now_ns), reason)
+
+    @property
+    def _seen_s(self) -> float:
+        """Time that the station has been seen."""
+        return float(self._gate.state["seen_s"][0])
+
+    def _begin_anew(self, pump: int) -> None:
+        """Forget what the open run has shown under another baseline."""
+        self._runs.pumps["stuck"][pump] = 0
+        self._runs.pumps["is_learning"][pump] = self._pumps[pump].known is None
 
     def _every(self) -> range:
         return range(len(self._pumps))
@@ -162,23 +200,14 @@ class Detector:
             evidence["baseline"] = pump.known.version
         return self._verdict(index, time_ns, window_ns, {pump.state: 1.0}, evidence)
 
-    def _watch(self, frame: Frame, running: tuple[bool, ...]) -> None:
-        self._repeats.update(frame, running, [pump.known is None for pump in self._pumps])
-        for index, is_running in enumerate(running):
-            if is_running:
-                pump = self._pumps[index]
-                pump.run_s += frame.gap_s if math.isfinite(frame.gap_s) else 0.0
-                if self._repeats.stuck:
-                    prefixes = ("level_m", f"pump{index + 1}_")
-                    pump.stuck.update(name for name in self._repeats.stuck if name.startswith(prefixes))
-
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         """Verdict on a run that has ended."""
         pump = self._pumps[run.pump]
         pump.early = None
         pump.cusum.reset()
-        log_ratio = self._drawdown.take(run.pump)
-        stuck, pump.stuck = sorted(pump.stuck), set()
+        running = self._runs.pumps[run.pump]
+        log_ratio, running["log_ratio"] = float(running["log_ratio"]), math.nan
+        stuck, running["stuck"] = stuck_names(run.pump, int(running["stuck"])), 0
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s)}
         if run.missing:
             evidence["missing"] = sorted(run.missing)
@@ -197,7 +226,7 @@ class Detector:
             return self._verdict(run.pump, time_ns, run.window_ns, {"learning": 1.0}, evidence)
         weighed = self._weigh(run, pump.known, log_ratio, evidence)
         remember(weighed.probability, pump.belief, self._system)
-        state, remark = decide(weighed, float(np.median(run.head_m)))
+        state, remark = decide(weighed, float(median(run.head_m)))
         pump.recent.append((sum(run.window_ns) // 2, weighed.shift_m))
         wrong = self._doubtful_meters(run, pump.known, stuck)
         evidence |= wrong
@@ -262,19 +291,18 @@ class Detector:
         if pump.known is None or not filled:
             return []
         baseline = pump.known.baseline
-        last = self._runs.last_segments(index, 1)
         deviation_m = np.sqrt(np.diag(baseline.segment_covariance + baseline.run_covariance))
-        since = pump.cusum.update(baseline.shifts(last.segments)[0], deviation_m)
-        if since < EARLY_SEGMENTS or pump.stuck:
+        since = pump.cusum.update(baseline.shifts(self._runs.last_segment(index))[0], deviation_m)
+        if since < EARLY_SEGMENTS or self._runs.pumps["stuck"][index]:
             pump.early = None
             return []
         run = self._runs.last_segments(index, min(since, filled))
-        is_dry = np.median(run.total_flow_m3h) < NO_FLOW_SHARE * self._nominal.runout_flow_m3h(index)
+        is_dry = median(run.total_flow_m3h) < NO_FLOW_SHARE * self._nominal.runout_flow_m3h(index)
         if is_dry and math.isfinite(pump.known.drawdown.mean):
             return []  # the drawdown will tell at the end of the run whether the flow meter is dead
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
         weighed = self._weigh(run, pump.known, math.nan, evidence)
-        state, remark = decide(weighed, float(np.median(run.head_m)))
+        state, remark = decide(weighed, float(median(run.head_m)))
         is_sure = state in FAULTS and weighed.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum() > EARLY_PROBABILITY
         previous, pump.early = pump.early, state if is_sure else None
         if pump.early is None or pump.early != previous or state == pump.state:
@@ -298,6 +326,7 @@ class Detector:
         doubt = sibling_objection(run.pump, offsets_m, self._nominal.curves)
         if doubt is None:
             pump.settle(baseline, time_ns, self._seen_s)
+            self._runs.pumps["is_learning"][run.pump] = 0
         else:
             pump.learning.reason = doubt
 
@@ -320,11 +349,11 @@ class Detector:
     ) -> dict[str, Any]:
         """Severity, advice and expected costs."""
         known, segments = self._pumps[run.pump].known, run.segments
-        flow_m3h = float(np.median(segments.flow_m3h))
-        friction_m = self._nominal.friction_h2_m5 * float(np.median(segments.total_m3h)) ** 2
+        flow_m3h = float(median(segments.flow_m3h))
+        friction_m = self._nominal.friction_h2_m5 * float(median(segments.total_m3h)) ** 2
         healthy_m3h = known.baseline.explained_flows(segments)[0] if known is not None else flow_m3h
         power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
-        run_share = self._pumps[run.pump].run_s / max(self._seen_s, 1.0)
+        run_share = float(self._runs.pumps["run_s"][run.pump]) / max(self._seen_s, 1.0)
         wasted_kwh = power_kw * 24.0 * run_share * max(1.0 - flow_m3h / max(healthy_m3h, 1e-9), 0.0)
         curve = self._nominal.curves[run.pump]
         figures: dict[str, Any] = {
@@ -343,7 +372,7 @@ class Detector:
         evidence: dict[str, Any],
     ) -> Verdict:
         pump = self._pumps[index]
-        rolling = pump.rolling.value()
+        rolling = self._rolling.value(index)
         if rolling is not None:
             evidence["rolling_f_test"] = {
                 "pump": f_test_figures(rolling.pump),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.nominal import Nominal
@@ -36,6 +36,14 @@ LOSING_SHARE = 0.95
 """Of pump faults: the curve falls. A pump that gets better has been cleaned, or was not healthy when learnt."""
 RISING_SHARE = 0.9
 """Of system faults: the main takes more head. One that takes less may have burst."""
+
+
+_CAUSES = (PUMP_FAULT, SYSTEM_FAULT, BOTH, FLOW_METER, HEAD_SENSOR)
+_HYPOTHESES = np.array([NORMAL, *_CAUSES * len(SCALES)])
+_LOG_SCALE = np.where(_HYPOTHESES == NORMAL, 0.0, -np.log(len(SCALES)))
+_MOVES_POWER = np.where(np.isin(_HYPOTHESES, (FLOW_METER, HEAD_SENSOR)), DISTURBED_SHARE, LOAD_SHARE)
+_FOLLOWED = np.column_stack([1.0 - _MOVES_POWER, _MOVES_POWER])
+"""Share of runs in which the power stays, and in which it moves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,27 +85,33 @@ def _ways(
     """
     tau_p, tau_s = scales.pump_m**2, scales.system_m**2
     v_p, v_s = observation.slope_variance
-    flow, head = (np.outer(direction, direction) for direction in (observation.flow_meter, observation.head_sensor))
-    causes = [(NORMAL, np.zeros((4, 4)))]
-    for scale in SCALES:
-        causes += [
-            (PUMP_FAULT, np.diag([scale * tau_p, v_s, 0.0, 0.0])),
-            (SYSTEM_FAULT, np.diag([v_p, scale * tau_s, 0.0, 0.0])),
-            (BOTH, np.diag([scale * tau_p + v_p, scale * tau_s + v_s, 0.0, 0.0])),
-            (FLOW_METER, scale * FLOW_METER_ERROR**2 * flow),
-            (HEAD_SENSOR, scale * scales.head_m**2 * head),
-        ]
-    ways = []
-    for hypothesis, matrix in causes:
-        log_scale = 0.0 if hypothesis == NORMAL else -np.log(len(SCALES))
-        followed = DISTURBED_SHARE if hypothesis in (FLOW_METER, HEAD_SENSOR) else LOAD_SHARE
-        for drawdown in (0.0, DISTURBED_DRAWDOWN**2) if known[DRAWDOWN] else (0.0,):
-            for power in (0.0, POWER_SHIFT**2) if known[POWER] else (0.0,):
-                share = (DISTURBED_SHARE if drawdown else 1.0 - DISTURBED_SHARE) if known[DRAWDOWN] else 1.0
-                share *= (followed if power else 1.0 - followed) if known[POWER] else 1.0
-                ways.append((hypothesis, log_scale + np.log(share), matrix + np.diag([0.0, 0.0, drawdown, power])))
-    hypotheses, log_shares, matrices = zip(*ways, strict=True)
-    return np.array(hypotheses), np.array(log_shares), np.array(matrices)
+    scale = np.array(SCALES)
+    spread = np.zeros((len(_HYPOTHESES), 4, 4))
+    pump, system, both, flow, head = (spread[1 + cause :: len(_CAUSES)] for cause in range(len(_CAUSES)))
+    pump[:, PUMP, PUMP], pump[:, SYSTEM, SYSTEM] = scale * tau_p, v_s
+    system[:, PUMP, PUMP], system[:, SYSTEM, SYSTEM] = v_p, scale * tau_s
+    both[:, PUMP, PUMP], both[:, SYSTEM, SYSTEM] = scale * tau_p + v_p, scale * tau_s + v_s
+    scale = scale[:, np.newaxis, np.newaxis]
+    flow[:] = scale * FLOW_METER_ERROR**2 * np.outer(observation.flow_meter, observation.flow_meter)
+    head[:] = scale * scales.head_m**2 * np.outer(observation.head_sensor, observation.head_sensor)
+    disturbed = (1.0 - DISTURBED_SHARE, DISTURBED_SHARE) if known[DRAWDOWN] else (1.0,)
+    ways = np.repeat(spread, 2 * len(disturbed) if known[POWER] else len(disturbed), axis=0)
+    ways = ways.reshape(len(_HYPOTHESES), len(disturbed), -1, 4, 4)
+    ways[:, 1:, :, DRAWDOWN, DRAWDOWN] += DISTURBED_DRAWDOWN**2
+    ways[:, :, 1:, POWER, POWER] += POWER_SHIFT**2
+    share = np.array(disturbed)[:, np.newaxis]
+    if known[POWER]:
+        share = share * _FOLLOWED[:, np.newaxis]
+    log_share = _LOG_SCALE[:, np.newaxis, np.newaxis] + np.log(share)
+    hypotheses = np.repeat(_HYPOTHESES, ways.shape[1] * ways.shape[2])
+    return hypotheses, np.broadcast_to(log_share, ways.shape[:3]).ravel(), ways.reshape(-1, 4, 4)
+
+
+def _log_sums(log_values: Floats) -> Floats:
+    """Logarithm of the sum of each row of logarithms."""
+    top = log_values.max(axis=1)
+    log_sums: Floats = top + np.log(np.exp(log_values - top[:, np.newaxis]).sum(axis=1))
+    return log_sums
 
 
 def fault_scales(nominal: Nominal, pump: int, baseline: Baseline) -> Scales:
@@ -141,10 +155,10 @@ def weigh(observation: Observation, scales: Scales, prior: Floats) -> Weighed:
     _, log_determinant = np.linalg.slogdet(every)
     inverse = np.linalg.inv(every)
     log_each = log_share - 0.5 * (log_determinant + np.einsum("i,hij,j->h", mean, inverse, mean))
-    each = range(HEAD_SENSOR + 1)
-    log_likelihood = np.array([logsumexp(log_each[hypotheses == hypothesis]) for hypothesis in each])
-    inverse = inverse[[int(np.argmax(hypotheses == hypothesis)) for hypothesis in each]]
-    rows = [int(np.flatnonzero(np.flatnonzero(known) == component)[0]) for component in (PUMP, SYSTEM)]
+    is_of = hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis]
+    log_likelihood = _log_sums(np.where(is_of, log_each, -np.inf))
+    inverse = inverse[is_of.argmax(axis=1)]
+    rows = [int(known[:component].sum()) for component in (PUMP, SYSTEM)]
     estimates = np.array([tau_p, tau_s]) * (inverse[BOTH] @ mean)[rows]
     variances = np.array([tau_p, tau_s]) - np.array([tau_p, tau_s]) ** 2 * np.diag(inverse[BOTH])[rows]
     deviations = np.sqrt(np.maximum(variances, 1e-300))

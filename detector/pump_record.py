@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline, Curve
 from wetwell.detector.belief import PumpBelief
-from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.cusum import Cusum
 from wetwell.detector.index_limits import IndexLimits
 from wetwell.detector.learning import Learning
@@ -78,10 +77,7 @@ class PumpRecord:
     state: State = "learning"
     onset_ns: int | None = None
     early: State | None = None
-    run_s: float = 0.0
-    stuck: set[str] = field(default_factory=set)
     cusum: Cusum = field(default_factory=Cusum)
-    rolling: RollingFTest = field(default_factory=lambda: RollingFTest(ROLLING_SAMPLES))
     limits: IndexLimits = field(default_factory=IndexLimits)
     log_ratios: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
     log_powers: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
@@ -144,7 +140,6 @@ class PumpRecord:
         self.onset_ns, self.early = None, None
         self.limits = IndexLimits()
         self.recent.clear()
-        self.stuck.clear()
         self.cusum.reset()
 
     def _forget(self) -> None:

@@ -1,14 +1,17 @@
 """Pump runs: from start to stop, the steady part cut into segments."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.gate import Frame, PumpFrame
-from wetwell.detector.nominal import Nominal
-from wetwell.detector.residuals import level_residuals
+from wetwell.detector.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
+from wetwell.detector.gate import Frame
+from wetwell.detector.nominal import Nominal, Table, duty_flows
+from wetwell.detector.residuals import distances
+from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 
 Floats = npt.NDArray[np.float64]
@@ -30,12 +33,47 @@ NO_FLOW_SHARE = 0.01
 SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m", "power_kw")
 NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
 """Without these a pump cannot be told from the system."""
-COLUMNS = 9
+NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
 BLIND_S = 60.0
 """A run that has lacked one of them for so long is reported at once."""
+WARM_UP_NS, SETTLING_NS, PART_NS, BLIND_NS = (int(s * NS_PER_S) for s in (WARM_UP_S, SETTLING_S, MAX_RUN_S, BLIND_S))
+
+PUMP = np.dtype(
+    [
+        (name, np.int64)
+        for name in (
+            "is_running",
+            "is_open",
+            "is_ending",
+            "is_steady",
+            "is_reported_blind",
+            "is_blind",
+            "is_learning",
+            "start_ns",
+            "part_ns",
+            "last_ns",
+            "steady_from_ns",
+            "samples",
+            "seen",
+            "stuck",
+        )
+    ]
+    + [(name, np.float64) for name in ("speed_ratio", "duty_speed", "duty_m3h", "run_s", "log_ratio")]
+)
+"""What is known of a pump from sample to sample.
+
+The open run: its start, that of the part being collected, its last sample, when it will be steady, how many steady
+samples it has, a bit for each signal that it has had, and whether one that is needed has never come. Speed and flow
+by the datasheet. For others: whether the pump is being learnt, a bit for each meter that was stuck in the run, time
+that it ran, and the drawdown figure of its last run.
+"""
+COLUMNS = 10
+"""Of a steady sample: pump, time, flow, head, speed ratio, total flow, level, power, both flows by the datasheet."""
+LEAST_ROOM = 256
+SEGMENT_MEANS = 8
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Segments:
     """Means over 25 steady samples each, m of them.
 
@@ -93,19 +131,183 @@ class Run:
     missing: frozenset[str]
 
 
-@dataclass(slots=True)
-class OpenRun:
-    """A run that goes on."""
+def new_pumps(nominal: Nominal) -> npt.NDArray[np.void]:
+    """State of the pumps of a station before the first sample."""
+    pumps = np.zeros(nominal.pumps, dtype=PUMP)
+    pumps["speed_ratio"] = pumps["log_ratio"] = math.nan
+    pumps["is_learning"] = 1
+    return pumps
 
-    start_ns: int
-    part_ns: int
-    last_ns: int
-    steady_from_ns: int
-    speed_ratio: float = math.nan
-    rows: list[tuple[float, ...]] = field(default_factory=list)
-    seen: set[str] = field(default_factory=set)
-    is_steady: bool = False
-    is_reported_blind: bool = False
+
+@compiled
+def _says_running(own: Any, frame: Floats, at: int, is_open: bool) -> bool:
+    """Whether a pump runs: by its flag, else by frequency or flow, else as it did."""
+    if not math.isnan(frame[at + RUNNING]):
+        return bool(frame[at + RUNNING] > 0.0)
+    if not math.isnan(frame[at + FREQUENCY]):
+        return bool(frame[at + FREQUENCY] > RUNNING_SHARE * own["frequency_hz"])
+    if not math.isnan(frame[at + FLOW]):
+        return bool(frame[at + FLOW] > RUNNING_SHARE * own["runout_m3h"])
+    return is_open
+
+
+@compiled
+def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
+    pump["steady_from_ns"] = max(pump["steady_from_ns"], now_ns + wait_ns)
+
+
+@compiled
+def note_running(table: Table, pumps: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+    """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
+    is_break = gap_s > BREAK_S
+    is_changed = any_ending = False
+    for number in range(pumps.shape[0]):
+        pump = pumps[number]
+        is_open = pump["is_open"] != 0
+        at = FIRST_PUMP + PUMP_VALUES * number
+        is_running = _says_running(table[number], frame, at, is_open and not is_break)
+        is_changed = is_changed or is_running != (pump["is_running"] != 0)
+        pump["is_running"] = is_running
+        is_over = is_break or not is_running or time_ns - pump["part_ns"] >= PART_NS
+        pump["is_ending"] = is_open and is_over
+        any_ending = any_ending or (is_open and is_over)
+        if is_open and is_break:
+            pump["is_open"] = 0
+    if is_changed:
+        for number in range(pumps.shape[0]):
+            if pumps[number]["is_open"]:
+                _settle(pumps[number], time_ns, WARM_UP_NS)
+    return any_ending
+
+
+@compiled
+def steady_rows(pumps: Any) -> int:
+    """Number of steady samples in all open runs."""
+    rows = 0
+    for number in range(pumps.shape[0]):
+        rows += pumps[number]["samples"]
+    return rows
+
+
+@compiled
+def drop_ended(pumps: Any, rows: Floats, time_ns: int) -> None:
+    """Close the runs that end, and begin the next part of those that go on."""
+    kept = 0
+    for row in range(steady_rows(pumps)):
+        if not pumps[int(rows[row, 0])]["is_ending"]:
+            for column in range(COLUMNS):
+                rows[kept, column] = rows[row, column]
+            kept += 1
+    for number in range(pumps.shape[0]):
+        pump = pumps[number]
+        if pump["is_ending"]:
+            pump["is_ending"] = pump["samples"] = pump["seen"] = 0
+            pump["is_open"] = pump["is_open"] and pump["is_running"]
+            pump["part_ns"] = time_ns
+
+
+@compiled
+def _note_duty(table: Table, pumps: Any, frame: Floats) -> None:
+    """Flows by the datasheet; worked out anew only when a speed has changed."""
+    is_new = False
+    for number in range(pumps.shape[0]):
+        pump, frequency_hz = pumps[number], frame[FIRST_PUMP + PUMP_VALUES * number + FREQUENCY]
+        speed = frequency_hz / table[number]["frequency_hz"] if pump["is_running"] and frequency_hz > 0.0 else 0.0
+        is_new = is_new or speed != pump["duty_speed"]
+        pump["duty_speed"] = speed
+    if is_new:
+        duty_flows(table, pumps)
+
+
+@compiled
+def _collect(table: Table, pumps: Any, number: int, time_ns: int, frame: Floats, rows: Floats, row: int) -> bool:
+    """Take the frame into the open run of a pump; whether it is steady, and so has become this row."""
+    pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
+    flow_m3h, head_m = frame[at + FLOW], frame[at + HEAD]
+    for bit, value in enumerate((frame[at + FREQUENCY], flow_m3h, head_m, frame[LEVEL], frame[at + POWER])):
+        if not math.isnan(value):
+            pump["seen"] |= 1 << bit
+    speed_ratio = frame[at + FREQUENCY] / own["frequency_hz"]
+    if not abs(speed_ratio - pump["speed_ratio"]) <= SPEED_STEP:
+        pump["speed_ratio"] = speed_ratio
+        _settle(pump, time_ns, SETTLING_NS)
+    is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
+    if time_ns < pump["steady_from_ns"] or not is_usable or math.isnan(flow_m3h + head_m):
+        return False
+    _note_duty(table, pumps, frame)
+    total_m3h, duty_total_m3h = flow_m3h, pump["duty_m3h"]
+    if own["is_common_header"]:
+        total_m3h = duty_total_m3h = 0.0
+        for other in range(pumps.shape[0]):
+            duty_total_m3h += pumps[other]["duty_m3h"]
+            if pumps[other]["is_running"]:
+                total_m3h += frame[FIRST_PUMP + PUMP_VALUES * other + FLOW]
+        if math.isnan(total_m3h):
+            return False
+    rows[row, 0] = number
+    rows[row, 1] = (time_ns - pump["part_ns"]) / NS_PER_S
+    rows[row, 2] = flow_m3h
+    rows[row, 3] = head_m
+    rows[row, 4] = speed_ratio
+    rows[row, 5] = total_m3h
+    rows[row, 6] = frame[LEVEL]
+    rows[row, 7] = frame[at + POWER]
+    rows[row, 8] = pump["duty_m3h"] / speed_ratio
+    rows[row, 9] = duty_total_m3h
+    return True
+
+
+@compiled
+def collect(table: Table, pumps: Any, time_ns: int, frame: Floats, rows: Floats) -> bool:
+    """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind."""
+    row = steady_rows(pumps)
+    any_blind = False
+    for number in range(pumps.shape[0]):
+        pump = pumps[number]
+        pump["is_steady"] = pump["is_blind"] = 0
+        if not pump["is_running"]:
+            continue
+        if not pump["is_open"]:
+            pump["is_open"] = 1
+            pump["is_reported_blind"] = pump["samples"] = pump["seen"] = 0
+            pump["start_ns"] = pump["part_ns"] = time_ns
+            pump["steady_from_ns"] = time_ns + WARM_UP_NS
+            pump["speed_ratio"] = math.nan
+        pump["last_ns"] = time_ns
+        if _collect(table, pumps, number, time_ns, frame, rows, row):
+            pump["is_steady"] = 1
+            pump["samples"] += 1
+            row += 1
+        if not pump["is_reported_blind"] and time_ns - pump["start_ns"] >= BLIND_NS:
+            pump["is_reported_blind"] = 1
+            pump["is_blind"] = pump["seen"] & NEEDED_BITS != NEEDED_BITS
+            any_blind = any_blind or pump["is_blind"] != 0
+    return any_blind
+
+
+@compiled
+def _average(table: Table, pump: int, rows: Floats, means: Floats) -> None:
+    """Set the means of each segment: both residuals, then as in `Segments`."""
+    own = table[pump]
+    for segment in range(means.shape[1]):
+        means[:, segment] = 0.0
+        for at in range(segment * SEGMENT_SAMPLES, (segment + 1) * SEGMENT_SAMPLES):
+            flow_m3h, head_m, speed_ratio, total_m3h = rows[at, 2], rows[at, 3], rows[at, 4], rows[at, 5]
+            pump_m, system_m = distances(
+                *(flow_m3h, head_m, speed_ratio, total_m3h, own["c0"], own["c1"], own["c2"]),
+                *(own["static_head_m"], own["friction_h2_m5"]),
+            )
+            is_closed = total_m3h < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
+            means[0, segment] += pump_m
+            means[1, segment] += 0.0 if is_closed else system_m
+            means[2, segment] += flow_m3h / speed_ratio
+            means[3, segment] += total_m3h
+            means[4, segment] += rows[at, 8]
+            means[5, segment] += rows[at, 9]
+            means[6, segment] += rows[at, 6]
+            means[7, segment] += speed_ratio
+        for mean in range(SEGMENT_MEANS):
+            means[mean, segment] /= SEGMENT_SAMPLES
 
 
 class RunTracker:
@@ -115,196 +317,99 @@ class RunTracker:
     `SETTLING_S` after the last change of its speed. A run ends when the pump stops, when the stream breaks for more
     than `BREAK_S`, or in parts of `MAX_RUN_S`, so that a pump that never stops is judged too.
 
-    Memory: at most `MAX_RUN_S` samples a pump.
+    Memory: 80 bytes a steady sample of the open runs, at most `MAX_RUN_S` of each.
     """
 
     def __init__(self, nominal: Nominal) -> None:
         self._nominal = nominal
-        self._open: list[OpenRun | None] = [None] * nominal.pumps
-        self._running: tuple[bool, ...] = (False,) * nominal.pumps
-        self._duty_speeds: tuple[float, ...] = ()
-        self._duty_m3h: list[float] = []
-
-    @property
-    def running(self) -> tuple[bool, ...]:
-        """Which pumps ran in the last frame."""
-        return self._running
+        self.table = nominal.table()
+        self.pumps = new_pumps(nominal)
+        self.rows = np.zeros((LEAST_ROOM, COLUMNS))
 
     def update(self, frame: Frame) -> list[Run]:
         """Runs that this frame ends."""
-        ended = self.finish() if frame.gap_s > BREAK_S else []
-        running = tuple(
-            [
-                self._is_running(reading, pump) if reading.running is None else reading.running
-                for pump, reading in enumerate(frame.pumps)
-            ]
-        )
-        if running != self._running:
-            self._running = running
-            for going_on in self._open:
-                if going_on is not None:
-                    _settle(going_on, frame.time_ns, WARM_UP_S)
-        for pump, is_running in enumerate(running):
-            if is_running or self._open[pump] is not None:
-                finished = self._update_pump(pump, frame)
-                if finished is not None:
-                    ended.append(finished)
+        values = np.array(frame.values())
+        is_ending = note_running(self.table, self.pumps, frame.time_ns, frame.gap_s, values)
+        ended = self.take_ended(frame.time_ns) if is_ending else []
+        if self.is_full:
+            self.make_room()
+        collect(self.table, self.pumps, frame.time_ns, values, self.rows)
+        return ended
+
+    @property
+    def is_full(self) -> bool:
+        """Whether another sample of each pump may not find room."""
+        return steady_rows(self.pumps) + len(self.pumps) > len(self.rows)
+
+    def make_room(self) -> None:
+        """Double the room for steady samples."""
+        self.rows = np.concatenate((self.rows, np.zeros_like(self.rows)))
+
+    def take_ended(self, time_ns: int) -> list[Run]:
+        """Runs that end with the frame of this stamp; what was kept of them is dropped."""
+        ended = [self._as_run(pump) for pump in np.flatnonzero(self.pumps["is_ending"]).tolist()]
+        drop_ended(self.pumps, self.rows, time_ns)
+        if steady_rows(self.pumps) == 0 and len(self.rows) > LEAST_ROOM:
+            self.rows = np.zeros((LEAST_ROOM, COLUMNS))
         return ended
 
     def finish(self) -> list[Run]:
         """Runs that are still open, at the end of a recording."""
-        return [run for pump in range(self._nominal.pumps) if (run := self._close(pump)) is not None]
-
-    def steady_samples(self) -> list[tuple[int, tuple[float, ...]]]:
-        """Pump and (flow, head, speed ratio, total flow) of each pump that was steady in the last frame."""
-        return [(pump, run.rows[-1][1:5]) for pump, run in enumerate(self._open) if run is not None and run.is_steady]
+        self.pumps["is_ending"] = self.pumps["is_open"]
+        self.pumps["is_open"] = 0
+        return self.take_ended(0)
 
     def newly_blind_runs(self) -> list[Run]:
         """Open runs that have lacked a needed signal since their start, `BLIND_S` ago; each is given once."""
-        blind = []
-        for pump, run in enumerate(self._open):
-            if run is None or run.is_reported_blind or run.last_ns - run.start_ns < BLIND_S * NS_PER_S:
-                continue
-            run.is_reported_blind = True
-            if not run.seen >= NEEDED:
-                blind.append(self._as_run(pump, run))
-        return blind
+        return [self._as_run(pump) for pump in np.flatnonzero(self.pumps["is_blind"]).tolist()]
+
+    def full_pumps(self) -> list[int]:
+        """Pumps that have just filled a segment."""
+        is_full = (self.pumps["is_steady"] > 0) & (self.pumps["samples"] % SEGMENT_SAMPLES == 0)
+        return [int(pump) for pump in np.flatnonzero(is_full)]
 
     def full_segments(self, pump: int) -> int:
         """Number of segments of an open run, when it has just filled one; else 0."""
-        run = self._open[pump]
-        if run is None or not run.is_steady or len(run.rows) % SEGMENT_SAMPLES:
+        state = self.pumps[pump]
+        if not state["is_steady"] or state["samples"] % SEGMENT_SAMPLES:
             return 0
-        return len(run.rows) // SEGMENT_SAMPLES
+        return int(state["samples"]) // SEGMENT_SAMPLES
 
     def last_segments(self, pump: int, segments: int) -> Run:
         """The last segments of an open run, of which the window begins with them."""
-        run = self._open[pump]
-        if run is None:
+        if not self.pumps["is_open"][pump]:
             raise ValueError(f"pump {pump} has no open run")
-        return self._as_run(pump, run, len(run.rows) - segments * SEGMENT_SAMPLES)
+        return self._as_run(pump, int(self.pumps["samples"][pump]) - segments * SEGMENT_SAMPLES)
 
-    def _is_running(self, reading: PumpFrame, pump: int) -> bool:
-        """Whether a pump runs that does not say so."""
-        if not math.isnan(reading.frequency_hz):
-            return reading.frequency_hz > RUNNING_SHARE * self._nominal.frequencies_hz[pump]
-        if not math.isnan(reading.flow_m3h):
-            return reading.flow_m3h > RUNNING_SHARE * self._nominal.runout_flow_m3h(pump)
-        return self._open[pump] is not None
+    def last_segment(self, pump: int) -> Segments:
+        """The last segment of an open run."""
+        return self._segments(pump, self._rows_of(pump)[-SEGMENT_SAMPLES:])
 
-    def _update_pump(self, pump: int, frame: Frame) -> Run | None:
-        run = self._open[pump]
-        if not self._running[pump]:
-            return self._close(pump)
-        if run is None:
-            run = self._open[pump] = OpenRun(frame.time_ns, frame.time_ns, frame.time_ns, 0)
-            _settle(run, frame.time_ns, WARM_UP_S)
-        finished = None
-        if frame.time_ns - run.part_ns >= MAX_RUN_S * NS_PER_S:
-            finished = self._as_run(pump, run)
-            run.part_ns = frame.time_ns
-            run.rows.clear()
-            run.seen.clear()
-        run.last_ns = frame.time_ns
-        self._collect(run, pump, frame)
-        return finished
+    def _rows_of(self, pump: int) -> Floats:
+        rows = self.rows[: steady_rows(self.pumps)]
+        own: Floats = rows[rows[:, 0] == pump]
+        return own
 
-    def _collect(self, run: OpenRun, pump: int, frame: Frame) -> None:
-        run.is_steady = False
-        reading = frame.pumps[pump]
-        values = (reading.frequency_hz, reading.flow_m3h, reading.head_m, frame.level_m, reading.power_kw)
-        if len(run.seen) < len(SIGNALS):
-            run.seen.update(name for name, value in zip(SIGNALS, values, strict=True) if not math.isnan(value))
-        speed_ratio = reading.frequency_hz / self._nominal.frequencies_hz[pump]
-        if not abs(speed_ratio - run.speed_ratio) <= SPEED_STEP:
-            run.speed_ratio = speed_ratio
-            _settle(run, frame.time_ns, SETTLING_S)
-        is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
-        if frame.time_ns < run.steady_from_ns or not is_usable or math.isnan(reading.flow_m3h + reading.head_m):
-            return
-        total_m3h = reading.flow_m3h
-        duty_m3h = self._duty(frame)
-        duty_total_m3h = duty_m3h[pump]
-        if self._nominal.is_common_header:
-            total_m3h = sum(other.flow_m3h for other, on in zip(frame.pumps, self._running, strict=True) if on)
-            duty_total_m3h = sum(duty_m3h)
-            if math.isnan(total_m3h):
-                return
-        time_s = (frame.time_ns - run.part_ns) / NS_PER_S
-        run.is_steady = True
-        row = (time_s, reading.flow_m3h, reading.head_m, speed_ratio, total_m3h, frame.level_m, reading.power_kw)
-        run.rows.append((*row, duty_m3h[pump] / speed_ratio, duty_total_m3h))
+    def _segments(self, pump: int, rows: Floats) -> Segments:
+        means = np.empty((SEGMENT_MEANS, len(rows) // SEGMENT_SAMPLES))
+        _average(self.table, pump, rows, means)
+        return Segments(np.ascontiguousarray(means[:2].T), *means[2:])
 
-    def _duty(self, frame: Frame) -> list[float]:
-        """Flows by the datasheet; worked out anew only when a speed has changed."""
-        frequencies_hz = self._nominal.frequencies_hz
-        speeds = tuple(
-            [
-                reading.frequency_hz / nominal_hz if is_running and reading.frequency_hz > 0.0 else 0.0
-                for reading, nominal_hz, is_running in zip(frame.pumps, frequencies_hz, self._running, strict=True)
-            ]
-        )
-        if speeds != self._duty_speeds:
-            self._duty_speeds = speeds
-            self._duty_m3h = self._nominal.duty_flows(speeds)
-        return self._duty_m3h
-
-    def _close(self, pump: int) -> Run | None:
-        run = self._open[pump]
-        self._open[pump] = None
-        return None if run is None else self._as_run(pump, run)
-
-    def _as_run(self, pump: int, run: OpenRun, first_row: int = 0) -> Run:
-        """The run from a row on; where that is not the first, its window begins there."""
-        rows = np.array(run.rows[first_row:]).reshape(-1, COLUMNS)
-        time_s, flow_m3h, head_m, speed_ratio, total_m3h, level_m, power_kw, duty_m3h, duty_total_m3h = rows.T
-        pump_m, system_m = level_residuals(
-            flow_m3h,
-            head_m,
-            speed_ratio,
-            curve=self._nominal.curves[pump],
-            static_head_m=self._nominal.static_head_m,
-            friction_h2_m5=self._nominal.friction_h2_m5,
-            total_flow_m3h=total_m3h,
-        )
-        is_closed = (total_m3h < NO_FLOW_SHARE * self._nominal.runout_flow_m3h(pump)) & (system_m < 0.0)
-        columns = np.column_stack(
-            [
-                pump_m,
-                np.where(is_closed, 0.0, system_m),
-                flow_m3h / speed_ratio,
-                total_m3h,
-                duty_m3h,
-                duty_total_m3h,
-                level_m,
-                speed_ratio,
-            ]
-        )
-        whole = len(rows) // SEGMENT_SAMPLES * SEGMENT_SAMPLES
-        means = columns[:whole].reshape(-1, SEGMENT_SAMPLES, columns.shape[1]).mean(axis=1)
-        by_column = np.ascontiguousarray(means.T)
+    def _as_run(self, pump: int, first_row: int = 0) -> Run:
+        """The open run from a row on; where that is not the first, its window begins there."""
+        state, rows = self.pumps[pump], self._rows_of(pump)[first_row:]
+        part_ns, seen = int(state["part_ns"]), int(state["seen"])
+        time_s = rows[:, 1]
         return Run(
             pump=pump,
-            window_ns=(run.part_ns + round(time_s[0] * NS_PER_S) if first_row else run.part_ns, run.last_ns),
+            window_ns=(part_ns + round(time_s[0] * NS_PER_S) if first_row else part_ns, int(state["last_ns"])),
             time_s=time_s,
-            flow_m3h=flow_m3h,
-            head_m=head_m,
-            speed_ratio=speed_ratio,
-            total_flow_m3h=total_m3h,
-            level_m=level_m,
-            power_kw=power_kw,
-            segments=Segments(
-                residual_m=np.ascontiguousarray(means[:, :2]),
-                flow_m3h=by_column[2],
-                total_m3h=by_column[3],
-                duty_m3h=by_column[4],
-                duty_total_m3h=by_column[5],
-                level_m=by_column[6],
-                speed_ratio=by_column[7],
-            ),
-            missing=frozenset(SIGNALS) - run.seen,
+            flow_m3h=rows[:, 2],
+            head_m=rows[:, 3],
+            speed_ratio=rows[:, 4],
+            total_flow_m3h=rows[:, 5],
+            level_m=rows[:, 6],
+            power_kw=rows[:, 7],
+            segments=self._segments(pump, rows),
+            missing=frozenset(name for bit, name in enumerate(SIGNALS) if not seen >> bit & 1),
         )
-
-
-def _settle(run: OpenRun, now_ns: int, seconds: float) -> None:
-    run.steady_from_ns = max(run.steady_from_ns, now_ns + int(seconds * NS_PER_S))

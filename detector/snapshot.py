@@ -14,20 +14,16 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline, Model
 from wetwell.detector.belief import PumpBelief, SystemBelief
-from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.cusum import Cusum
-from wetwell.detector.drawdown import Drawdown, Phase
-from wetwell.detector.gate import Gate
 from wetwell.detector.index_limits import IndexLimits
 from wetwell.detector.learning import Learning
-from wetwell.detector.meter_watch import RepeatWatch
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.observation import Check
 from wetwell.detector.pump_record import Knowledge, PumpRecord
-from wetwell.detector.runs import OpenRun, RunTracker, Segments
+from wetwell.detector.runs import Segments
 from wetwell.protocols.errors import WetwellError
 
-SCHEMA = "wetwell.detector-snapshot/1"
+SCHEMA = "wetwell.detector-snapshot/2"
 
 _CLASSES: Mapping[str, type] = {
     cls.__name__: cls
@@ -35,19 +31,12 @@ _CLASSES: Mapping[str, type] = {
         Baseline,
         Check,
         Cusum,
-        Drawdown,
-        Gate,
         IndexLimits,
         Knowledge,
         Learning,
         Model,
-        OpenRun,
-        Phase,
         PumpBelief,
         PumpRecord,
-        RepeatWatch,
-        RollingFTest,
-        RunTracker,
         Segments,
         SystemBelief,
     )
@@ -121,7 +110,8 @@ def _encoded_float(value: float) -> Any:
 
 def _encoded_array(value: npt.NDArray[Any]) -> Any:
     order: Literal["C", "F"] = "C" if value.flags.c_contiguous else "F"
-    return {"array": [value.dtype.str, list(value.shape), order, base64.b64encode(value.tobytes(order)).decode()]}
+    dtype = value.dtype.str if value.dtype.names is None else value.dtype.descr
+    return {"array": [dtype, list(value.shape), order, base64.b64encode(value.tobytes(order)).decode()]}
 
 
 def _encoded_pairs(value: Mapping[Any, Any]) -> list[Any]:
@@ -154,6 +144,7 @@ def _decoded(value: Any, nominal: Nominal) -> Any:
 
 def _array(content: list[Any], _nominal: Nominal) -> Any:
     dtype, shape, order, data = content
+    dtype = dtype if isinstance(dtype, str) else [(name, kind) for name, kind in dtype]
     return np.frombuffer(base64.b64decode(data), dtype=dtype).reshape(shape, order=order).copy(order)
 
 

@@ -1,5 +1,6 @@
 """Batch work: a simulated recording, verdicts on a recording."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress, track
 
+from wetwell.detector.block import BLOCK_ROWS, blocks
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
 from wetwell.protocols.messages import Verdict
@@ -49,7 +51,7 @@ def write_simulated(
 
 
 def detect(station: Station, recording: Recording, out: Path) -> dict[str, object]:
-    """Judge a recording with the streaming detector and write the verdicts, one JSON object a line.
+    """Judge a recording, block by block, and write the verdicts, one JSON object a line.
 
     The file appears whole or not at all.
 
@@ -66,20 +68,20 @@ def detect(station: Station, recording: Recording, out: Path) -> dict[str, objec
     detector = Detector(station.name, nominal_of(station))
     states: Counter[str] = Counter()
     with whole_file(out) as file:
-        for verdict in _verdicts(detector, recording):
+        for verdict in _verdicts(detector, recording, len(station.pump)):
             states[verdict.state] += 1
             file.write(verdict.encode() + b"\n")
     return {"verdicts": dict(states), "counts": detector.counts}
 
 
-def _verdicts(detector: Detector, recording: Recording) -> Iterator[Verdict]:
-    samples = track(
-        recording.rows(),
-        total=len(recording),
+def _verdicts(detector: Detector, recording: Recording, pumps: int) -> Iterator[Verdict]:
+    taken = track(
+        blocks(recording, pumps),
+        total=math.ceil(len(recording) / BLOCK_ROWS),
         description="judging",
         console=Console(stderr=True),
         transient=True,
     )
-    for sample in samples:
-        yield from detector.update(sample)
+    for block in taken:
+        yield from detector.take(block)
     yield from detector.finish()

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from wetwell.simulator.jit import compiled
+from wetwell.protocols.jit import compiled
 
 LEVEL = 0
 INFLOW = 1

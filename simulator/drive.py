@@ -2,7 +2,7 @@
 
 import math
 
-from wetwell.simulator.jit import compiled
+from wetwell.protocols.jit import compiled
 
 ROUNDING_HZ = 1e-9
 """Far above the rounding of a ramp's sum, far under any drive's resolution."""

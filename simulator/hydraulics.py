@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.simulator.jit import compiled
+from wetwell.protocols.jit import compiled
 
 Floats = npt.NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
 from wetwell.simulator.channels import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.drive import turned_ratio
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
-from wetwell.simulator.jit import compiled
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
 from wetwell.simulator.sensors import delayed, sense
 from wetwell.simulator.supervision import drive, supervise

@@ -2,7 +2,7 @@
 
 import math
 
-from wetwell.simulator.jit import compiled
+from wetwell.protocols.jit import compiled
 
 WATER_DENSITY_KG_M3 = 1000.0
 GRAVITY_M_S2 = 9.81

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.jit import compiled
 from wetwell.protocols.station import Sensors
 from wetwell.simulator import layout as at
 from wetwell.simulator.channels import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, channels
-from wetwell.simulator.jit import compiled
 
 Floats = npt.NDArray[np.float64]
 

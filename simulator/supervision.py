@@ -6,6 +6,7 @@ The rules are those of `control` and `drive`; here they act on the arrays of `la
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
 from wetwell.simulator.control import (
     NOTHING,
@@ -15,7 +16,6 @@ from wetwell.simulator.control import (
     wanted_change,
 )
 from wetwell.simulator.drive import next_frequency_hz
-from wetwell.simulator.jit import compiled
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
 from wetwell.simulator.channels import FLOW, FREQUENCY, HEAD, POWER, pump_channel
-from wetwell.simulator.jit import compiled
 from wetwell.simulator.sensors import sense, transmit
 
 Floats = npt.NDArray[np.float64]

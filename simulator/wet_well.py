@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
-from wetwell.simulator.jit import compiled
 
 Floats = npt.NDArray[np.float64]
 

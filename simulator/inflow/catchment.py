@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from wetwell.protocols.jit import compiled
 from wetwell.protocols.station import NonNegative, Positive, Table
 from wetwell.simulator.inflow.stream import Floats
-from wetwell.simulator.jit import compiled
 
 HOURS = (
     *(0.55, 0.42, 0.34, 0.3, 0.34, 0.55, 1.05, 1.65, 1.8, 1.55, 1.25, 1.1),

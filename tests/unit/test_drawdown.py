@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from wetwell.detector.drawdown import DEAD_RATIO, Drawdown
+from wetwell.detector.drawdown import DEAD_RATIO, draw_down, new_phases
 from wetwell.detector.gate import Frame, PumpFrame
+from wetwell.detector.runs import PUMP
 from wetwell.protocols.stamps import NS_PER_S
 
 AREA_M2 = 8.0
@@ -38,11 +39,17 @@ def trace(*phases, inflow_m3h=lambda _second: 60.0, ratio=1.0, is_inflow_measure
 IDLE, ONE, TWO = (0, 0), (1, 0), (1, 1)
 
 
-def told(frames, *, area_m2=AREA_M2, pump=0):
-    drawdown = Drawdown(area_m2)
+def told_of_both(frames, *, area_m2=AREA_M2):
+    phases, pumps = new_phases(), np.zeros(2, dtype=PUMP)
+    pumps["log_ratio"] = NAN
     for frame, running in frames:
-        drawdown.update(frame, running)
-    return drawdown.take(pump)
+        pumps["is_running"] = running
+        draw_down(phases, area_m2, frame.time_ns, frame.gap_s, np.array(frame.values()), pumps)
+    return pumps["log_ratio"].tolist()
+
+
+def told(frames, *, area_m2=AREA_M2):
+    return told_of_both(frames, area_m2=area_m2)[0]
 
 
 @pytest.mark.parametrize("is_inflow_measured", [False, True])
@@ -87,13 +94,10 @@ def test_a_dead_meter_has_the_least_ratio_there_is():
     assert told(trace((300, IDLE), (200, ONE), (5, IDLE), ratio=0.0)) == pytest.approx(math.log(DEAD_RATIO))
 
 
-def test_the_figure_is_given_once_and_to_its_pump():
-    drawdown = Drawdown(AREA_M2)
-    for frame, running in trace((300, IDLE), (200, (0, 1)), (5, IDLE)):
-        drawdown.update(frame, running)
-    assert math.isnan(drawdown.take(0))
-    assert drawdown.take(1) == pytest.approx(0.0, abs=0.02)
-    assert math.isnan(drawdown.take(1))
+def test_the_figure_is_given_to_its_pump():
+    first, second = told_of_both(trace((300, IDLE), (200, (0, 1)), (5, IDLE)))
+    assert math.isnan(first)
+    assert second == pytest.approx(0.0, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -6,19 +6,32 @@ import numpy as np
 import pytest
 
 from wetwell.detector.gate import Frame, PumpFrame
-from wetwell.detector.meter_watch import NOISY_FACTOR, RepeatWatch, healthy_noise, noisy_meters, reading_noise
+from wetwell.detector.meter_watch import (
+    NOISY_FACTOR,
+    healthy_noise,
+    new_meters,
+    noisy_meters,
+    reading_noise,
+    stuck_names,
+    watch_meters,
+)
+from wetwell.detector.runs import PUMP
 from wetwell.protocols.stamps import NS_PER_S
 
 NAN = math.nan
 
 
-def feed(watch, *, level_m, flow_m3h, head_m, is_learning=False, is_running=True):
+def feed(meters, *, level_m, flow_m3h, head_m, is_learning=False, is_running=True):
     """Feed equally long series; the names that are stuck after each second."""
-    stuck = []
+    stuck, pumps = [], np.zeros(1, dtype=PUMP)
+    pumps["is_learning"], pumps["is_running"] = is_learning, is_running
     for second, (level, flow, head) in enumerate(zip(level_m, flow_m3h, head_m, strict=True)):
         frame = Frame(second * NS_PER_S, 1.0, level, NAN, (PumpFrame(50.0, flow, head, NAN, is_running),))
-        watch.update(frame, (is_running,), (is_learning,))
-        stuck.append(set(watch.stuck))
+        watch_meters(meters, frame.time_ns, frame.gap_s, np.array(frame.values()), pumps)
+        bits = sum(int(is_stuck) << bit for bit, is_stuck in enumerate(meters["is_stuck"]))
+        stuck.append(set(stuck_names(0, bits)))
+        if is_running:
+            assert pumps["stuck"][0] & bits == bits, "the run remembers what was stuck"
     return stuck
 
 
@@ -34,34 +47,33 @@ def lively(rng, seconds):
     ("name", "reading"), [("level_m", "level_m"), ("flow_m3h", "pump1_flow_m3h"), ("head_m", "pump1_head_m")]
 )
 def test_a_reading_that_stands_still_for_a_minute_is_stuck_until_it_moves(name, reading):
-    rng, watch = np.random.default_rng(0), RepeatWatch()
-    feed(watch, **lively(rng, 600), is_learning=True)
+    rng, meters = np.random.default_rng(0), new_meters(1)
+    feed(meters, **lively(rng, 600), is_learning=True)
     series = lively(rng, 200)
     series[name][20:120] = series[name][20]
-    stuck = feed(watch, **series)
+    stuck = feed(meters, **series)
     first = next(second for second, names in enumerate(stuck) if names)
     assert first == pytest.approx(80, abs=2)
     assert all(names == {reading} for names in stuck[first:120])
     assert not any(stuck[120:])
-    assert watch.stuck == set()
 
 
 def test_readings_of_zero_are_not_stuck():
-    watch = RepeatWatch()
+    meters = new_meters(1)
     zeros = np.zeros(500)
     assert not any(
-        feed(watch, level_m=lively(np.random.default_rng(0), 500)["level_m"], flow_m3h=zeros, head_m=zeros)
+        feed(meters, level_m=lively(np.random.default_rng(0), 500)["level_m"], flow_m3h=zeros, head_m=zeros)
     )
 
 
 def test_the_head_of_a_pump_that_stands_still_may_too():
     series = lively(np.random.default_rng(0), 500) | {"head_m": np.full(500, 3.3)}
-    assert not any(feed(RepeatWatch(), **series, is_running=False))
+    assert not any(feed(new_meters(1), **series, is_running=False))
 
 
 def test_values_that_are_absent_are_not_stuck():
     absent = np.full(500, NAN)
-    assert not any(feed(RepeatWatch(), level_m=absent, flow_m3h=absent, head_m=absent))
+    assert not any(feed(new_meters(1), level_m=absent, flow_m3h=absent, head_m=absent))
 
 
 def by_exception(values, every):
@@ -69,12 +81,12 @@ def by_exception(values, every):
 
 
 def test_a_feed_that_reports_by_exception_in_health_is_learnt():
-    rng, watch = np.random.default_rng(1), RepeatWatch()
-    feed(watch, **{name: by_exception(values, 40) for name, values in lively(rng, 2000).items()}, is_learning=True)
+    rng, meters = np.random.default_rng(1), new_meters(1)
+    feed(meters, **{name: by_exception(values, 40) for name, values in lively(rng, 2000).items()}, is_learning=True)
     slow = {name: by_exception(values, 100) for name, values in lively(rng, 1000).items()}
-    assert not any(feed(watch, **slow)), "five times as long as ever is not yet stuck"
+    assert not any(feed(meters, **slow)), "five times as long as ever is not yet stuck"
     dead = lively(rng, 400) | {"flow_m3h": np.full(400, 201.5)}
-    stuck = feed(watch, **dead)
+    stuck = feed(meters, **dead)
     assert stuck[-1] == {"pump1_flow_m3h"}
     assert not any(stuck[:190])
 

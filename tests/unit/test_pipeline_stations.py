@@ -115,7 +115,7 @@ def test_a_station_that_never_had_a_level_is_judged_without(alpha):
 
 @pytest.fixture(scope="module")
 def now_ns(learnt):
-    return learnt._gate._last_ns
+    return int(learnt._gate.state["time_ns"][0])
 
 
 def test_a_pump_that_is_re_baselined_learns_anew_and_the_others_go_on(alpha, learnt, now_ns):
