@@ -8,9 +8,11 @@ from pydantic import Field, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
+from wetwell.protocols.alarm_messages import Priority
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.registers import WordOrder
-from wetwell.protocols.station import Positive, Table, load_toml
+from wetwell.protocols.station import Finite, NonNegative, Positive, Table, load_toml
+from wetwell.services.alarms.rules import RuleName
 
 CONFIG_VARIABLE = "WETWELL_CONFIG"
 
@@ -50,6 +52,47 @@ class DetectorSettings(Table):
     costs: Costs = Costs()
 
 
+class RuleSettings(Table):
+    """What is other than in the rule table for one kind of alarm."""
+
+    priority: Priority | None = None
+    on_delay_s: NonNegative | None = None
+    off_delay_s: NonNegative | None = None
+    is_enabled: bool | None = None
+
+
+class AlarmSettings(Table):
+    """Alarms.
+
+    Attributes
+    ----------
+    state_dir : Path, optional
+        Folder of state and audit; without it acts are only logged and the state ends with the process.
+    stale_after_s, silent_after_s : float
+        Without a sample, and without a service, for so long on the wall clock is an alarm.
+    high_level_m : float, optional
+        High level of every station; without it, `high_level_margin_m` above the last start level of its file.
+    overflow_margin_m : float
+        So far under the overflow of the station file begins the risk.
+    level_deadband_m : float
+        So far under its limit must a level fall for the alarm to return.
+    chattering_transitions : int
+        More changes within an hour than these put an alarm on the chattering list.
+    rules : dict
+        By name of the rule, what is other than in the rule table.
+    """
+
+    state_dir: Path | None = None
+    stale_after_s: Positive = 60.0
+    silent_after_s: Positive = 30.0
+    high_level_m: Finite | None = None
+    high_level_margin_m: NonNegative = 0.3
+    overflow_margin_m: NonNegative = 0.1
+    level_deadband_m: NonNegative = 0.05
+    chattering_transitions: Annotated[int, Field(ge=1)] = 10
+    rules: dict[RuleName, RuleSettings] = Field(default_factory=dict)
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -60,6 +103,7 @@ class Settings(BaseSettings):
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
+    alarms: AlarmSettings = AlarmSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:
