@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import time
 from collections import Counter, OrderedDict
 
 from wetwell.detector.dispatch import Costs
@@ -70,6 +71,7 @@ class StationJudge:
         self._states: dict[int, str] = {}
         self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
+        self._heard_s = time.monotonic()
 
     async def run(self) -> None:
         """Judge for ever. A payload that is no sample is counted and left out."""
@@ -77,6 +79,7 @@ class StationJudge:
         while True:
             for payload in await self._samples.receive():
                 self._take(payload)
+            self._heard_s = time.monotonic()
             await asyncio.sleep(0)  # let the health figures out between batches
 
     async def obey(self) -> None:
@@ -88,7 +91,8 @@ class StationJudge:
     def figures(self) -> dict[str, float]:
         """Health figures."""
         counts = {name: float(count) for name, count in (self.detector.counts | self._counts).items()}
-        return counts | {"dropped": float(self._samples.dropped)}
+        age_s = time.monotonic() - self._heard_s
+        return counts | {"dropped": float(self._samples.dropped), "sample_age_s": age_s}
 
     def _take(self, payload: bytes) -> None:
         try:

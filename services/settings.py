@@ -33,15 +33,21 @@ class ModbusSettings(Table):
 
 
 class LogSettings(Table):
-    """Logs, on standard error."""
+    """Logs, on standard error. Form "json" is one JSON object a line."""
 
     level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
+    form: Literal["text", "json"] = "text"
 
 
 class HealthSettings(Table):
-    """Health figures on the bus."""
+    """Health figures on the bus, and over HTTP at an address such as `127.0.0.1:9100` where one is given.
+
+    `max_sample_age_s`: so long without a sample, and `/healthz` says that the daemon does not do its duty.
+    """
 
     period_s: Positive = 10.0
+    http: Annotated[str, Field(pattern=r"^.+:\d{1,5}$")] | None = None
+    max_sample_age_s: Positive = 60.0
 
 
 class DetectorSettings(Table):
