@@ -76,6 +76,8 @@ class AlarmSettings(Table):
         Folder of state and audit; without it acts are only logged and the state ends with the process.
     stale_after_s, silent_after_s : float
         Without a sample, and without a service, for so long on the wall clock is an alarm.
+    heartbeat_after_s : float
+        A heartbeat of a PLC that has not changed for so long is an alarm.
     high_level_m : float, optional
         High level of every station; without it, `high_level_margin_m` above the last start level of its file.
     overflow_margin_m : float
@@ -91,6 +93,7 @@ class AlarmSettings(Table):
     state_dir: Path | None = None
     stale_after_s: Positive = 60.0
     silent_after_s: Positive = 30.0
+    heartbeat_after_s: Positive = 30.0
     high_level_m: Finite | None = None
     high_level_margin_m: NonNegative = 0.3
     overflow_margin_m: NonNegative = 0.1

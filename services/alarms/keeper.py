@@ -81,7 +81,8 @@ class AlarmKeeper:
         """Look at the health figures of a gateway."""
         status = self._decoded(Status, payload)
         if status is not None and status.service == "gateway" and status.station in self.stations:
-            self.stations[status.station].take_status(status, self._now(), self.book)
+            watch = self.stations[status.station]
+            watch.take_status(status, self._now(), self.book, self._settings.heartbeat_after_s)
 
     def take_presence(self, presence: Presence) -> None:
         """Note that a service has come or gone."""
@@ -257,7 +258,7 @@ class AlarmKeeper:
             watch = self._watch(name)
             watch.time_ns, watch.seq, watch.verdicts = kept.time_ns, kept.seq, kept.verdicts
             watch.has_samples = kept.time_ns is not None
-            watch.gone_s = dict.fromkeys(kept.services, now_s)  # missed until they are seen
+            watch.gone_s = dict.fromkeys(kept.services, now_s)  # missed until seen
 
     def _watch(self, station: str) -> StationWatch:
         if station not in self.stations:

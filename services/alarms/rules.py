@@ -46,7 +46,7 @@ RULES: Mapping[RuleName, Rule] = {
     ),
     "overflow_risk": Rule("urgent", "level near overflow", "start all pumps, send a crew or a tanker", 10.0, 60.0),
     "samples_stale": Rule("high", "no samples", "the station is not seen: check PLC, gateway and network"),
-    "plc_stopped": Rule("high", "heartbeat of the PLC stands still", "the PLC answers but its program stands", 10.0),
+    "plc_stopped": Rule("high", "heartbeat of the PLC stands still", "the PLC answers but its program does not run"),
     "plc_lost": Rule("high", "PLC does not answer", "check the PLC's power, network and address", 30.0),
     "detector_silent": Rule("high", "detector is not running", "nobody judges the pumps: start the detector"),
     "gateway_silent": Rule("high", "gateway is not running", "nobody polls the PLC: start the gateway"),

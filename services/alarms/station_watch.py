@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from wetwell.protocols.keys import SITE
 from wetwell.protocols.messages import Sample, Status, Verdict
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.alarms.book import AlarmBook
@@ -15,15 +16,9 @@ FOLLOW_VERDICTS = 3
 FOLLOW_SAMPLES = 1_000
 """The same for samples whose `seq` is old too; more than a publisher keeps."""
 
-SILENCE: dict[str, RuleName] = {
-    "detector": "detector_silent",
-    "gateway": "gateway_silent",
-    "historian": "historian_silent",
-}
-"""Services that are missed, by name."""
-
-PLC_FIGURES: dict[str, RuleName] = {"heartbeat_frozen": "plc_stopped", "plc_lost": "plc_lost"}
-"""Health figures of a gateway that are above zero while something is wrong."""
+STATION_SERVICES: dict[str, RuleName] = {"detector": "detector_silent"}
+SITE_SERVICES: dict[str, RuleName] = {"gateway": "gateway_silent", "historian": "historian_silent"}
+"""Services that are missed, of each station and of the whole site."""
 
 
 @dataclass(frozen=True)
@@ -130,16 +125,22 @@ class StationWatch:
             )
         return True
 
-    def take_status(self, status: Status, now: Now, book: AlarmBook) -> None:
-        """Look whether the gateway reaches the PLC, and whether the PLC's program runs."""
-        for figure, rule in PLC_FIGURES.items():
-            value = status.figures.get(figure)
-            if value is not None:
-                book.observe(self.name, rule, value > 0.0, self.clock_ns(now), now.wall_ns)
+    @property
+    def services(self) -> dict[str, RuleName]:
+        """Services whose absence is an alarm here, and which."""
+        return SITE_SERVICES if self.name == SITE else STATION_SERVICES
+
+    def take_status(self, status: Status, now: Now, book: AlarmBook, heartbeat_after_s: float) -> None:
+        """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs."""
+        time_ns, age_s = self.clock_ns(now), status.figures.get("heartbeat_age_s")
+        book.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
+        if age_s is not None and status.state == "running":
+            text = f"heartbeat of the PLC stands still for {age_s:.0f} s"
+            book.observe(self.name, "plc_stopped", age_s >= heartbeat_after_s, time_ns, now.wall_ns, text=text)
 
     def take_presence(self, service: str, *, is_alive: bool, now: Now) -> None:
         """Note that a service has come or gone."""
-        if service in SILENCE:
+        if service in self.services:
             gone_s = self.gone_s.get(service)
             self.gone_s[service] = None if is_alive else now.steady_s if gone_s is None else gone_s
 
@@ -153,7 +154,7 @@ class StationWatch:
             book.observe(self.name, "samples_stale", age_s > stale_after_s, time_ns, now.wall_ns, text=text)
         for service, gone_s in self.gone_s.items():
             is_silent = gone_s is not None and now.steady_s - gone_s > silent_after_s
-            book.observe(self.name, SILENCE[service], is_silent, time_ns, now.wall_ns)
+            book.observe(self.name, self.services[service], is_silent, time_ns, now.wall_ns)
 
     def begin_again(self, now: Now) -> None:
         """Count silence from now on: until now it was that of the bus."""

@@ -108,6 +108,8 @@ def figure_faults(figures: dict[str, float], max_sample_age_s: float) -> list[st
     faults = []
     if figures.get("sample_age_s", 0.0) > max_sample_age_s:
         faults.append(f"no sample for {figures['sample_age_s']:.0f} s")
+    if figures.get("is_failing", 0.0) > 0.0:
+        faults.append("the database or its disk refuses what is to be kept")
     if figures.get("disk_errors", 0.0) > 0.0:
         faults.append(f"{figures['disk_errors']:.0f} writes to disk failed in a row")
     return faults

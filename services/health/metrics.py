@@ -20,6 +20,7 @@ METRICS: Mapping[str, str] = {
     "foreign_orders": "Orders for another station or pump.",
     "future": "Samples too far ahead of the clock.",
     "gaps": "Pauses in the samples.",
+    "is_failing": "1 while the historian's database or disk refuses.",
     "is_flood": "1 in an alarm flood.",
     "late": "Samples older than the last one.",
     "lost": "Samples that are missing by their number.",

@@ -189,16 +189,19 @@ def test_a_stopped_plc_is_told_from_the_figures_of_the_gateway():
     site = Site()
     site.sample()
 
-    def status(at_s, **figures):
+    def status(at_s, state="running", **figures):
         site.wall_s = at_s
-        message = Status(time=0, station="alpha", service="gateway", state="running", figures=figures)
+        message = Status(time=0, station="alpha", service="gateway", state=state, figures=figures)
         site.keeper.take_status(message.encode())
         return site.news()
 
-    assert status(1, heartbeat_frozen=1.0) == []
-    assert status(11, heartbeat_frozen=1.0) == [("plc_stopped", "unacknowledged")]
-    assert status(21, heartbeat_frozen=0.0, plc_lost=1.0) == [("plc_stopped", "returned")]
-    assert status(51, plc_lost=1.0) == [("plc_lost", "unacknowledged")]
+    assert status(1, heartbeat_age_s=29.0) == []
+    assert status(11, heartbeat_age_s=30.0) == [("plc_stopped", "unacknowledged")]
+    assert site.told[0].text == "heartbeat of the PLC stands still for 30 s"
+    assert status(21, "waiting", heartbeat_age_s=0.0) == []
+    assert status(50, "waiting", heartbeat_age_s=90.0) == []
+    assert status(51, "waiting") == [("plc_lost", "unacknowledged")]
+    assert status(61, heartbeat_age_s=1.0) == [("plc_lost", "returned"), ("plc_stopped", "returned")]
 
 
 def test_without_a_router_nobody_else_is_blamed():
