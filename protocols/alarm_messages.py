@@ -15,7 +15,7 @@ AlarmState = Literal[
     "out_of_service",
 ]
 """ISA-18.2: normal (A), unacknowledged alarm (B), acknowledged alarm (C), returned to normal unacknowledged (D),
-shelved (E), out of service (G)."""
+shelved (G), out of service (I)."""
 
 Priority = Literal["low", "medium", "high", "urgent"]
 
@@ -72,3 +72,27 @@ class AlarmAnswer(Message):
     is_done: bool
     reason: str = ""
     alarm: Alarm | None = None
+
+
+class AlarmFigure(Message):
+    """An alarm on a list: how often it changed within the hour, or since when it stands."""
+
+    station: str
+    alarm: str
+    transitions: int | None = None
+    raised: Stamp | None = None
+
+
+class AlarmReport(Message):
+    """How well the alarms of a site serve its operators. `rates` on the wall clock, lists in the stations' time.
+
+    `rates`: `alarms_10min`, `alarms_hour`, `alarms_day` (calls in the last ten minutes, hour and day), `peak_10min`
+    (most in any ten minutes of the last day), `flood_share` (of the day's ten minutes), `is_flood`.
+    """
+
+    schema_name: Literal["wetwell.alarm-report/1"] = Field("wetwell.alarm-report/1", alias="schema")
+    time: Stamp
+    rates: dict[str, float]
+    standing: dict[AlarmState, int]
+    chattering: tuple[AlarmFigure, ...] = ()
+    stale: tuple[AlarmFigure, ...] = ()

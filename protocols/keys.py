@@ -45,6 +45,11 @@ def alarm_act_key(station: str) -> str:
     return f"{ROOT}/{station}/alarm-act"
 
 
+def alarm_report_key() -> str:
+    """Key of the question for rates, chattering and stale alarms of the whole site."""
+    return f"{ROOT}/{SITE}/alarm-report"
+
+
 def history_key(station: str) -> str:
     """Key of the questions to the historian about a station."""
     return f"{ROOT}/{station}/history"

@@ -1,9 +1,11 @@
 """The router daemon: the meeting point of the bus, for sites that run no router of their own."""
 
+import asyncio
 import logging
 
+from wetwell.protocols.keys import SITE
 from wetwell.services.bus import listen
-from wetwell.services.daemon import stop_event
+from wetwell.services.daemon import report_health, stop_event, until
 from wetwell.services.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -18,6 +20,7 @@ async def serve_router(settings: Settings) -> None:
         If the endpoint cannot be opened.
     """
     async with stop_event() as stop:
-        with listen(settings):
+        with listen(settings) as bus:
             log.info("router on %s", settings.zenoh.endpoint)
-            await stop.wait()
+            health = report_health(bus, SITE, "router", settings.health.period_s, dict)
+            await until(stop, asyncio.create_task(health, name="router.health"))

@@ -8,9 +8,11 @@ from pydantic import Field, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
+from wetwell.protocols.alarm_messages import Priority
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.registers import WordOrder
-from wetwell.protocols.station import Positive, Table, load_toml
+from wetwell.protocols.station import Finite, NonNegative, Positive, Table, load_toml
+from wetwell.services.alarms.rules import RuleName
 
 CONFIG_VARIABLE = "WETWELL_CONFIG"
 
@@ -31,15 +33,21 @@ class ModbusSettings(Table):
 
 
 class LogSettings(Table):
-    """Logs, on standard error."""
+    """Logs, on standard error. Form "json" is one JSON object a line."""
 
     level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
+    form: Literal["text", "json"] = "text"
 
 
 class HealthSettings(Table):
-    """Health figures on the bus."""
+    """Health figures on the bus, and over HTTP at an address such as `127.0.0.1:9100` where one is given.
+
+    `max_sample_age_s`: so long without a sample, and `/healthz` says that the daemon does not do its duty.
+    """
 
     period_s: Positive = 10.0
+    http: Annotated[str, Field(pattern=r"^.+:\d{1,5}$")] | None = None
+    max_sample_age_s: Positive = 60.0
 
 
 class DetectorSettings(Table):
@@ -48,6 +56,50 @@ class DetectorSettings(Table):
     state_dir: Path | None = None
     checkpoint_s: Positive = 60.0
     costs: Costs = Costs()
+
+
+class RuleSettings(Table):
+    """What is other than in the rule table for one kind of alarm."""
+
+    priority: Priority | None = None
+    on_delay_s: NonNegative | None = None
+    off_delay_s: NonNegative | None = None
+    is_enabled: bool | None = None
+
+
+class AlarmSettings(Table):
+    """Alarms.
+
+    Attributes
+    ----------
+    state_dir : Path, optional
+        Folder of state and audit; without it acts are only logged and the state ends with the process.
+    stale_after_s, silent_after_s : float
+        Without a sample, and without a service, for so long on the wall clock is an alarm.
+    heartbeat_after_s : float
+        A heartbeat of a PLC that has not changed for so long is an alarm.
+    high_level_m : float, optional
+        High level of every station; without it, `high_level_margin_m` above the last start level of its file.
+    overflow_margin_m : float
+        So far under the overflow of the station file begins the risk.
+    level_deadband_m : float
+        So far under its limit must a level fall for the alarm to return.
+    chattering_transitions : int
+        More changes within an hour than these put an alarm on the chattering list.
+    rules : dict
+        By name of the rule, what is other than in the rule table.
+    """
+
+    state_dir: Path | None = None
+    stale_after_s: Positive = 60.0
+    silent_after_s: Positive = 30.0
+    heartbeat_after_s: Positive = 30.0
+    high_level_m: Finite | None = None
+    high_level_margin_m: NonNegative = 0.3
+    overflow_margin_m: NonNegative = 0.1
+    level_deadband_m: NonNegative = 0.05
+    chattering_transitions: Annotated[int, Field(ge=1)] = 10
+    rules: dict[RuleName, RuleSettings] = Field(default_factory=dict)
 
 
 class Settings(BaseSettings):
@@ -60,6 +112,7 @@ class Settings(BaseSettings):
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
+    alarms: AlarmSettings = AlarmSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:

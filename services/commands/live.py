@@ -66,6 +66,7 @@ def up(
         "--modbus-server",
     ]
     commands = {"detector": ["detector", "--station", station], "simulator": ["simulator", *live]}
+    commands["alarms"] = ["alarms", "--station", station]
     run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
 
 

@@ -1,7 +1,9 @@
 """What the commands share: options, settings from flags, how a result is printed."""
 
 import asyncio
+import contextlib
 import re
+import sys
 from collections.abc import Coroutine
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -108,12 +110,15 @@ def positive(value: float, flag: str) -> float:
     return value
 
 
-def run(settings: Settings, service: Coroutine[Any, Any, None]) -> None:
-    """Run a service until it ends, with its logs on standard error."""
-    from wetwell.services.daemon import start_logging
+def run(settings: Settings, daemon: Coroutine[Any, Any, None]) -> None:
+    """Run a service until it ends, with its logs on standard error and its health page if the settings ask for it."""
+    from wetwell.services.health.board import BOARD
+    from wetwell.services.health.page import health_page
+    from wetwell.services.logs import start_logging
 
-    start_logging(settings.log.level)
-    asyncio.run(service)
+    start_logging(settings.log, service=sys.argv[1] if len(sys.argv) > 1 else "wetwell")
+    with contextlib.closing(daemon), health_page(settings.health, BOARD):
+        asyncio.run(daemon)
 
 
 def print_result(result: dict[str, object], *, as_json: bool) -> None:

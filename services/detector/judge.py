@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections import Counter, OrderedDict
 from collections.abc import Iterable
 
@@ -54,6 +55,7 @@ class StationJudge:
         self._last: dict[int, Verdict] = {}
         self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
+        self._heard_s = time.monotonic()
         if told is not None:
             log.info("station '%s': goes on from its checkpoint", self.station)
             self._answers.update(told.answers)
@@ -66,6 +68,7 @@ class StationJudge:
         while True:
             for payload in await self._samples.receive():
                 self._decode(payload)
+            self._heard_s = time.monotonic()
             await asyncio.sleep(0)  # let the health figures out between batches
 
     async def take(self, samples: Iterable[Sample]) -> None:
@@ -89,7 +92,8 @@ class StationJudge:
     def figures(self) -> dict[str, float]:
         """Health figures."""
         counts = {name: float(count) for name, count in (self.detector.counts | self._counts).items()}
-        return counts | {"dropped": float(self._samples.dropped)}
+        age_s = time.monotonic() - self._heard_s
+        return counts | {"dropped": float(self._samples.dropped), "sample_age_s": age_s}
 
     def _decode(self, payload: bytes) -> None:
         try:

@@ -1,0 +1,43 @@
+"""What the health figures of the daemons mean. The table in `docs/operations.md` is held against this one."""
+
+from collections.abc import Mapping
+
+METRICS: Mapping[str, str] = {
+    "acts": "Acts of operators on alarms that were carried out.",
+    "alarms_10min": "Alarms that called in the last ten minutes.",
+    "alarms_hour": "Alarms that called in the last hour.",
+    "alarms_day": "Alarms that called in the last day.",
+    "audit_errors": "Acts that were refused because the audit could not be written.",
+    "bad_quality": "Samples whose source calls them bad.",
+    "chattering": "Alarms that come and go too often.",
+    "clock_steps": "Times that the clock of the source was set.",
+    "disk_errors": "Writes to disk that failed in a row; 0 after one that did not.",
+    "doubled": "Messages that came twice.",
+    "dropped": "Messages dropped because the daemon was too slow.",
+    "failures": "Samples that could not be judged, with a traceback in the log.",
+    "flood_share": "Share of the day's ten minutes with more than ten alarms.",
+    "foreign": "Messages of another station, or of none.",
+    "foreign_orders": "Orders for another station or pump.",
+    "future": "Samples too far ahead of the clock.",
+    "gaps": "Pauses in the samples.",
+    "is_failing": "1 while the historian's database or disk refuses.",
+    "is_flood": "1 in an alarm flood.",
+    "late": "Samples older than the last one.",
+    "lost": "Samples that are missing by their number.",
+    "malformed": "Messages that are not what their key promises.",
+    "malformed_orders": "Orders that are none.",
+    "missing_values": "Values that are not there.",
+    "out_of_range_values": "Values that cannot be.",
+    "peak_10min": "Most alarms in any ten minutes of the last day.",
+    "rows": "Rows of the recording that were replayed.",
+    "sample_age_s": "Time since the last sample came. [s]",
+    "samples": "Samples taken.",
+    "seconds": "Seconds of the plant that were simulated.",
+    "speed": "How many times as fast as life.",
+    "stale": "Alarms that stand for more than a day.",
+    "standing": "Alarms whose condition is there.",
+    "stations": "Stations that are watched.",
+    "unacknowledged": "Alarms that wait for an acknowledgement.",
+    "verdicts": "Verdicts published, or taken.",
+}
+"""By name of the figure. Prometheus sees it as `wetwell_<name>` with the labels `station` and `service`."""
