@@ -50,6 +50,22 @@ class DetectorSettings(Table):
     costs: Costs = Costs()
 
 
+class HistorianSettings(Table):
+    """The historian: where it keeps what, and for how long.
+
+    Days count back from the newest sample of a station. A batch is kept each `commit_s`; up to `spool_rows` wait in
+    memory while the disk or the database refuses.
+    """
+
+    folder: Path = Path("wetwell-data")
+    commit_s: Positive = 1.0
+    maintain_s: Positive = 60.0
+    spool_rows: Annotated[int, Field(ge=1)] = 500_000
+    keep_live_days: Annotated[int, Field(ge=1)] = 1
+    downsample_after_days: Annotated[int, Field(ge=2)] | None = None
+    keep_days: Annotated[int, Field(ge=2)] | None = None
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -60,6 +76,7 @@ class Settings(BaseSettings):
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
+    historian: HistorianSettings = HistorianSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:
