@@ -1,10 +1,11 @@
 """Settings of the services. Order: defaults < TOML file < environment (`WETWELL_...`) < flags."""
 
+import json
 import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, SecretStr, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
@@ -53,17 +54,25 @@ class DetectorSettings(Table):
 class HistorianSettings(Table):
     """The historian: where it keeps what, and for how long.
 
-    Days count back from the newest sample of a station. A batch is kept each `commit_s`; up to `spool_rows` wait in
-    memory while the disk or the database refuses.
+    `url` names a PostgreSQL database that is used in place of the folder, such as `postgresql://user@host/name`; its
+    password may stand in `password_file`. Days count back from the newest sample of a station. A batch is kept each
+    `commit_s`; up to `spool_rows` wait in memory while the disk or the database refuses.
     """
 
     folder: Path = Path("wetwell-data")
+    url: SecretStr | None = None
+    password_file: Path | None = None
     commit_s: Positive = 1.0
     maintain_s: Positive = 60.0
     spool_rows: Annotated[int, Field(ge=1)] = 500_000
     keep_live_days: Annotated[int, Field(ge=1)] = 1
     downsample_after_days: Annotated[int, Field(ge=2)] | None = None
     keep_days: Annotated[int, Field(ge=2)] | None = None
+
+    def for_child(self) -> str:
+        """As JSON for the environment of a child process, with the secret that `model_dump_json` masks."""
+        url = None if self.url is None else self.url.get_secret_value()
+        return json.dumps(self.model_dump(mode="json") | {"url": url})
 
 
 class Settings(BaseSettings):

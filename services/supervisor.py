@@ -1,4 +1,4 @@
-"""The whole service on one machine: router, simulator with its PLC, detector; verdicts on the terminal."""
+"""The whole service on one machine: router, simulator with its PLC, detector, historian; verdicts on the terminal."""
 
 import asyncio
 import contextlib
@@ -106,6 +106,7 @@ async def _child(
         "WETWELL_MODBUS": settings.modbus.model_dump_json(),
         "WETWELL_LOG": settings.log.model_dump_json(),
         "WETWELL_HEALTH": settings.health.model_dump_json(),
+        "WETWELL_HISTORIAN": settings.historian.for_child(),
     }
     child = await asyncio.create_subprocess_exec(
         sys.executable,

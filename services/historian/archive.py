@@ -54,6 +54,15 @@ class Archive:
             values=_matrix(table, columns_of(pumps_of(table.column_names))),
         )
 
+    def pumps(self, station: str, day_ns: int) -> int:
+        """Number of pumps in the file of a day; 0 if there is none."""
+        try:
+            return pumps_of(pa.parquet.read_schema(self.path("samples", station, day_ns)).names)
+        except FileNotFoundError:
+            return 0
+        except (OSError, pa.ArrowException) as error:
+            raise StoreError(f"{self.path('samples', station, day_ns)}: cannot be read: {error}") from error
+
     def minutes(self, station: str, day_ns: int) -> Summary | None:
         """Minutes of a day; None if there is no file."""
         table = self._read(self.path("minutes", station, day_ns))

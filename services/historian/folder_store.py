@@ -107,6 +107,16 @@ class FolderStore:
         ]
         return merged([*(each.between(start_ns, end_ns) for each in filed if each is not None), live])
 
+    def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
+        """Number of pumps that the samples of a span speak of; None if there are none."""
+        counts = [
+            self.archive.pumps(station, day_ns)
+            for day_ns in self.archive.days_ns("samples", station)
+            if start_ns - DAY_NS < day_ns < end_ns
+        ]
+        live = self.live.pumps(station, start_ns, end_ns)
+        return max(counts if live is None else [*counts, live], default=None)
+
     def summaries(self, station: str, start_ns: int, end_ns: int) -> Iterator[Summary]:
         """Minutes of days of which the samples are gone."""
         with_samples = set(self.archive.days_ns("samples", station))

@@ -12,6 +12,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store import Batch, EventKind, StationSpan, StoreError, span_of
@@ -119,6 +120,16 @@ class LiveDatabase:
                     (station, start_ns, end_ns),
                 ).fetchall()
             )
+
+    def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
+        """Number of pumps that the samples of a span speak of; None if there are none."""
+        with self._reading() as database:
+            (size,) = database.execute(
+                "SELECT max(length(data)) FROM sample WHERE station = (SELECT id FROM station WHERE name = ?) "
+                "AND time_ns >= ? AND time_ns < ?",
+                (station, start_ns, end_ns),
+            ).fetchone()
+        return None if size is None else (int(size) // 8 - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
 
     def next_time_ns(self, station: str, start_ns: int) -> int | None:
         """Time of the first sample from `start_ns` on."""

@@ -3,20 +3,25 @@
 import contextlib
 from collections.abc import Iterator
 
+from wetwell.protocols.errors import ConfigError
 from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.historian.store import Store
 from wetwell.services.settings import HistorianSettings
 
 
 @contextlib.contextmanager
-def open_store(settings: HistorianSettings, *, alone: bool = True) -> Iterator[Store]:
+def open_store(settings: HistorianSettings, *, alone: bool = True, must_exist: bool = False) -> Iterator[Store]:
     """Open the store; `alone` as the one historian that maintains it.
 
     Raises
     ------
+    ConfigError
+        If it must exist and does not.
     StoreError
         If it cannot be opened, or another historian works on it.
     """
+    if must_exist and not settings.folder.is_dir():
+        raise ConfigError(f"historian.folder: {settings.folder}: there is no history")
     store = FolderStore(
         settings.folder,
         keep_live_days=settings.keep_live_days,

@@ -65,6 +65,9 @@ class Store(Protocol):
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
         """Samples from `start_ns` until before `end_ns`. Ask for days, see `blocks`, and not for years."""
 
+    def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
+        """Number of pumps that the samples of a span speak of; None if there are none."""
+
     def summaries(self, station: str, start_ns: int, end_ns: int) -> Iterator[Summary]:
         """Minutes of the days of which the samples are no longer kept."""
 

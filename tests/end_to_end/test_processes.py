@@ -133,7 +133,7 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
             answer = plc.recv(64)
         assert answer[7:9] == bytes([4, 4])
         children = _children(up.pid)
-        assert len(children) == 2
+        assert len(children) == 3
         code, out, err = stop(up, signal.SIGINT)
         assert code == 0, err
         assert f"mbpoll -m tcp -p {modbus_port}" in out
