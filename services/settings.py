@@ -2,10 +2,11 @@
 
 import json
 import os
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, SecretStr, ValidationError
+from pydantic import Field, SecretStr, ValidationError, model_validator
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
@@ -68,6 +69,14 @@ class HistorianSettings(Table):
     keep_live_days: Annotated[int, Field(ge=1)] = 1
     downsample_after_days: Annotated[int, Field(ge=2)] | None = None
     keep_days: Annotated[int, Field(ge=2)] | None = None
+
+    @model_validator(mode="after")
+    def _days_rise(self) -> Self:
+        days = [self.keep_live_days, self.downsample_after_days, self.keep_days]
+        given = [each for each in days if each is not None]
+        if any(later <= earlier for earlier, later in pairwise(given)):
+            raise ValueError("keep_live_days < downsample_after_days < keep_days must hold")
+        return self
 
     def for_child(self) -> str:
         """As JSON for the environment of a child process, with the secret that `model_dump_json` masks."""

@@ -55,13 +55,17 @@ def _of_samples(store: Store, station: str, start_ns: int, end_ns: int, points: 
     """The samples if they are few, else a summary, block by block."""
     span_ns = -(-(end_ns - start_ns) // points)
     few: list[Samples] = []
-    parts = [part.over(start_ns, span_ns) for part in store.summaries(station, start_ns, end_ns)]
+    parts: list[Summary] = []
     for block in blocks(store, station, start_ns, end_ns):
         few.append(block)
         if parts or sum(map(len, few)) > points:
             parts += [Summary.of(each).over(start_ns, span_ns) for each in few]
             few = []
-    if not parts:
+    # after the samples: these turn into minutes, and what is seen twice changes no mean, least or largest value
+    parts += [part.over(start_ns, span_ns) for part in store.summaries(station, start_ns, end_ns)]
+    if parts:
+        parts += [Summary.of(each).over(start_ns, span_ns) for each in few]
+    else:
         samples = merged(few)
         return _columns(station, "samples", samples.time_ns, _by_name(samples))
     summary = joined(parts).over(start_ns, span_ns)

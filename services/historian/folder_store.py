@@ -7,19 +7,14 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
-from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.historian.archive import Archive
 from wetwell.services.historian.hours import HOUR_NS, Hours
 from wetwell.services.historian.live_database import LiveDatabase
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of
-from wetwell.services.historian.summary import Summary, joined
+from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller
 
 log = logging.getLogger(__name__)
-
-MINUTE_NS = 60 * NS_PER_S
 
 
 class FolderStore:
@@ -90,16 +85,17 @@ class FolderStore:
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span."""
-        days_ns = {day for day in self.archive.days_ns("samples", station) if start_ns - DAY_NS < day < end_ns}
-        next_ns = self.live.next_time_ns(station, start_ns)
+        live_ns = set()
+        next_ns = self.live.next_time_ns(station, start_ns)  # before the files: rows go from here to there
         while next_ns is not None and next_ns < end_ns:
-            days_ns.add(day_of(next_ns))
+            live_ns.add(day_of(next_ns))
             next_ns = self.live.next_time_ns(station, day_of(next_ns) + DAY_NS)
-        return sorted(days_ns)
+        filed_ns = {day for day in self.archive.days_ns("samples", station) if start_ns - DAY_NS < day < end_ns}
+        return sorted(live_ns | filed_ns)
 
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
         """Samples of a span; where file and database have the same one, that of the file."""
-        live = self.live.samples(station, start_ns, end_ns)  # before the files: rows go from here to there
+        live = self.live.samples(station, start_ns, end_ns)  # before the files, likewise
         filed = [
             self.archive.samples(station, day_ns)
             for day_ns in self.archive.days_ns("samples", station)
@@ -140,7 +136,7 @@ class FolderStore:
         """Turn one day into a file, or one old file into minutes, or delete one that is too old."""
         for span in self.stations():
             newest_ns = day_of(min(span.last_ns, now_ns))
-            for step in (self._delete_old, self._roll, self._downsample):
+            for step in (self._roll, self._downsample, self._delete_old):
                 done = step(span.station, newest_ns)
                 if done is not None:
                     return done
@@ -203,7 +199,7 @@ class FolderStore:
         return f"{self.archive.path('minutes', station, day_ns)}: {len(minutes)} minutes"
 
     def _delete_old(self, station: str, newest_ns: int) -> str | None:
-        """Delete what is too old: the oldest files, the samples that came late, verdicts and alarms."""
+        """Delete what is too old: the oldest file, or verdicts and alarms."""
         if self._keep_days is None:
             return None
         end_ns = newest_ns - self._keep_days * DAY_NS
@@ -212,18 +208,5 @@ class FolderStore:
             if days_ns and days_ns[0] < end_ns:
                 self.archive.delete(form, station, days_ns[0])
                 return f"{self.archive.path(form, station, days_ns[0])}: deleted"
-        first_ns = self.live.next_time_ns(station, -(2**63))
-        if first_ns is not None and first_ns < end_ns:
-            old = self.live.samples(station, first_ns, min(first_ns + DAY_NS, end_ns))
-            self.live.delete_samples(station, old)
-            return f"station '{station}': {len(old)} old samples deleted"
         events = self.live.delete_events(station, end_ns)
         return f"station '{station}': {events} old verdicts and alarms deleted" if events else None
-
-
-def fuller(earlier: Summary, later: Summary) -> Summary:
-    """Minutes of two origins: where both have a minute, the one with more values; of equal ones the later."""
-    both = joined([later, earlier])
-    order = np.lexsort((np.arange(len(both)), -both.count.sum(axis=1), both.time_ns))
-    is_first = np.r_[True, np.diff(both.time_ns[order]) > 0]
-    return both.take(order[is_first])

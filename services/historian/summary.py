@@ -1,12 +1,15 @@
 """Means, least and largest values over spans of time, which can be summed up again over longer ones."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.historian.samples import Floats, Integers, Samples, columns_of
+
+MINUTE_NS = 60 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +41,31 @@ class Summary:
         values = np.where(np.isfinite(samples.values), samples.values, np.nan)
         count = (~np.isnan(values)).astype(np.float64)
         return cls(time_ns=samples.time_ns, count=count, mean=values, low=values, high=values)
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[tuple[int, bytes, bytes, bytes, bytes]]) -> "Summary":
+        """Summary of rows (time, count, mean, low, high), float64, of the same or fewer columns."""
+        time_ns = np.array([row[0] for row in rows], dtype=np.int64)
+        width = max((len(row[1]) // 8 for row in rows), default=2)
+
+        def matrix(arrays: Iterable[bytes], nothing: float) -> Floats:
+            values = np.full((len(rows), width), nothing)
+            for number, array in enumerate(arrays):
+                values[number, : len(array) // 8] = np.frombuffer(array, dtype="<f8")
+            return values
+
+        return cls(
+            time_ns=time_ns,
+            count=matrix((row[1] for row in rows), 0.0),
+            mean=matrix((row[2] for row in rows), np.nan),
+            low=matrix((row[3] for row in rows), np.nan),
+            high=matrix((row[4] for row in rows), np.nan),
+        )
+
+    def lists(self) -> Iterator[tuple[int, list[float], list[float], list[float], list[float]]]:
+        """Rows (time, count, mean, low, high)."""
+        arrays = (self.time_ns, self.count, self.mean, self.low, self.high)
+        return zip(*(array.tolist() for array in arrays), strict=True)
 
     def over(self, start_ns: int, span_ns: int) -> "Summary":
         """Summary over equal spans from `start_ns` on; spans without a row are left out.
@@ -105,3 +133,11 @@ def joined(parts: Iterable[Summary]) -> Summary:
         low=stacked("low", np.nan),
         high=stacked("high", np.nan),
     )
+
+
+def fuller(earlier: Summary, later: Summary) -> Summary:
+    """Minutes of two origins: where both have a minute, the one with more values; of equal ones the later."""
+    both = joined([later, earlier])
+    order = np.lexsort((np.arange(len(both)), -both.count.sum(axis=1), both.time_ns))
+    is_first = np.r_[True, np.diff(both.time_ns[order]) > 0]
+    return both.take(order[is_first])
