@@ -5,23 +5,29 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from wetwell.protocols.messages import Message, Number, Stamp
+from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
 
-Kind = Literal["samples", "verdicts", "alarms", "kpi"]
+Kind = Literal["samples", "verdicts", "alarms", "kpi", "stations"]
+
+LONGEST_NS = MAX_STAMP_NS - 2 * 86_400 * NS_PER_S
+"""Times further from 1970 are not kept; it is in the year 2262."""
 
 
 class HistoryQuery(Message):
-    """What was kept of a station from `start` until before `end`.
+    """What was kept of a station from `start` until before `end`; without them, all.
 
-    Of samples and KPI at most `points` rows come: means, least and largest of equal spans if there are more (columns
-    `level_m`, `level_m_min`, `level_m_max`, ...). Of verdicts and alarms the last `points` come. `raw` asks for the
-    samples as they came, with `seq` and `quality`: the first `points` of them as messages, oldest first, and whether
-    there are `more` (ask again from after the last one).
+    Of samples at most `points` rows come: if there are more, the means, least and largest values of equal spans
+    (columns `level_m`, `level_m_min`, `level_m_max`, ...), `time` being the beginning of each span. `raw` asks for
+    the samples themselves, oldest first, up to `points`, with the columns `seq` and `quality` (0 good, 1 uncertain,
+    2 bad); the answer then says whether there are `more`. Of `kpi` hours come, or if they are more than `points`
+    days, and of these the last `points`. Of verdicts and alarms the last `points` come. `stations`, asked about the
+    station `_site`, gives a message for each station, with the times of its `first` and `last` sample.
     """
 
     schema_name: Literal["wetwell.history-query/1"] = Field("wetwell.history-query/1", alias="schema")
     kind: Kind
-    start: Stamp
-    end: Stamp
+    start: Stamp = -LONGEST_NS
+    end: Stamp = LONGEST_NS
     points: int = Field(1000, ge=1, le=100_000)
     raw: bool = False
 

@@ -1,10 +1,12 @@
 """Settings of the services. Order: defaults < TOML file < environment (`WETWELL_...`) < flags."""
 
+import json
 import os
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, SecretStr, ValidationError, model_validator
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
@@ -102,6 +104,38 @@ class AlarmSettings(Table):
     rules: dict[RuleName, RuleSettings] = Field(default_factory=dict)
 
 
+class HistorianSettings(Table):
+    """The historian: where it keeps what, and for how long.
+
+    `url` names a PostgreSQL database that is used in place of the folder, such as `postgresql://user@host/name`; its
+    password may stand in `password_file`. Days count back from the newest sample of a station. A batch is kept each
+    `commit_s`; up to `spool_rows` wait in memory while the disk or the database refuses.
+    """
+
+    folder: Path = Path("wetwell-data")
+    url: SecretStr | None = None
+    password_file: Path | None = None
+    commit_s: Positive = 1.0
+    maintain_s: Positive = 60.0
+    spool_rows: Annotated[int, Field(ge=1)] = 500_000
+    keep_live_days: Annotated[int, Field(ge=1)] = 1
+    downsample_after_days: Annotated[int, Field(ge=2)] | None = None
+    keep_days: Annotated[int, Field(ge=2)] | None = None
+
+    @model_validator(mode="after")
+    def _days_rise(self) -> Self:
+        days = [self.keep_live_days, self.downsample_after_days, self.keep_days]
+        given = [each for each in days if each is not None]
+        if any(later <= earlier for earlier, later in pairwise(given)):
+            raise ValueError("keep_live_days < downsample_after_days < keep_days must hold")
+        return self
+
+    def for_child(self) -> str:
+        """As JSON for the environment of a child process, with the secret that `model_dump_json` masks."""
+        url = None if self.url is None else self.url.get_secret_value()
+        return json.dumps(self.model_dump(mode="json") | {"url": url})
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -113,6 +147,7 @@ class Settings(BaseSettings):
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
     alarms: AlarmSettings = AlarmSettings()
+    historian: HistorianSettings = HistorianSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:

@@ -1,4 +1,4 @@
-"""The whole service on one machine: router, simulator with its PLC, detector; verdicts on the terminal."""
+"""The whole service on one machine: router, simulator with its PLC, detector, historian; verdicts on the terminal."""
 
 import asyncio
 import contextlib
@@ -125,6 +125,7 @@ async def _child(
         "WETWELL_LOG": settings.log.model_dump_json(),
         "WETWELL_HEALTH": alone.model_dump_json(),
         "WETWELL_ALARMS": settings.alarms.model_dump_json(),
+        "WETWELL_HISTORIAN": settings.historian.for_child(),
     }
     environment.pop("WETWELL_HEALTH__HTTP", None)
     child = await asyncio.create_subprocess_exec(

@@ -1,6 +1,7 @@
 """Services that run until they are stopped."""
 
 import asyncio
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -22,8 +23,9 @@ from wetwell.services.commands.options import (
     print_result,
     run,
     settings_of,
+    with_history,
 )
-from wetwell.services.settings import LogSettings, Settings
+from wetwell.services.settings import HistorianSettings, LogSettings, Settings
 
 app = typer.Typer()
 
@@ -41,9 +43,12 @@ def up(
     modbus: ModbusOption = None,
     word_order: WordOrderOption = None,
     config: ConfigOption = None,
+    data: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Keep the history here; default: gone at the end.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
-    """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector."""
+    """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector, historian."""
     from wetwell.services.supervisor import serve_all
     from wetwell.services.terminal import banner, line_printer
 
@@ -65,9 +70,16 @@ def up(
         str(speed),
         "--modbus-server",
     ]
-    commands = {"detector": ["detector", "--station", station], "simulator": ["simulator", *live]}
-    commands["alarms"] = ["alarms", "--station", station]
-    run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
+    commands = {
+        "historian": ["historian"],
+        "detector": ["detector", "--station", station],
+        "alarms": ["alarms", "--station", station],
+        "simulator": ["simulator", *live],
+    }
+    with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
+        if data is not None or settings.historian == HistorianSettings():
+            settings = with_history(settings, data or Path(folder))
+        run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
 
 
 @app.command()

@@ -42,8 +42,8 @@ PreparationOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
-def parse_duration_s(text: str) -> float:
-    """Seconds in a text such as 90, 90s, 10m or 2h.
+def parse_duration_s(text: str, flag: str = "--for") -> float:
+    """Seconds in a text such as 90, 90s, 10m or 2h; an error names the flag.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def parse_duration_s(text: str) -> float:
     """
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh]?)", text)
     if match is None:
-        raise ConfigError(f"--for: got '{text}', must be a time such as 90s, 10m or 2h")
+        raise ConfigError(f"{flag}: got '{text}', must be a time such as 90s, 10m or 2h")
     return float(match[1]) * {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}[match[2]]
 
 
@@ -79,6 +79,14 @@ def settings_of(
     if word_order is not None:
         flags.setdefault("modbus", {})["word_order"] = word_order
     return load_settings(config, flags)
+
+
+def with_history(settings: Settings, folder: Path | None) -> Settings:
+    """Settings with another folder of the history, if one is given."""
+    if folder is None:
+        return settings
+    historian = settings.historian.model_copy(update={"folder": folder, "url": None})
+    return settings.model_copy(update={"historian": historian})
 
 
 def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":

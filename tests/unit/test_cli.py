@@ -49,6 +49,12 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
         (["up", "--for", "soon"], "--for: got 'soon', must be a time such as 90s, 10m or 2h"),
         (["up", "--modbus", "here"], "--modbus: got 'here', must be HOST:PORT such as 127.0.0.1:5020"),
         (["up", "--zenoh", "udp"], "settings: zenoh.endpoint: got 'udp', string should match pattern"),
+        (["export", "--data", "{tmp}/no", "--out", "{tmp}/x.csv"], "historian.folder: {tmp}/no: there is no history"),
+        (
+            ["export", "--from", "soon", "--out", "{tmp}/x.csv"],
+            "--from: got 'soon', must be ISO 8601 such as 2025-01",
+        ),
+        (["history", "--last", "ever"], "--last: got 'ever', must be a time such as 90s, 10m or 2h"),
         (["config", "check", "{settings}"], "{settings}: modbus.prot: unknown key"),
     ],
 )
