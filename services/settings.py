@@ -50,6 +50,13 @@ class DetectorSettings(Table):
     costs: Costs = Costs()
 
 
+class SecuritySettings(Table):
+    """Who is let in: tokens of the dashboard, made by `wetwell token`; whether to listen to all without asking."""
+
+    tokens_file: Path | None = None
+    insecure: bool = False
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -60,6 +67,7 @@ class Settings(BaseSettings):
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
+    security: SecuritySettings = SecuritySettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:
