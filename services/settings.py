@@ -1,10 +1,11 @@
 """Settings of the services. Order: defaults < TOML file < environment (`WETWELL_...`) < flags."""
 
+import json
 import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, SecretStr, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
@@ -15,10 +16,29 @@ from wetwell.protocols.station import Positive, Table, load_toml
 CONFIG_VARIABLE = "WETWELL_CONFIG"
 
 
+class ZenohTlsSettings(Table):
+    """Certificates of the bus, for endpoints `tls/...`; PEM files."""
+
+    root_ca: Path | None = None
+    certificate: Path | None = None
+    private_key: Path | None = None
+    mutual: bool = True
+    verify_name: bool = True
+
+
 class ZenohSettings(Table):
-    """The bus."""
+    """The bus: where; as whom (`user`); for a router whom it lets in (`users_file`) and to what (`access_control`).
+
+    A password comes from `password_file`, or from the environment as `WETWELL_ZENOH__PASSWORD`.
+    """
 
     endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")] = "tcp/127.0.0.1:7447"
+    user: str | None = None
+    password: SecretStr | None = None
+    password_file: Path | None = None
+    users_file: Path | None = None
+    access_control: Path | Literal["default"] | None = None
+    tls: ZenohTlsSettings = ZenohTlsSettings()
 
 
 class ModbusSettings(Table):
@@ -94,6 +114,36 @@ def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None)
     except ValidationError as error:
         place = path if path is not None else "settings"
         raise ConfigError(f"{place}: {first_fault(error)}") from error
+
+
+def secret_of(name: str, value: SecretStr | None, file: Path | None) -> str | None:
+    """A secret that stands in the settings or, better, in a file of its own, without the end of the line.
+
+    Raises
+    ------
+    ConfigError
+        If both are given, or the file cannot be read or is empty. The secret itself is never in the message.
+    """
+    if value is not None and file is not None:
+        raise ConfigError(f"{name} and {name}_file are both given: which one counts?")
+    if file is None:
+        return None if value is None else value.get_secret_value()
+    try:
+        secret = file.read_text().strip("\r\n")
+    except (OSError, UnicodeError) as error:
+        raise ConfigError(f"{name}_file: {file}: cannot be read: {error}") from error
+    if not secret:
+        raise ConfigError(f"{name}_file: {file} is empty")
+    return secret
+
+
+def for_child(table: Table) -> str:
+    """A table as JSON for the environment of a child process, with the secrets that every other print masks."""
+    return json.dumps(table.model_dump(), default=_plain)
+
+
+def _plain(value: object) -> str:
+    return value.get_secret_value() if isinstance(value, SecretStr) else str(value)
 
 
 def _merged(*trees: dict[str, Any]) -> dict[str, Any]:

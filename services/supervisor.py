@@ -13,7 +13,7 @@ from wetwell.protocols.link import Bus, Subscription
 from wetwell.protocols.messages import MessageError, Verdict
 from wetwell.services.bus import listen
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
-from wetwell.services.settings import Settings
+from wetwell.services.settings import Settings, for_child
 
 log = logging.getLogger(__name__)
 
@@ -102,10 +102,10 @@ async def _child(
     """Start a child in a session of its own; at the end ask it to stop, and make it stop if it does not."""
     environment = os.environ | {
         PARENT_VARIABLE: "1",
-        "WETWELL_ZENOH": settings.zenoh.model_dump_json(),
-        "WETWELL_MODBUS": settings.modbus.model_dump_json(),
-        "WETWELL_LOG": settings.log.model_dump_json(),
-        "WETWELL_HEALTH": settings.health.model_dump_json(),
+        "WETWELL_ZENOH": for_child(settings.zenoh),
+        "WETWELL_MODBUS": for_child(settings.modbus),
+        "WETWELL_LOG": for_child(settings.log),
+        "WETWELL_HEALTH": for_child(settings.health),
     }
     child = await asyncio.create_subprocess_exec(
         sys.executable,
