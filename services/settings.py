@@ -5,13 +5,14 @@ import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, SecretStr, ValidationError
+from pydantic import Field, IPvAnyNetwork, SecretStr, ValidationError
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.registers import WordOrder
 from wetwell.protocols.station import Positive, Table, load_toml
+from wetwell.protocols.write_permission import LOOPBACK_WRITES
 
 CONFIG_VARIABLE = "WETWELL_CONFIG"
 
@@ -41,13 +42,35 @@ class ZenohSettings(Table):
     tls: ZenohTlsSettings = ZenohTlsSettings()
 
 
+class ModbusTlsSettings(Table):
+    """Certificates of the Modbus server, PEM: with them it speaks TLS only; with `client_ca` clients need one too."""
+
+    certificate: Path | None = None
+    private_key: Path | None = None
+    client_ca: Path | None = None
+
+
+class WriteRule(Table):
+    """Registers that the clients of a network may write; `*` stands for any part of a name."""
+
+    client: IPvAnyNetwork
+    registers: Annotated[tuple[str, ...], Field(min_length=1)]
+
+
 class ModbusSettings(Table):
-    """The Modbus TCP server. Port 5020 needs no privilege, unlike the standard 502."""
+    """The Modbus TCP server. Port 5020 needs no privilege, unlike the standard 502 (802 with TLS).
+
+    `write_allow` says who may write; by default programs on this machine may, and nobody else.
+    """
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 5020
     unit_id: Annotated[int, Field(ge=1, le=247)] = 1
     word_order: WordOrder = "ABCD"
+    tls: ModbusTlsSettings = ModbusTlsSettings()
+    write_allow: tuple[WriteRule, ...] = tuple(
+        WriteRule(client=one.client, registers=one.registers) for one in LOOPBACK_WRITES
+    )
 
 
 class LogSettings(Table):
