@@ -292,7 +292,7 @@ class _Handler(ServerRequestHandler):
     """One connection, which knows whose request it serves."""
 
     def __init__(self, server: ModbusTcpServer, begin_s: float) -> None:
-        super().__init__(server, server.trace_packet, server.trace_pdu, server.trace_connect)
+        super().__init__(server, server.trace_packet, server.trace_pdu, server.trace_connect)  # type: ignore[no-untyped-call]
         self.begin_s = begin_s
 
     async def handle_request(self) -> None:
