@@ -298,7 +298,7 @@ class _Handler(ServerRequestHandler):
     async def handle_request(self) -> None:
         if isinstance(self.transport, asyncio.Transport):
             _client.set(self.transport.get_extra_info("peername", ("::",))[0])  # each request is a task of its own
-            await super().handle_request()
+            await super().handle_request()  # type: ignore[no-untyped-call]
 
 
 class _Connections(ModbusTcpServer):
