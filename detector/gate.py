@@ -119,11 +119,6 @@ class Gate:
         """How many samples and values were let through, marked or dropped; those that are not 0."""
         return Counter({name: int(self.state[name][0]) for name in COUNTS if self.state[name][0]})
 
-    @property
-    def last_ns(self) -> int | None:
-        """Time of the last sample that was let through."""
-        return self._last_ns
-
     def update(self, sample: Readings) -> Frame | None:
         """Frame of a sample, or None where it is dropped."""
         time_ns, seq, values, pumps, is_bad = self._live.fill(sample)

@@ -95,7 +95,7 @@ class Detector:
     @property
     def seen_until_ns(self) -> int:
         """Time of the last sample that was let through; 0 before the first."""
-        return self._gate.last_ns or 0
+        return int(self._gate.state["time_ns"][0])
 
     def update(self, sample: Readings) -> tuple[Verdict, ...]:
         """Verdicts that a sample brings."""

@@ -21,6 +21,7 @@ from wetwell.protocols.errors import ConfigError, LinkError
 from wetwell.protocols.link import Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 from wetwell.protocols.messages import JSON_ENCODING
+from wetwell.protocols.zenoh_access import OPEN, ZenohAccess
 
 logger = logging.getLogger(__name__)
 
@@ -266,22 +267,24 @@ class ZenohBus:
             return self._is_router or bool(self._session.info.routers_zid())
 
 
-def open_router(endpoint: str) -> ZenohBus:
+def open_router(endpoint: str, access: ZenohAccess = OPEN) -> ZenohBus:
     """Bus to which others connect.
 
     Parameters
     ----------
     endpoint : str
-        Where to listen, such as `tcp/127.0.0.1:7447`.
+        Where to listen, such as `tcp/127.0.0.1:7447`, or `tls/...` with a certificate.
+    access : ZenohAccess
+        Who may come, and what they may do.
 
     Raises
     ------
     ConfigError
-        If `endpoint` is not of that form.
+        If `endpoint` is not of that form, or something of `access` is missing or cannot be read.
     LinkError
         If the endpoint cannot be listened on, most often because another program does.
     """
-    config = _config("router", endpoint)
+    config = _config("router", endpoint, access)
     config.insert_json5("scouting/delay", "0")  # nobody is scouted: do not wait for answers
     try:
         return ZenohBus(zenoh.open(config), is_router=True)
@@ -289,34 +292,37 @@ def open_router(endpoint: str) -> ZenohBus:
         raise LinkError(f"cannot listen on {endpoint}: {_reason(error)}") from error
 
 
-def open_client(endpoint: str, *, timeout_s: float = 2.0) -> ZenohBus:
+def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0) -> ZenohBus:
     """Bus through the router at an endpoint; waits up to `timeout_s` for it.
 
     Raises
     ------
     ConfigError
-        If `endpoint` is not of the form `tcp/127.0.0.1:7447`.
+        If `endpoint` is not of the form `tcp/127.0.0.1:7447`, or something of `access` is missing or cannot be read.
     LinkError
         If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
     """
-    config = _config("client", endpoint)
+    config = _config("client", endpoint, access)
     config.insert_json5("connect/timeout_ms", str(max(1, round(timeout_s * 1000))))
     config.insert_json5("connect/retry", json.dumps(RECONNECT))
     try:
         return ZenohBus(zenoh.open(config), is_router=False)
     except zenoh.ZError as error:
-        raise LinkError(
-            f"no router reached at {endpoint} within {timeout_s:g} s (wrong credentials look the same)"
-        ) from error
+        doubt = f"it is away or refuses {access.shown}" if access.shown else "wrong credentials look the same"
+        raise LinkError(f"no router reached at {endpoint} within {timeout_s:g} s ({doubt})") from error
 
 
-async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_s: float = 10.0) -> ZenohBus:
+async def connect_client(
+    endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0, longest_wait_s: float = 10.0
+) -> ZenohBus:
     """Bus through the router at an endpoint; tries until it is there, with full jitter, and logs each failure.
 
     Parameters
     ----------
     endpoint : str
         Where the router listens, such as `tcp/127.0.0.1:7447`.
+    access : ZenohAccess
+        Who this client is.
     timeout_s : float
         Time limit of one try. [s]
     longest_wait_s : float
@@ -325,12 +331,12 @@ async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_
     Raises
     ------
     ConfigError
-        If `endpoint` is not of that form: no later try would help.
+        If `endpoint` is not of that form or `access` is wrong in itself: no later try would help.
     """
     attempt = 0
     while True:
         try:
-            return await _open_in_thread(endpoint, timeout_s)
+            return await _open_in_thread(endpoint, access, timeout_s)
         except LinkError as error:
             attempt += 1
             wait_s = random.uniform(0.0, min(longest_wait_s, 1.5 ** min(attempt, 100)))
@@ -338,10 +344,10 @@ async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_
         await asyncio.sleep(wait_s)
 
 
-async def _open_in_thread(endpoint: str, timeout_s: float) -> ZenohBus:
+async def _open_in_thread(endpoint: str, access: ZenohAccess, timeout_s: float) -> ZenohBus:
     """Open a client without blocking the loop; a bus that comes after a cancellation is closed in the thread."""
     executor = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh-open")
-    opening = executor.submit(open_client, endpoint, timeout_s=timeout_s)
+    opening = executor.submit(open_client, endpoint, access, timeout_s=timeout_s)
     executor.shutdown(wait=False)
     try:
         return await asyncio.wrap_future(opening)
@@ -366,7 +372,7 @@ def _recovery(*, with_history: bool) -> zenoh.ext.RecoveryConfig:
     return zenoh.ext.RecoveryConfig(heartbeat=None, periodic_queries=period)
 
 
-def _config(mode: Literal["router", "client"], endpoint: str) -> zenoh.Config:
+def _config(mode: Literal["router", "client"], endpoint: str, access: ZenohAccess) -> zenoh.Config:
     config = zenoh.Config()
     settings: dict[str, Any] = {
         "mode": mode,
@@ -380,6 +386,11 @@ def _config(mode: Literal["router", "client"], endpoint: str) -> zenoh.Config:
             config.insert_json5(name, json.dumps(value))
     except zenoh.ZError as error:
         raise ConfigError(f"endpoint must be of the form tcp/ADDRESS:PORT, got '{endpoint}'") from error
+    for name, value in access.settings(mode, endpoint).items():
+        try:
+            config.insert_json5(name, json.dumps(value))
+        except zenoh.ZError:  # its text may hold a password
+            raise ConfigError(f"zenoh refuses the settings of {name}") from None
     return config
 
 

@@ -6,7 +6,7 @@ from typing import NoReturn
 import typer
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.services.commands import alarms, gap, historian, judging, listing, live, recordings
+from wetwell.services.commands import alarms, gap, historian, judging, listing, live, recordings, token
 
 app = typer.Typer(
     name="wetwell",
@@ -19,6 +19,7 @@ for group in (live, historian, recordings, judging, listing):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap")
 app.add_typer(alarms.app, name="alarms")
+app.add_typer(token.app, name="token")
 
 
 def main() -> NoReturn:

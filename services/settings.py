@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, SecretStr, ValidationError, model_validator
+from pydantic import Field, IPvAnyNetwork, SecretStr, ValidationError, model_validator
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
 from wetwell.detector.dispatch import Costs
@@ -14,24 +14,66 @@ from wetwell.protocols.alarm_messages import Priority
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.registers import WordOrder
 from wetwell.protocols.station import Finite, NonNegative, Positive, Table, load_toml
+from wetwell.protocols.write_permission import LOOPBACK_WRITES
 from wetwell.services.alarms.rules import RuleName
 
 CONFIG_VARIABLE = "WETWELL_CONFIG"
 
 
+class ZenohTlsSettings(Table):
+    """Certificates of the bus, for endpoints `tls/...`; PEM files."""
+
+    root_ca: Path | None = None
+    certificate: Path | None = None
+    private_key: Path | None = None
+    mutual: bool = True
+    verify_name: bool = True
+
+
 class ZenohSettings(Table):
-    """The bus."""
+    """The bus: where; as whom (`user`); for a router whom it lets in (`users_file`) and to what (`access_control`).
+
+    A password comes from `password_file`, or from the environment as `WETWELL_ZENOH__PASSWORD`.
+    """
 
     endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")] = "tcp/127.0.0.1:7447"
+    user: str | None = None
+    password: SecretStr | None = None
+    password_file: Path | None = None
+    users_file: Path | None = None
+    access_control: Path | Literal["default"] | None = None
+    tls: ZenohTlsSettings = ZenohTlsSettings()
+
+
+class ModbusTlsSettings(Table):
+    """Certificates of the Modbus server, PEM: with them it speaks TLS only; with `client_ca` clients need one too."""
+
+    certificate: Path | None = None
+    private_key: Path | None = None
+    client_ca: Path | None = None
+
+
+class WriteRule(Table):
+    """Registers that the clients of a network may write; `*` stands for any part of a name."""
+
+    client: IPvAnyNetwork
+    registers: Annotated[tuple[str, ...], Field(min_length=1)]
 
 
 class ModbusSettings(Table):
-    """The Modbus TCP server. Port 5020 needs no privilege, unlike the standard 502."""
+    """The Modbus TCP server. Port 5020 needs no privilege, unlike the standard 502 (802 with TLS).
+
+    `write_allow` says who may write; by default programs on this machine may, and nobody else.
+    """
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 5020
     unit_id: Annotated[int, Field(ge=1, le=247)] = 1
     word_order: WordOrder = "ABCD"
+    tls: ModbusTlsSettings = ModbusTlsSettings()
+    write_allow: tuple[WriteRule, ...] = tuple(
+        WriteRule(client=one.client, registers=one.registers) for one in LOOPBACK_WRITES
+    )
 
 
 class LogSettings(Table):
@@ -130,10 +172,12 @@ class HistorianSettings(Table):
             raise ValueError("keep_live_days < downsample_after_days < keep_days must hold")
         return self
 
-    def for_child(self) -> str:
-        """As JSON for the environment of a child process, with the secret that `model_dump_json` masks."""
-        url = None if self.url is None else self.url.get_secret_value()
-        return json.dumps(self.model_dump(mode="json") | {"url": url})
+
+class SecuritySettings(Table):
+    """Who is let in: tokens of the dashboard, made by `wetwell token`; whether to listen to all without asking."""
+
+    tokens_file: Path | None = None
+    insecure: bool = False
 
 
 class Settings(BaseSettings):
@@ -148,6 +192,7 @@ class Settings(BaseSettings):
     detector: DetectorSettings = DetectorSettings()
     alarms: AlarmSettings = AlarmSettings()
     historian: HistorianSettings = HistorianSettings()
+    security: SecuritySettings = SecuritySettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:
@@ -174,6 +219,39 @@ def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None)
     except ValidationError as error:
         place = path if path is not None else "settings"
         raise ConfigError(f"{place}: {first_fault(error)}") from error
+
+
+def secret_of(name: str, value: SecretStr | None, file: Path | None) -> str | None:
+    """A secret that stands in the settings or, better, in a file of its own, without the end of the line.
+
+    Raises
+    ------
+    ConfigError
+        If both are given, or the file cannot be read or is empty. The secret itself is never in the message.
+    """
+    if value is not None and file is not None:
+        raise ConfigError(f"{name} and {name}_file are both given: which one counts?")
+    if file is None:
+        return None if value is None else value.get_secret_value()
+    try:
+        secret = file.read_text().strip("\r\n")
+    except (OSError, UnicodeError) as error:
+        raise ConfigError(f"{name}_file: {file}: cannot be read: {error}") from error
+    if not secret:
+        raise ConfigError(f"{name}_file: {file} is empty")
+    return secret
+
+
+def environment_of(settings: Settings) -> dict[str, str]:
+    """Variables that give a child process the same settings, with the secrets that every other print masks."""
+    return {
+        f"WETWELL_{section.upper()}": json.dumps(getattr(settings, section).model_dump(), default=_plain)
+        for section in Settings.model_fields
+    }
+
+
+def _plain(value: object) -> str:
+    return value.get_secret_value() if isinstance(value, SecretStr) else str(value)
 
 
 def _merged(*trees: dict[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from wetwell.protocols.messages import MessageError, Status, Verdict
 from wetwell.services.bus import listen
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
 from wetwell.services.health.board import BOARD
-from wetwell.services.settings import Settings
+from wetwell.services.settings import Settings, environment_of
 
 log = logging.getLogger(__name__)
 
@@ -118,15 +118,8 @@ async def _child(
 ) -> AsyncIterator[asyncio.subprocess.Process]:
     """Start a child in a session of its own; at the end ask it to stop, and make it stop if it does not."""
     alone = settings.health.model_copy(update={"http": None})  # the page is the supervisor's
-    environment = os.environ | {
-        PARENT_VARIABLE: "1",
-        "WETWELL_ZENOH": settings.zenoh.model_dump_json(),
-        "WETWELL_MODBUS": settings.modbus.model_dump_json(),
-        "WETWELL_LOG": settings.log.model_dump_json(),
-        "WETWELL_HEALTH": alone.model_dump_json(),
-        "WETWELL_ALARMS": settings.alarms.model_dump_json(),
-        "WETWELL_HISTORIAN": settings.historian.for_child(),
-    }
+    given = environment_of(settings.model_copy(update={"health": alone}))
+    environment = os.environ | given | {PARENT_VARIABLE: "1"}
     environment.pop("WETWELL_HEALTH__HTTP", None)
     child = await asyncio.create_subprocess_exec(
         sys.executable,
