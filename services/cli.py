@@ -6,7 +6,7 @@ from typing import NoReturn
 import typer
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.services.commands import gap, judging, listing, live, recordings
+from wetwell.services.commands import gap, gateway, judging, listing, live, recordings
 
 app = typer.Typer(
     name="wetwell",
@@ -18,6 +18,7 @@ app = typer.Typer(
 for group in (live, recordings, judging, listing):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap")
+app.add_typer(gateway.app, name="gateway")
 
 
 def main() -> NoReturn:

@@ -50,6 +50,13 @@ class DetectorSettings(Table):
     costs: Costs = Costs()
 
 
+class GatewaySettings(Table):
+    """The gateway: files of the PLCs that it polls, and its longest wait before a connection is made anew."""
+
+    plcs: tuple[Path, ...] = ()
+    longest_wait_s: Positive = 30.0
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -60,6 +67,7 @@ class Settings(BaseSettings):
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
+    gateway: GatewaySettings = GatewaySettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:
