@@ -230,9 +230,9 @@ class ModbusConnection:
 
 def _reason(error: Exception) -> str:
     """What the system says; asyncio puts a text of its own in the place of it."""
-    if isinstance(error, OSError) and not isinstance(error, socket.gaierror) and error.errno:
-        return os.strerror(error.errno).lower()
-    return str(getattr(error, "strerror", None) or error)
+    if isinstance(error, ssl.SSLError | socket.gaierror):
+        return (error.strerror or str(error)).lower()
+    return os.strerror(error.errno).lower() if isinstance(error, OSError) and error.errno else str(error)
 
 
 def _keep_alive(connection: socket.socket) -> None:
