@@ -76,7 +76,7 @@ class StationFeed:
         quality = self._watch_heartbeat(poll.values, now_s)
         if self._plc.device.clock == "plc":
             time_s = poll.values["time_s"]
-            if time_s is None or not abs(time_s) <= MAX_STAMP_NS / NS_PER_S - 1.0:
+            if not time_s or abs(time_s) > MAX_STAMP_NS / NS_PER_S - 1.0:  # whole numbers know no "no value" but 0
                 self.counts["without_time"] += 1
                 return None
             stamp_ns = round(time_s * NS_PER_S)
