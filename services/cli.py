@@ -6,7 +6,7 @@ from typing import NoReturn
 import typer
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.services.commands import alarms, gap, historian, judging, listing, live, recordings, token
+from wetwell.services.commands import alarms, gap, gateway, historian, judging, listing, live, recordings, token
 
 app = typer.Typer(
     name="wetwell",
@@ -20,6 +20,7 @@ for group in (live, historian, recordings, judging, listing):
 app.add_typer(gap.app, name="gap")
 app.add_typer(alarms.app, name="alarms")
 app.add_typer(token.app, name="token")
+app.add_typer(gateway.app, name="gateway")
 
 
 def main() -> NoReturn:

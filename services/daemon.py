@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Callable
 
 from wetwell.protocols.keys import alive_key, status_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import Status
+from wetwell.protocols.messages import ServiceState, Status
 from wetwell.services.clock import now_ns
 from wetwell.services.health.board import BOARD
 from wetwell.services.systemd.notify import watched_by_systemd
@@ -78,14 +78,26 @@ async def until(stop: asyncio.Event, task: asyncio.Task[None]) -> None:
         raise error
 
 
+def _running() -> tuple[ServiceState, str]:
+    return "running", ""
+
+
 async def report_health(
-    bus: Bus, station: str, service: str, period_s: float, figures: Callable[[], dict[str, float]]
+    bus: Bus,
+    station: str,
+    service: str,
+    period_s: float,
+    figures: Callable[[], dict[str, float]],
+    condition: Callable[[], tuple[ServiceState, str]] = _running,
 ) -> None:
-    """Show that a service lives, and publish its figures for ever, also on the board behind `/metrics`."""
+    """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`."""
     bus.announce(alive_key(station, service))
     publisher = bus.publisher(status_key(station, service))
     never = asyncio.Event()
     async for _ in ticks(period_s, never):
-        status = Status(time=now_ns(), station=station, service=service, state="running", figures=figures())
+        state, reason = condition()
+        status = Status(
+            time=now_ns(), station=station, service=service, state=state, figures=figures(), reason=reason
+        )
         BOARD.report(station, service, period_s, status.figures)
         publisher.put(status.encode())

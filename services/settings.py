@@ -180,6 +180,13 @@ class SecuritySettings(Table):
     insecure: bool = False
 
 
+class GatewaySettings(Table):
+    """The gateway: files of the PLCs that it polls, and its longest wait before a connection is made anew."""
+
+    plcs: tuple[Path, ...] = ()
+    longest_wait_s: Positive = 30.0
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -193,6 +200,7 @@ class Settings(BaseSettings):
     alarms: AlarmSettings = AlarmSettings()
     historian: HistorianSettings = HistorianSettings()
     security: SecuritySettings = SecuritySettings()
+    gateway: GatewaySettings = GatewaySettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:
