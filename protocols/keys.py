@@ -53,3 +53,8 @@ def alarm_report_key() -> str:
 def history_key(station: str) -> str:
     """Key of the questions to the historian about a station."""
     return f"{ROOT}/{station}/history"
+
+
+def plan_key(shard: int) -> str:
+    """Key of the plan of a shard of the fleet."""
+    return f"{ROOT}/{SITE}/plan/{shard}"

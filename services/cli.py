@@ -6,7 +6,18 @@ from typing import NoReturn
 import typer
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.services.commands import alarms, gap, gateway, historian, judging, listing, live, recordings, token
+from wetwell.services.commands import (
+    alarms,
+    fleet,
+    gap,
+    gateway,
+    historian,
+    judging,
+    listing,
+    live,
+    recordings,
+    token,
+)
 
 app = typer.Typer(
     name="wetwell",
@@ -15,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-for group in (live, historian, recordings, judging, listing):
+for group in (live, historian, fleet, recordings, judging, listing):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap")
 app.add_typer(alarms.app, name="alarms")

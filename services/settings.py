@@ -95,10 +95,14 @@ class HealthSettings(Table):
 
 
 class DetectorSettings(Table):
-    """The detector: where it keeps its state, if anywhere, and what acts cost."""
+    """The detector: where it keeps its state, if anywhere, how often, and what acts cost.
+
+    `crash_tries`: so often a station may bring the process down until it is left out.
+    """
 
     state_dir: Path | None = None
     checkpoint_s: Positive = 60.0
+    crash_tries: Annotated[int, Field(ge=1)] = 3
     costs: Costs = Costs()
 
 
@@ -187,6 +191,15 @@ class GatewaySettings(Table):
     longest_wait_s: Positive = 30.0
 
 
+class FleetSettings(Table):
+    """Many stations on Dask: the scheduler, or how many workers to start here; shards; how often to look around."""
+
+    scheduler: Annotated[str, Field(pattern=r"^(tcp|tls)://.+:\d+$")] | None = None
+    workers: Annotated[int, Field(ge=1)] | None = None
+    shards: Annotated[int, Field(ge=1, le=10_000)] = 8
+    period_s: Positive = 2.0
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -201,6 +214,7 @@ class Settings(BaseSettings):
     historian: HistorianSettings = HistorianSettings()
     security: SecuritySettings = SecuritySettings()
     gateway: GatewaySettings = GatewaySettings()
+    fleet: FleetSettings = FleetSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:

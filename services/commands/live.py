@@ -169,6 +169,18 @@ def rebaseline(
     print_result(answer | {"baseline": verdict.evidence.get("baseline")}, as_json=as_json)
 
 
+@detector_app.command()
+def release(
+    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")],
+    config: ConfigOption = None,
+) -> None:
+    """Judge a station again, from the next start on, that was left out because the detector had crashed at it."""
+    from wetwell.services.detector.quarantine import Quarantine
+
+    kept = settings_of(config).detector
+    Quarantine(kept.state_dir, "release", kept.crash_tries).release(station)
+
+
 @app.command()
 def replay(
     recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],

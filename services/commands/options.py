@@ -66,9 +66,10 @@ def settings_of(
     zenoh: str | None = None,
     modbus: str | None = None,
     word_order: Literal["ABCD", "CDAB"] | None = None,
+    more: dict[str, Any] | None = None,
 ) -> Settings:
     """Settings from file, environment and flags."""
-    flags: dict[str, Any] = {}
+    flags: dict[str, Any] = dict(more or {})
     if zenoh is not None:
         flags["zenoh"] = {"endpoint": zenoh}
     if modbus is not None:

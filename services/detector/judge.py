@@ -5,6 +5,7 @@ import logging
 import time
 from collections import Counter, OrderedDict
 from collections.abc import Iterable
+from itertools import islice
 
 from wetwell.detector.dispatch import Costs
 from wetwell.detector.nominal import nominal_of
@@ -14,6 +15,7 @@ from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Order, Sample, Verdict
 from wetwell.protocols.station import Station
 from wetwell.services.detector.checkpoint import Checkpoint, Told
+from wetwell.services.detector.quarantine import Quarantine
 
 log = logging.getLogger(__name__)
 
@@ -36,14 +38,22 @@ class StationJudge:
         For the expected cost of each act.
     checkpoint : Checkpoint, optional
         Where the state is kept; what it holds is taken up at once, and its last verdicts are published again.
+    quarantine : Quarantine, optional
+        What remembers at which station the process has died.
     """
 
     def __init__(
-        self, bus: Bus, station: Station, costs: Costs | None = None, checkpoint: Checkpoint | None = None
+        self,
+        bus: Bus,
+        station: Station,
+        costs: Costs | None = None,
+        checkpoint: Checkpoint | None = None,
+        quarantine: Quarantine | None = None,
     ) -> None:
         self.station = station.name
         self.detector = Detector(station.name, nominal_of(station), costs)
         self._checkpoint = checkpoint
+        self._quarantine = quarantine or Quarantine(None, "", 1)
         told = None if checkpoint is None else checkpoint.restore(self.detector)
         self.is_restored = told is not None
         self._orders = bus.subscribe(order_key(station.name))
@@ -66,17 +76,23 @@ class StationJudge:
         """Judge for ever. A payload that is no sample is counted and left out."""
         log.info("station '%s': waiting for samples", self.station)
         while True:
-            for payload in await self._samples.receive():
+            payloads = await self._samples.receive()
+            self._quarantine.enter(self.station)
+            for payload in payloads:
                 self._decode(payload)
+            self._quarantine.leave()
             self._heard_s = time.monotonic()
             await asyncio.sleep(0)  # let the health figures out between batches
 
     async def take(self, samples: Iterable[Sample]) -> None:
         """Judge samples that come another way, such as from the historian."""
-        for number, sample in enumerate(samples):
-            self._judge(sample)
-            if number % 100 == 99:
-                await asyncio.sleep(0)
+        left = iter(samples)
+        while batch := list(islice(left, 100)):
+            self._quarantine.enter(self.station)
+            for sample in batch:
+                self._judge(sample)
+            self._quarantine.leave()
+            await asyncio.sleep(0)
 
     async def obey(self) -> None:
         """Carry out the orders of operators for ever. One that is none is counted and left out."""
