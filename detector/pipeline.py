@@ -88,6 +88,11 @@ class Detector:
         """How many samples and values the gate has let through, marked or dropped."""
         return dict(self._gate.counts)
 
+    @property
+    def baselines(self) -> tuple[Baseline | None, ...]:
+        """What was learnt of each pump; None while it is being learnt."""
+        return tuple(None if pump.known is None else pump.known.baseline for pump in self._pumps)
+
     def update(self, sample: Readings) -> tuple[Verdict, ...]:
         """Verdicts that a sample brings."""
         frame = self._gate.update(sample)

@@ -15,6 +15,7 @@ from wetwell.protocols.station import Station
 from wetwell.services.bus import connect
 from wetwell.services.checkpoint import Checkpoint
 from wetwell.services.daemon import report_health, stop_event, until
+from wetwell.services.model_publisher import ModelPublisher
 from wetwell.services.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -67,6 +68,7 @@ class StationJudge:
             bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
             for pump in range(1, len(station.pump) + 1)
         ]
+        self._model = ModelPublisher(bus, station, self.detector)
         self._states: dict[int, str] = {}
         self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
@@ -137,6 +139,7 @@ class StationJudge:
     def _publish(self, verdict: Verdict) -> None:
         self._counts["verdicts"] += 1
         self._publishers[verdict.pump - 1].put(verdict.encode())
+        self._model.take(verdict)
         if self._states.get(verdict.pump) != verdict.state:
             log.info("station '%s' pump %d: %s", self._station, verdict.pump, verdict.state)
         self._states[verdict.pump] = verdict.state

@@ -10,6 +10,7 @@ from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
     ModbusOption,
+    PageOption,
     ScenarioOption,
     SeedOption,
     SpeedOption,
@@ -40,14 +41,15 @@ def up(
     zenoh: ZenohOption = None,
     modbus: ModbusOption = None,
     word_order: WordOrderOption = None,
+    page: PageOption = None,
     config: ConfigOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
-    """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector."""
+    """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector, page."""
     from wetwell.services.supervisor import serve_all
     from wetwell.services.terminal import banner, line_printer
 
-    settings = settings_of(config, zenoh, modbus, word_order)
+    settings = settings_of(config, zenoh, modbus, word_order, page)
     if settings.log == LogSettings():
         settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
     limit_s = None if limit is None else parse_duration_s(limit)
@@ -65,7 +67,11 @@ def up(
         str(speed),
         "--modbus-server",
     ]
-    commands = {"detector": ["detector", "--station", station], "simulator": ["simulator", *live]}
+    commands = {
+        "dashboard": ["dashboard"],
+        "detector": ["detector", "--station", station],
+        "simulator": ["simulator", *live],
+    }
     run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
 
 

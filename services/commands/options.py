@@ -30,6 +30,9 @@ ZenohOption = Annotated[str | None, typer.Option("--zenoh", metavar="ENDPOINT", 
 ModbusOption = Annotated[
     str | None, typer.Option("--modbus", metavar="HOST:PORT", help="Address of the Modbus TCP server.")
 ]
+PageOption = Annotated[
+    str | None, typer.Option("--page", metavar="HOST:PORT", help="Address of the control-room page.")
+]
 WordOrderOption = Annotated[
     Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
 ]
@@ -64,19 +67,26 @@ def settings_of(
     zenoh: str | None = None,
     modbus: str | None = None,
     word_order: Literal["ABCD", "CDAB"] | None = None,
+    page: str | None = None,
 ) -> Settings:
     """Settings from file, environment and flags."""
     flags: dict[str, Any] = {}
     if zenoh is not None:
         flags["zenoh"] = {"endpoint": zenoh}
     if modbus is not None:
-        host, colon, port = modbus.rpartition(":")
-        if not colon or not port.isdecimal():
-            raise ConfigError(f"--modbus: got '{modbus}', must be HOST:PORT such as 127.0.0.1:5020")
-        flags["modbus"] = {"host": host, "port": int(port)}
+        flags["modbus"] = _address("--modbus", modbus, "127.0.0.1:5020")
+    if page is not None:
+        flags["dashboard"] = _address("--page", page, "127.0.0.1:8080")
     if word_order is not None:
         flags.setdefault("modbus", {})["word_order"] = word_order
     return load_settings(config, flags)
+
+
+def _address(flag: str, text: str, example: str) -> dict[str, Any]:
+    host, colon, port = text.rpartition(":")
+    if not colon or not port.isdecimal():
+        raise ConfigError(f"{flag}: got '{text}', must be HOST:PORT such as {example}")
+    return {"host": host.strip("[]"), "port": int(port)}
 
 
 def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":
