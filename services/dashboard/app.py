@@ -108,11 +108,7 @@ class _Answers:
         return _json(request, self._desk.view.site_state())
 
     async def station(self, request: Request) -> Response:
-        name = request.path_params["station"]
-        state = self._desk.view.station_state(name)
-        if state is None:
-            raise RefusalError(404, f"station '{name}' is not known")
-        return _json(request, state)
+        return _json(request, self._desk.view.station_state(request.path_params["station"]))
 
     async def alarms(self, request: Request) -> Response:
         return _json(request, self._desk.view.alarms())
@@ -124,7 +120,7 @@ class _Answers:
 
     async def act(self, request: Request) -> Response:
         answer = await act_on_alarm(self._desk.asked(), request.path_params["station"], await request.body())
-        return JSONResponse(answer, 200 if answer["is_done"] else 409)
+        return JSONResponse(answer)
 
     async def history(self, request: Request) -> Response:
         answer = await history(self._desk.asked(), request.path_params["station"], request.query_params)

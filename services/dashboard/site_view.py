@@ -109,10 +109,10 @@ class SiteView:
         """JSON of the whole overview, in the form of a frame."""
         return self._overview([station.live() for station in self._order], self.stations)
 
-    def station_state(self, name: str) -> str | None:
-        """JSON of all that is known of a station; None if it is not known."""
-        station = self.stations.get(name)
-        return None if station is None else f'{{"id":{self.frame_id},{station.state()}}}'
+    def station_state(self, name: str) -> str:
+        """JSON of all that is known of a station, in the form of a frame; of one that is not known, that."""
+        station = self.stations.get(name) or StationView(name, -1, 1)
+        return f'{{"id":{self.frame_id},{station.state()}}}'
 
     def health(self, now_s: float) -> list[dict[str, Any]]:
         """Services with their last figures and how long ago they came. [s]."""

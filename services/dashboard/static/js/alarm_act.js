@@ -39,7 +39,7 @@ async function send(alarm, act, tell) {
       body: JSON.stringify(order),
     });
     const told = await answer.json();
-    tell(answer.ok ? "" : (told.error ?? told.reason));
+    tell(told.is_done ? "" : (told.error ?? told.reason));
   } catch {
     tell("no connection: nothing was done");
   }

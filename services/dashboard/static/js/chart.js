@@ -33,12 +33,12 @@ export function chart(label, series, options = {}) {
         width: Math.max(120, element.clientWidth),
         height: options.height ?? 130,
         tzDate: (time) => uPlot.tzDate(new Date(time * 1000), "Etc/UTC"),
-        legend: { show: options.legend ?? false, live: true },
+        legend: { show: Boolean(options.legend), live: options.legend === "live" },
         cursor: { sync: options.sync ? { key: options.sync } : undefined, drag: { x: Boolean(options.onZoom), y: false } },
-        scales: { y: { range: options.range ?? ((_, low, high) => spread(low, high)) } },
+        scales: { y: { ...options.scale, range: options.range ?? ((_, low, high) => spread(low, high)) } },
         axes: [
-          { ...axis, space: 70, size: 30 },
-          { ...axis, size: 46, label: options.unit, labelSize: options.unit ? 16 : 0, labelFont: "11px system-ui, sans-serif" },
+          { ...axis, space: 75, size: 30, values: (_, times, __, ___, step) => times.map((time) => moment(time * 1000).slice(...(step >= 86_400 ? [5, 10] : step < 60 ? [11, 19] : [11, 16]))) },
+          { ...axis, size: 46, splits: options.splits, filter: options.splits && ((_, splits) => splits), label: options.unit, labelSize: options.unit ? 16 : 0, labelFont: "11px system-ui, sans-serif" },
         ],
         series: [
           { label: "time", value: (_, time) => (time == null ? "–" : `${moment(time * 1000)}`) },

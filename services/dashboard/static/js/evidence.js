@@ -24,9 +24,15 @@ export function evidenceOf(verdict) {
 function probabilities(probability) {
   const rows = Object.entries(probability).sort(([, a], [, b]) => b - a).map(([name, share]) =>
     html("tr", {}, html("th", { scope: "row" }, STATES[name]?.word ?? name),
-      html("td", {}, html("meter", { min: 0, max: 1, value: share, "aria-label": STATES[name]?.word ?? name })),
+      html("td", { class: "share" }, bar(share)),
       html("td", { class: "number" }, percent(share))));
   return html("table", { class: "posterior" }, html("caption", {}, "Probability"), html("tbody", {}, ...rows));
+}
+
+function bar(share) {
+  const element = html("span", { class: "bar-of", "aria-hidden": "true" });
+  element.style.transform = `scaleX(${share})`;
+  return element;
 }
 
 function* facts({ evidence, onset }) {

@@ -5,7 +5,7 @@ export const NONE = "–";
 export const figure = (value, digits = 1) => (Number.isFinite(value) ? value.toFixed(digits) : NONE);
 
 export const signed = (value, digits = 2) =>
-  Number.isFinite(value) ? (value > 0 ? "+" : value < 0 ? "−" : "") + Math.abs(value).toFixed(digits) : NONE;
+  Number.isFinite(value) ? (Math.abs(value) < 0.5 * 10 ** -digits ? "" : value > 0 ? "+" : "−") + Math.abs(value).toFixed(digits) : NONE;
 
 export const percent = (share) => (Number.isFinite(share) ? `${(100 * share).toFixed(share > 0.9995 || share < 0.0005 ? 2 : 1)} %` : NONE);
 

@@ -29,7 +29,7 @@ export function historyPanel(station) {
   const on = html("button", { type: "button", "aria-label": "Later", onclick: () => move(0.5) }, "›");
   const download = html("a", { download: "", class: "button" }, "download as recording");
   const note = html("p", { class: "note", role: "status" }, "Choose a span; drag over the chart to zoom.");
-  const plot = chart("History", lines, { unit: "", height: 220, legend: true, onZoom: (from, to) => look({ from, to }) });
+  const plot = chart("History", lines, { unit: "", height: 220, legend: "live", onZoom: (from, to) => look({ from, to }) });
   const element = panel("History", html("div", { class: "buttons" }, choice, ...buttons, back, on, download), plot.element, note);
   element.classList.add("is-history");
   plot.element.hidden = true;

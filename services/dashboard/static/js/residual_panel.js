@@ -5,15 +5,17 @@ import { html, panel, say } from "./dom.js";
 import { millis } from "./format.js";
 
 const LIMIT = 3;
+const SPLITS = [-1000, -300, -100, -30, -10, -3, 0, 3, 10, 30, 100, 300, 1000];
 
 export function residualPanel(station, chosen) {
   const limits = () => [{ value: LIMIT, word: `+${LIMIT} σ` }, { value: -LIMIT, word: `−${LIMIT} σ` }];
-  const range = (_, low, high) => [Math.min(-4, (low ?? 0) * 1.1), Math.max(4, (high ?? 0) * 1.1)];
+  const range = (_, low, high) => [Math.min(-6, (low ?? 0) * 1.3), Math.max(6, (high ?? 0) * 1.3)];
+  const splits = (_, __, low, high) => SPLITS.filter((value) => value >= low && value <= high);
   const points = { show: true, size: 4 };
   const sigmas = chart("Residuals of each run in standard deviations", () => [
     { label: "pump curve r_p", pen: "pen1", points },
     { label: "system curve r_s", pen: "pen2", dash: [6, 3], points },
-  ], { unit: "shift, σ", height: 150, limits, range, legend: true });
+  ], { unit: "shift, σ", height: 170, limits, range, splits, scale: { distr: 4, asinh: LIMIT }, legend: true });
   const index = chart("Attribution index of each run", () => [
     { label: "I_W", pen: "pen3", points },
     { label: "system below", pen: "steel", dash: [4, 4], width: 1 },

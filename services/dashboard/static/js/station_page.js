@@ -79,7 +79,6 @@ export function stationPage(name, main, showLink) {
     },
     apply: (frame) => later(station.take(frame)),
     link: showLink,
-    missing: () => say(time, "not known yet: nothing was heard of it"),
   });
   return () => {
     end();

@@ -18,7 +18,6 @@ export function follow(events, state, view) {
     const mine = (waiting = []);
     try {
       const answer = await fetch(state);
-      if (answer.status === 404) view.missing?.();
       if (!answer.ok) throw new Error(answer.statusText);
       const whole = await answer.json();
       if (ended || waiting !== mine) return;

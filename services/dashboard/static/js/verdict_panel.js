@@ -5,9 +5,8 @@ import { evidenceOf } from "./evidence.js";
 import { clock, millis, moment } from "./format.js";
 import { STATES, chip, icon, state } from "./states.js";
 
-const WIDTH = 760;
 const LANE = 30;
-const LEFT = 62;
+const LEFT = 78;
 
 export function verdictPanel(station, chosen, choose) {
   const drawing = svg("svg", { class: "lanes", role: "img", "aria-label": "State of each pump over time; the list of changes tells the same" });
@@ -44,12 +43,13 @@ export function verdictPanel(station, chosen, choose) {
     const all = [...station.verdicts.values()].flat();
     const from = Math.min(...all.map((verdict) => millis(verdict.time)));
     const to = Math.max(...all.map((verdict) => millis(verdict.time)), from + 1000);
-    const x = (ms) => LEFT + ((WIDTH - LEFT - 8) * (ms - from)) / (to - from);
+    const width = drawing.clientWidth || 760;
+    const x = (ms) => LEFT + ((width - LEFT - 8) * (ms - from)) / (to - from);
     const height = LANE * station.pumps + 18;
-    mark(drawing, "viewBox", `0 0 ${WIDTH} ${height}`);
+    mark(drawing, "viewBox", `0 0 ${width} ${height}`);
     const lanes = Array.from({ length: station.pumps }, (_, index) => lane(index + 1, x, to));
     drawing.replaceChildren(...lanes,
-      svg("text", { x: LEFT, y: height - 4 }, moment(from)), svg("text", { x: WIDTH - 8, y: height - 4, "text-anchor": "end" }, clock(to)));
+      svg("text", { x: LEFT, y: height - 4 }, moment(from)), svg("text", { x: width - 8, y: height - 4, "text-anchor": "end" }, clock(to)));
   }
 
   function lane(number, x, to) {

@@ -24,21 +24,19 @@ export function wellPanel(station, chosen, choose) {
     const { left, right, top, bottom } = WELL;
     const width = right - left;
     water = svg("rect", { class: "water", x: left, y: top, width, height: bottom - top });
-    levelText = svg("text", { class: "big", x: left + 12, y: bottom - 14 });
-    inflowText = svg("text", { x: 8, y: top - 34 });
+    levelText = svg("text", { class: "big", x: left - 7, "text-anchor": "end" });
+    inflowText = svg("text", { x: 4, y: top - 42 });
     mainText = svg("text", { x: right, y: 22, "text-anchor": "end" });
     pumps = Array.from({ length: station.pumps }, (_, place) => pumpDrawing(place + 1, left + (width * (place + 0.5)) / station.pumps, choose));
-    const lines = levels().map(({ value, word, side }) => {
+    const lines = levels().map(({ value, word }) => {
       const y = levelY(value);
-      return svg("g", { class: "limit" },
-        svg("line", { x1: side === "start" ? right - 14 : left, x2: side === "start" ? right : left + 14, y1: y, y2: y }),
-        svg("text", { x: side === "start" ? right + 3 : left - 3, y: y + 3.5, "text-anchor": side === "start" ? "start" : "end" }, word));
+      return svg("g", { class: "limit" }, svg("line", { x1: right - 14, x2: right, y1: y, y2: y }), svg("text", { x: right + 5, y: y + 3.5 }, word));
     });
     drawing.replaceChildren(
       svg("line", { class: "pipe", x1: left, x2: right, y1: 34, y2: 34 }),
       svg("path", { class: "arrow", d: `M${right} 34l-12 -7v14z` }),
-      svg("line", { class: "pipe", x1: 4, x2: left + 18, y1: top - 20, y2: top - 20 }),
-      svg("path", { class: "arrow", d: `M${left + 18} ${top - 22}l7 14h-14z` }),
+      svg("path", { class: "pipe", d: `M4 ${top - 30}H${left - 22}V${top - 8}` }),
+      svg("path", { class: "arrow", d: `M${left - 22} ${top + 4}l-7 -13h14z` }),
       water, svg("path", { class: "wall", d: `M${left} ${top - 8}V${bottom}H${right}V${top - 8}` }),
       ...lines, ...pumps.map((each) => each.element), levelText, inflowText, mainText,
     );
@@ -51,8 +49,8 @@ export function wellPanel(station, chosen, choose) {
   function levels() {
     const stops = station.model?.stop_levels_m ?? [];
     return [
-      ...starts().map((value, place) => ({ value, word: `S${place + 1}`, side: "start" })),
-      ...stops.map((value, place) => ({ value, word: `E${place + 1}`, side: "stop" })),
+      ...starts().map((value, place) => ({ value, word: `S${place + 1}` })),
+      ...stops.map((value, place) => ({ value, word: `E${place + 1}` })),
     ];
   }
 
@@ -66,6 +64,7 @@ export function wellPanel(station, chosen, choose) {
     const share = Number.isFinite(level) ? Math.min(1, Math.max(0, level / highest())) : 0;
     water.style.transform = `scaleY(${share})`;
     say(levelText, `${figure(level, 2)} m`);
+    mark(levelText, "y", (levelY(share * highest()) + 6).toFixed(0));
     say(inflowText, station.inflow == null ? "inflow" : `inflow ${figure(station.inflow, 0)} m³/h`);
     say(mainText, `rising main ${figure(station.totalFlow(), 0)} m³/h`);
     for (const each of pumps) each.update(station, chosen());
