@@ -32,7 +32,7 @@ class PumpModel(Message):
 
 
 class Model(Message):
-    """Model of a station, published when it changes."""
+    """Model of a station, published when it changes. On a common header the system curve is over the total flow."""
 
     schema_name: Literal["wetwell.model/1"] = Field("wetwell.model/1", alias="schema")
     time: Stamp
@@ -41,4 +41,5 @@ class Model(Message):
     start_levels_m: tuple[float, ...]
     stop_levels_m: tuple[float, ...]
     floor_area_m2: float
+    is_common_header: bool = False
     pumps: tuple[PumpModel, ...]

@@ -8,6 +8,7 @@ import typer
 from wetwell.protocols.errors import WetwellError
 from wetwell.services.commands import (
     alarms,
+    dashboard,
     fleet,
     gap,
     gateway,
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-for group in (live, historian, fleet, recordings, judging, listing):
+for group in (live, dashboard, historian, fleet, recordings, judging, listing):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap")
 app.add_typer(alarms.app, name="alarms")

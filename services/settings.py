@@ -200,6 +200,25 @@ class FleetSettings(Table):
     period_s: Positive = 2.0
 
 
+class DashboardSettings(Table):
+    """The control-room page.
+
+    Attributes
+    ----------
+    host, port
+        Where it listens.
+    reports : Path
+        Folder whose `*.html`, three levels down, the page lists.
+    stale_s : float
+        Without a sample for so long, a station has no data. [s]
+    """
+
+    host: Literal["127.0.0.1", "::1"] = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 8080
+    reports: Path | None = None
+    stale_s: Positive = 10.0
+
+
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -215,6 +234,7 @@ class Settings(BaseSettings):
     security: SecuritySettings = SecuritySettings()
     gateway: GatewaySettings = GatewaySettings()
     fleet: FleetSettings = FleetSettings()
+    dashboard: DashboardSettings = DashboardSettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:

@@ -11,6 +11,7 @@ from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
     ModbusOption,
+    PageOption,
     ScenarioOption,
     SeedOption,
     SpeedOption,
@@ -23,9 +24,8 @@ from wetwell.services.commands.options import (
     print_result,
     run,
     settings_of,
-    with_history,
 )
-from wetwell.services.settings import HistorianSettings, LogSettings, Settings
+from wetwell.services.settings import LogSettings, Settings
 
 app = typer.Typer()
 
@@ -42,17 +42,19 @@ def up(
     zenoh: ZenohOption = None,
     modbus: ModbusOption = None,
     word_order: WordOrderOption = None,
+    page: PageOption = None,
     config: ConfigOption = None,
     data: Annotated[
-        Path | None, typer.Option("--data", metavar="DIR", help="Keep the history here; default: gone at the end.")
+        Path | None,
+        typer.Option("--data", metavar="DIR", help="Keep history and states here; default: gone at the end."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
-    """Run the whole service on this machine: simulated station, Modbus, Zenoh, detector, historian."""
+    """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
     from wetwell.services.supervisor import serve_all
     from wetwell.services.terminal import banner, line_printer
 
-    settings = settings_of(config, zenoh, modbus, word_order)
+    settings = settings_of(config, zenoh, modbus, word_order, page=page)
     if settings.log == LogSettings():
         settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
     limit_s = None if limit is None else parse_duration_s(limit)
@@ -72,13 +74,13 @@ def up(
     ]
     commands = {
         "historian": ["historian"],
+        "dashboard": ["dashboard"],
         "detector": ["detector", "--station", station],
         "alarms": ["alarms", "--station", station],
         "simulator": ["simulator", *live],
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
-        if data is not None or settings.historian == HistorianSettings():
-            settings = with_history(settings, data or Path(folder))
+        settings = with_data(settings, data, Path(folder))
         run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.settings import Settings, load_settings
+from wetwell.protocols.station import Table
+from wetwell.services.settings import HistorianSettings, Settings, load_settings
 
 if TYPE_CHECKING:
     from wetwell.simulator.scenario import Scenario
@@ -31,6 +32,9 @@ ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file w
 ZenohOption = Annotated[str | None, typer.Option("--zenoh", metavar="ENDPOINT", help="Such as tcp/127.0.0.1:7447.")]
 ModbusOption = Annotated[
     str | None, typer.Option("--modbus", metavar="HOST:PORT", help="Address of the Modbus TCP server.")
+]
+PageOption = Annotated[
+    str | None, typer.Option("--page", metavar="HOST:PORT", help="Address of the control-room page.")
 ]
 WordOrderOption = Annotated[
     Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
@@ -67,19 +71,32 @@ def settings_of(
     modbus: str | None = None,
     word_order: Literal["ABCD", "CDAB"] | None = None,
     more: dict[str, Any] | None = None,
+    page: str | None = None,
 ) -> Settings:
     """Settings from file, environment and flags."""
     flags: dict[str, Any] = dict(more or {})
     if zenoh is not None:
         flags["zenoh"] = {"endpoint": zenoh}
     if modbus is not None:
-        host, colon, port = modbus.rpartition(":")
-        if not colon or not port.isdecimal():
-            raise ConfigError(f"--modbus: got '{modbus}', must be HOST:PORT such as 127.0.0.1:5020")
-        flags["modbus"] = {"host": host, "port": int(port)}
+        flags["modbus"] = _address("--modbus", modbus, "127.0.0.1:5020")
+    if page is not None:
+        flags["dashboard"] = _address("--page", page, "127.0.0.1:8080")
     if word_order is not None:
         flags.setdefault("modbus", {})["word_order"] = word_order
     return load_settings(config, flags)
+
+
+def with_data(settings: Settings, data: Path | None, otherwise: Path) -> Settings:
+    """Settings whose daemons keep all they know in `data`, or, where nothing says where, in `otherwise`."""
+    folder = data or otherwise
+    changes: dict[str, Table] = {}
+    if data is not None or settings.historian == HistorianSettings():
+        changes["historian"] = settings.historian.model_copy(update={"folder": folder, "url": None})
+    for section in ("detector", "alarms"):
+        table = getattr(settings, section)
+        if data is not None or table.state_dir is None:
+            changes[section] = table.model_copy(update={"state_dir": folder / section})
+    return settings.model_copy(update=changes)
 
 
 def with_history(settings: Settings, folder: Path | None) -> Settings:
@@ -88,6 +105,13 @@ def with_history(settings: Settings, folder: Path | None) -> Settings:
         return settings
     historian = settings.historian.model_copy(update={"folder": folder, "url": None})
     return settings.model_copy(update={"historian": historian})
+
+
+def _address(flag: str, text: str, example: str) -> dict[str, Any]:
+    host, colon, port = text.rpartition(":")
+    if not colon or not port.isdecimal():
+        raise ConfigError(f"{flag}: got '{text}', must be HOST:PORT such as {example}")
+    return {"host": host.strip("[]"), "port": int(port)}
 
 
 def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":

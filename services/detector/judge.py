@@ -16,6 +16,7 @@ from wetwell.protocols.messages import MessageError, Order, Sample, Verdict
 from wetwell.protocols.station import Station
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.quarantine import Quarantine
+from wetwell.services.model_publisher import ModelPublisher
 
 log = logging.getLogger(__name__)
 
@@ -62,6 +63,7 @@ class StationJudge:
             bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
             for pump in range(1, len(station.pump) + 1)
         ]
+        self._model = ModelPublisher(bus, station, self.detector)
         self._last: dict[int, Verdict] = {}
         self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
@@ -160,6 +162,7 @@ class StationJudge:
     def _publish(self, verdict: Verdict) -> None:
         self._counts["verdicts"] += 1
         self._publishers[verdict.pump - 1].put(verdict.encode())
+        self._model.take(verdict)
         last = self._last.get(verdict.pump)
         if last is None or last.state != verdict.state:
             log.info("station '%s' pump %d: %s", self.station, verdict.pump, verdict.state)

@@ -11,8 +11,9 @@ from wetwell.protocols.keys import SITE, plan_key
 from wetwell.protocols.link import Bus, Subscription
 from wetwell.protocols.messages import MessageError
 from wetwell.services.bus import connect
-from wetwell.services.daemon import report_health, start_logging
+from wetwell.services.daemon import report_health
 from wetwell.services.detector.serve import judge_all
+from wetwell.services.logs import start_logging
 from wetwell.services.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -24,7 +25,7 @@ def run_shard(settings: Settings, plan: Plan) -> int:
     The shard's number. The task leaves Dask's pool of threads, so that a worker can take any number of shards.
     """
     secede()
-    start_logging(settings.log.level)
+    start_logging(settings.log, service=f"shard-{plan.shard}")
     return asyncio.run(_work(settings, plan))
 
 
