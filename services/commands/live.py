@@ -24,6 +24,7 @@ from wetwell.services.commands.options import (
     print_result,
     run,
     settings_of,
+    with_data,
 )
 from wetwell.services.settings import LogSettings, Settings
 
@@ -46,7 +47,7 @@ def up(
     config: ConfigOption = None,
     data: Annotated[
         Path | None,
-        typer.Option("--data", metavar="DIR", help="Keep history and states here; default: gone at the end."),
+        typer.Option("--data", metavar="DIR", help="Where all is kept; default: gone at the end."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
