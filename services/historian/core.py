@@ -8,6 +8,7 @@ from typing import Literal
 
 from wetwell.protocols.alarm_messages import Alarm
 from wetwell.protocols.history_messages import LONGEST_NS
+from wetwell.protocols.keys import SITE
 from wetwell.protocols.messages import MessageError, Sample, Verdict
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import NAME_PATTERN
@@ -162,7 +163,8 @@ def _row(kind: PayloadKind, payload: bytes) -> SampleRow | EventRow:
 
 
 def _check(station: str, time_ns: int) -> None:
-    if len(station) > MAX_NAME or re.match(NAME_PATTERN, station) is None:
+    is_name = station == SITE or re.match(NAME_PATTERN, station) is not None
+    if len(station) > MAX_NAME or not is_name:
         raise MessageError(f"station: got {station[:MAX_NAME]!r}, must be a name of letters, digits and ._-")
     if abs(time_ns) > LONGEST_NS:
         raise MessageError(f"station '{station}': time {time_ns} ns lies too far from 1970")
