@@ -6,7 +6,7 @@ from typing import NoReturn
 import typer
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.services.commands import alarms, gap, judging, listing, live, recordings
+from wetwell.services.commands import alarms, doctor, gap, judging, listing, live, recordings
 
 app = typer.Typer(
     name="wetwell",
@@ -15,7 +15,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-for group in (live, recordings, judging, listing):
+for group in (live, recordings, judging, listing, doctor):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap")
 app.add_typer(alarms.app, name="alarms")
