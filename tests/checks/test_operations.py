@@ -15,8 +15,7 @@ from wetwell.services.settings import AlarmSettings
 ROOT = Path(__file__).parents[2]
 SOURCES = [
     *(ROOT / "detector").glob("*.py"),
-    *(ROOT / "services").glob("detector*"),
-    *(ROOT / "services/alarms").glob("*"),
+    *(path for path in (ROOT / "services").rglob("*.py") if {"alarms", "detector", "detector.py"} & {*path.parts}),
 ]
 
 
@@ -35,10 +34,7 @@ def test_the_table_of_metrics_is_that_of_the_code():
 
 def test_every_count_of_detector_and_alarms_has_its_meaning():
     counted = {
-        name
-        for path in SOURCES
-        if path.suffix == ".py"
-        for name in re.findall(r'counts\["(\w+)"\]', path.read_text(encoding="utf-8"))
+        name for path in SOURCES for name in re.findall(r'counts\["(\w+)"\]', path.read_text(encoding="utf-8"))
     }
     assert {"samples", "malformed", "acts"} <= counted
     assert counted <= set(METRICS)
