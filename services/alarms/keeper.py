@@ -18,7 +18,7 @@ from wetwell.services.alarms.entry import Entry
 from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
 from wetwell.services.alarms.standing import ActRefusedError, Standing
 from wetwell.services.alarms.state_file import SiteState, StateFile, StationState
-from wetwell.services.alarms.station_watch import Limits, Now, StationWatch
+from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
 from wetwell.services.settings import AlarmSettings
 
 log = logging.getLogger(__name__)
@@ -165,7 +165,12 @@ class AlarmKeeper:
         """Write the state to disk."""
         stations = {
             name: StationState(
-                time_ns=watch.time_ns, seq=watch.seq, verdicts=watch.verdicts, services=list(watch.gone_s)
+                time_ns=watch.time_ns,
+                seq=watch.seq,
+                last_verdicts_ns={
+                    pump: known.times_ns[-1] for pump, known in watch.verdicts.items() if known.times_ns
+                },
+                services=list(watch.gone_s),
             )
             for name, watch in self.stations.items()
         }
@@ -256,14 +261,15 @@ class AlarmKeeper:
         self.book.restore(state.book)
         for name, kept in state.stations.items():
             watch = self._watch(name)
-            watch.time_ns, watch.seq, watch.verdicts = kept.time_ns, kept.seq, kept.verdicts
+            watch.time_ns, watch.seq = kept.time_ns, kept.seq
+            watch.verdicts = {pump: PumpVerdicts([last_ns]) for pump, last_ns in kept.last_verdicts_ns.items()}
             watch.has_samples = kept.time_ns is not None
             watch.gone_s = dict.fromkeys(kept.services, now_s)  # missed until seen
 
     def _watch(self, station: str) -> StationWatch:
         if station not in self.stations:
             now_s = self._now().steady_s
-            self.stations[station] = StationWatch(station, heard_s=now_s, missed_s=now_s)
+            self.stations[station] = StationWatch(station, heard_s=now_s, missed_s=now_s, start_s=now_s)
         return self.stations[station]
 
 

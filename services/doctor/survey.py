@@ -80,7 +80,7 @@ async def listen(bus: Bus, seconds: float) -> Survey:
     survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=ANSWER_S))
     for station in sorted(survey.stations):
         last_ns = survey.samples[station][-1][1].time if station in survey.samples else now_ns()
-        query = HistoryQuery(kind="samples", start=last_ns - HOUR_NS, end=last_ns + 1, points=10)
+        query = HistoryQuery(kind="samples", start=last_ns - HOUR_NS, end=last_ns, points=10)
         history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S))
         if history is not None:
             survey.histories[station] = history
