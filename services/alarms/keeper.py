@@ -80,14 +80,13 @@ class AlarmKeeper:
     def take_status(self, payload: bytes) -> None:
         """Look at the health figures of a gateway."""
         status = self._decoded(Status, payload)
-        if status is not None and status.service == "gateway" and status.station in self.stations:
-            watch = self.stations[status.station]
+        if status is not None and status.service == "gateway" and (watch := self._named(status.station)) is not None:
             watch.take_status(status, self._now(), self.book, self._settings.heartbeat_after_s)
 
     def take_presence(self, presence: Presence) -> None:
         """Note that a service has come or gone."""
         _, station, _, service = presence.key.split("/", 3)
-        watch = self._named(station)
+        watch = self.stations[SITE] if station == SITE else self._named(station)
         if watch is not None:
             watch.take_presence(service, is_alive=presence.is_alive, now=self._now())
 
@@ -245,7 +244,7 @@ class AlarmKeeper:
 
     def _named(self, station: str) -> StationWatch | None:
         """What is known of a station; None if this cannot be one."""
-        if station in self.stations:
+        if station in self.stations and station != SITE:
             return self.stations[station]
         is_name = re.fullmatch(NAME_PATTERN, station) is not None and len(station) <= 64
         if not is_name or len(self.stations) > MAX_STATIONS:

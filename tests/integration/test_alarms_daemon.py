@@ -131,8 +131,9 @@ def test_evidence_of_a_foreign_sender_is_no_reason_to_stop():
         site.keeper.take_status(payload)
     site.sample(station="../x")
     site.keeper.take_presence(Presence("wetwell/**/alive/x", is_alive=True))
+    site.sample(station="_site")
     assert site.keeper.figures()["malformed"] == 12.0
-    assert site.keeper.figures()["foreign"] == 2.0
+    assert site.keeper.figures()["foreign"] == 3.0
 
 
 def test_the_last_year_of_time_stamps_is_no_reason_to_stop():
