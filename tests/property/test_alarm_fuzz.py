@@ -2,7 +2,7 @@
 
 import json
 
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from wetwell.protocols.alarm_messages import Alarm, AlarmAnswer
@@ -83,7 +83,7 @@ class Question:
         self.answer = AlarmAnswer.decode(payload)
 
 
-@settings(max_examples=150)
+@settings(max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(SENT, max_size=12))
 def test_no_payload_stops_the_keeper(sent):
     bus, now_s = MemoryBus(), [0.0]
