@@ -9,6 +9,7 @@ from wetwell.protocols.errors import WetwellError
 from wetwell.services.commands import (
     alarms,
     dashboard,
+    doctor,
     fleet,
     gap,
     gateway,
@@ -27,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-for group in (live, dashboard, historian, fleet, recordings, judging, listing):
+for group in (live, dashboard, historian, fleet, recordings, judging, listing, doctor):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap")
 app.add_typer(alarms.app, name="alarms")

@@ -13,7 +13,7 @@ from wetwell.protocols.link import Bus, Subscription
 from wetwell.protocols.messages import MessageError, Status, Verdict
 from wetwell.services.bus import listen
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
-from wetwell.services.health.board import BOARD
+from wetwell.services.health.board import BOARD, HealthBoard
 from wetwell.services.settings import Settings, environment_of
 
 log = logging.getLogger(__name__)
@@ -75,7 +75,7 @@ async def _run(
         waits = [asyncio.create_task(_watch(name, child), name=f"up.{name}") for name, child in children.items()]
         shows = [
             asyncio.create_task(_show(verdicts, show), name="up.verdicts"),
-            asyncio.create_task(_show_health(statuses, settings.health.period_s), name="up.health"),
+            asyncio.create_task(_show_health(statuses, BOARD, settings.health.period_s), name="up.health"),
         ]
         try:
             done, _ = await asyncio.wait([*waits, *shows], return_when=asyncio.FIRST_COMPLETED)
@@ -95,7 +95,7 @@ async def _show(verdicts: Subscription[bytes], show: Callable[[Verdict], None]) 
                 log.warning("%s", error)
 
 
-async def _show_health(statuses: Subscription[bytes], period_s: float) -> None:
+async def _show_health(statuses: Subscription[bytes], board: HealthBoard, period_s: float) -> None:
     """Put the figures of all services behind the health page of this process."""
     while True:
         for payload in await statuses.receive():
@@ -104,7 +104,7 @@ async def _show_health(statuses: Subscription[bytes], period_s: float) -> None:
             except MessageError as error:
                 log.warning("%s", error)
             else:
-                BOARD.report(status.station, status.service, period_s, status.figures)
+                board.report(status.station, status.service, period_s, status.figures)
 
 
 async def _watch(name: str, child: asyncio.subprocess.Process) -> None:

@@ -11,7 +11,7 @@ from wetwell.services.alarms.rates import AlarmRates
 from wetwell.services.alarms.rules import RULES, Rule, RuleName, alarm_id, parse_alarm_id
 from wetwell.services.alarms.standing import ActRefusedError, Standing, back, is_shelf_over, with_act
 
-ANSWERS = 1_000
+ANSWERS = 200
 """Acts that are remembered with their answers, so that one that is asked again is not carried out twice."""
 STALE_NS = 24 * 3600 * 1_000_000_000
 SHELF = "end of shelf"

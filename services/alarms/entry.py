@@ -3,7 +3,7 @@
 from pydantic import BaseModel, ConfigDict, Field
 
 from wetwell.protocols.alarm_messages import Alarm
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.delay import Delay
 from wetwell.services.alarms.rules import Rule, RuleName, alarm_id
 from wetwell.services.alarms.standing import Standing, with_condition
@@ -46,7 +46,7 @@ class Entry(BaseModel):
 
     def touch(self, time_ns: int) -> None:
         """Note a change; no two changes of an alarm have the same time, and a later one never has an earlier one."""
-        self.time_ns = max(time_ns, self.time_ns + 1)
+        self.time_ns = min(max(time_ns, self.time_ns + 1), MAX_STAMP_NS)
 
     def changes_within_hour(self, now_ns: int) -> int:
         """How often the condition came or went in the last hour of the station's time."""

@@ -18,7 +18,7 @@ from wetwell.services.alarms.entry import Entry
 from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
 from wetwell.services.alarms.standing import ActRefusedError, Standing
 from wetwell.services.alarms.state_file import SiteState, StateFile, StationState
-from wetwell.services.alarms.station_watch import Limits, Now, StationWatch
+from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
 from wetwell.services.settings import AlarmSettings
 
 log = logging.getLogger(__name__)
@@ -80,14 +80,13 @@ class AlarmKeeper:
     def take_status(self, payload: bytes) -> None:
         """Look at the health figures of a gateway."""
         status = self._decoded(Status, payload)
-        if status is not None and status.service == "gateway" and status.station in self.stations:
-            watch = self.stations[status.station]
+        if status is not None and status.service == "gateway" and (watch := self._named(status.station)) is not None:
             watch.take_status(status, self._now(), self.book, self._settings.heartbeat_after_s)
 
     def take_presence(self, presence: Presence) -> None:
         """Note that a service has come or gone."""
         _, station, _, service = presence.key.split("/", 3)
-        watch = self._named(station)
+        watch = self.stations[SITE] if station == SITE else self._named(station)
         if watch is not None:
             watch.take_presence(service, is_alive=presence.is_alive, now=self._now())
 
@@ -165,7 +164,12 @@ class AlarmKeeper:
         """Write the state to disk."""
         stations = {
             name: StationState(
-                time_ns=watch.time_ns, seq=watch.seq, verdicts=watch.verdicts, services=list(watch.gone_s)
+                time_ns=watch.time_ns,
+                seq=watch.seq,
+                last_verdicts_ns={
+                    pump: known.times_ns[-1] for pump, known in watch.verdicts.items() if known.times_ns
+                },
+                services=list(watch.gone_s),
             )
             for name, watch in self.stations.items()
         }
@@ -240,7 +244,7 @@ class AlarmKeeper:
 
     def _named(self, station: str) -> StationWatch | None:
         """What is known of a station; None if this cannot be one."""
-        if station in self.stations:
+        if station in self.stations and station != SITE:
             return self.stations[station]
         is_name = re.fullmatch(NAME_PATTERN, station) is not None and len(station) <= 64
         if not is_name or len(self.stations) > MAX_STATIONS:
@@ -256,14 +260,15 @@ class AlarmKeeper:
         self.book.restore(state.book)
         for name, kept in state.stations.items():
             watch = self._watch(name)
-            watch.time_ns, watch.seq, watch.verdicts = kept.time_ns, kept.seq, kept.verdicts
+            watch.time_ns, watch.seq = kept.time_ns, kept.seq
+            watch.verdicts = {pump: PumpVerdicts([last_ns]) for pump, last_ns in kept.last_verdicts_ns.items()}
             watch.has_samples = kept.time_ns is not None
             watch.gone_s = dict.fromkeys(kept.services, now_s)  # missed until seen
 
     def _watch(self, station: str) -> StationWatch:
         if station not in self.stations:
             now_s = self._now().steady_s
-            self.stations[station] = StationWatch(station, heard_s=now_s, missed_s=now_s)
+            self.stations[station] = StationWatch(station, heard_s=now_s, missed_s=now_s, start_s=now_s)
         return self.stations[station]
 
 

@@ -11,7 +11,7 @@ FLOOD_BEGINS = 10
 """More calls than this in ten minutes are a flood."""
 FLOOD_ENDS = 5
 """Fewer calls than this in ten minutes end it."""
-MAX_CALLS = 20_000
+MAX_CALLS = 5_000
 """Calls that are remembered at most; a day of them is needed."""
 
 

@@ -115,7 +115,7 @@ def verdict_text(verdict: Verdict) -> str:
     for name, label, unit in _SEVERITY.get(verdict.state, ()):
         figure = _figure(verdict.evidence, name)
         if figure is not None:
-            words.append(f"{label} {figure[0]:g} {unit} ({figure[1]:g} to {figure[2]:g})")
+            words.append(f"{label} {figure[0]:.3g} {unit} ({figure[1]:.3g} to {figure[2]:.3g})")
     return ", ".join(words)
 
 
@@ -139,5 +139,5 @@ def _figure(evidence: Mapping[str, Any], name: str) -> tuple[float, float, float
         figure = evidence["severity"][name]
         low, high = figure["interval"]
         return float(figure["value"]), float(low), float(high)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, OverflowError, TypeError, ValueError):
         return None

@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
 from wetwell.protocols.whole_file import whole_file
 from wetwell.services.alarms.book import BookState
-from wetwell.services.alarms.station_watch import PumpVerdicts
 
 log = logging.getLogger(__name__)
 
@@ -22,7 +21,7 @@ class StationState(BaseModel):
 
     time_ns: int | None
     seq: int
-    verdicts: dict[int, PumpVerdicts]
+    last_verdicts_ns: dict[int, int]
     services: list[str]
 
 

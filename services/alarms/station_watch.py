@@ -5,12 +5,14 @@ from dataclasses import dataclass, field
 
 from wetwell.protocols.keys import SITE
 from wetwell.protocols.messages import Sample, Status, Verdict
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.book import AlarmBook
 from wetwell.services.alarms.rules import VERDICT_RULES, RuleName, verdict_advice, verdict_text
 
 KNOWN_VERDICTS = 200
 """Times of verdicts of a pump that are remembered, more than a publisher keeps for late joiners."""
+START_S = 30.0
+"""So long after the start older verdicts are those that publishers have kept."""
 FOLLOW_VERDICTS = 3
 """So many verdicts in a row that are older than the last one mean that the clock was set back."""
 FOLLOW_SAMPLES = 1_000
@@ -45,11 +47,17 @@ class PumpVerdicts:
     times_ns: list[int] = field(default_factory=list)
     older: int = 0
 
-    def is_news(self, time_ns: int) -> bool:
-        """Whether a verdict of this time is to be taken: not one that was, nor one that came too late."""
+    def is_news(self, time_ns: int, *, is_start: bool) -> bool:
+        """Whether a verdict of this time is to be taken: not one that was, nor one that came too late.
+
+        At the start (`is_start`) older ones come from the caches of their publishers.
+        """
         if time_ns in self.times_ns:
             return False
         if self.times_ns and time_ns < self.times_ns[-1]:
+            if is_start:
+                self.times_ns = [time_ns, *self.times_ns][-KNOWN_VERDICTS:]
+                return False
             self.older += 1
             if self.older < FOLLOW_VERDICTS:
                 return False
@@ -67,6 +75,8 @@ class StationWatch:
     """When the last sample came."""
     missed_s: float
     """Since when its absence counts."""
+    start_s: float = 0.0
+    """When the daemon began to know it."""
     time_ns: int | None = None
     seq: int = -1
     older: int = 0
@@ -78,7 +88,7 @@ class StationWatch:
         """Time of the station: that of its last sample, running on at the pace of the wall."""
         if self.time_ns is None:
             return now.wall_ns
-        return self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S)
+        return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
 
     def take_sample(self, sample: Sample, now: Now, book: AlarmBook, limits: Limits) -> bool:
         """Look at a sample; whether it was new."""
@@ -107,7 +117,8 @@ class StationWatch:
 
     def take_verdict(self, verdict: Verdict, now: Now, book: AlarmBook) -> bool:
         """Look at a verdict; whether it was new. "unknown" leaves the alarms of the pump as they are."""
-        if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time):
+        is_start = now.steady_s - self.start_s < START_S
+        if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time, is_start=is_start):
             return False
         if verdict.state == "unknown":
             return True

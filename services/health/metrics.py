@@ -39,5 +39,6 @@ METRICS: Mapping[str, str] = {
     "stations": "Stations that are watched.",
     "unacknowledged": "Alarms that wait for an acknowledgement.",
     "verdicts": "Verdicts published, or taken.",
+    "wrong_pump_count": "Samples with another number of pumps than the station has.",
 }
 """By name of the figure. Prometheus sees it as `wetwell_<name>` with the labels `station` and `service`."""

@@ -11,7 +11,7 @@ from wetwell.protocols.keys import alarm_act_key, alarm_key, alive_key
 from wetwell.protocols.link import Presence
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
-from wetwell.protocols.stamps import NS_PER_S, from_iso
+from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S, from_iso
 from wetwell.services.alarms.asking import list_alarms, new_act, report, send_act
 from wetwell.services.alarms.keeper import AlarmKeeper
 from wetwell.services.alarms.serve import keep
@@ -113,6 +113,8 @@ def test_a_verdict_that_comes_again_or_late_changes_nothing_but_a_clock_set_back
     assert site.verdict("normal", 10) == []
     assert site.verdict("normal", 15) == []
     assert site.verdict("normal", 30) == [("pump2.pump_fault", "returned")]
+    assert site.verdict("pump_fault", -7200) == []  # at the start it can only be an old one
+    site.wall_s = 30.0
     assert [site.verdict("pump_fault", at_s) for at_s in (-3600, -3500, -3400)] == [
         [],
         [],
@@ -129,8 +131,18 @@ def test_evidence_of_a_foreign_sender_is_no_reason_to_stop():
         site.keeper.take_status(payload)
     site.sample(station="../x")
     site.keeper.take_presence(Presence("wetwell/**/alive/x", is_alive=True))
+    site.sample(station="_site")
     assert site.keeper.figures()["malformed"] == 12.0
-    assert site.keeper.figures()["foreign"] == 2.0
+    assert site.keeper.figures()["foreign"] == 3.0
+
+
+def test_the_last_year_of_time_stamps_is_no_reason_to_stop():
+    site = Site(high_level_m=1.0, rules={"level_high": {"on_delay_s": 0.0}})
+    site.sample(2.0, seq=2**63 - 1, at_s=(MAX_STAMP_NS - START_NS) / NS_PER_S - 1e4)
+    site.wall_s = 2e4
+    assert ("samples_stale", "unacknowledged") in site.look()
+    assert site.act("acknowledge", alarm="level_high").is_done
+    assert site.look(1.0) == [("level_high", "acknowledged")]
 
 
 def test_high_level_has_delays_in_station_time_and_a_deadband(alpha):

@@ -19,9 +19,12 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from wetwell.protocols.errors import LinkError
+from wetwell.protocols.memory_link import MemoryBus
+from wetwell.protocols.messages import Status
 from wetwell.services.health.board import HealthBoard
 from wetwell.services.health.page import health_page
 from wetwell.services.settings import HealthSettings
+from wetwell.services.supervisor import _show_health
 from wetwell.services.systemd.notify import notify, watched_by_systemd
 
 UNITS = Path(__file__).parents[2] / "services" / "systemd"
@@ -102,28 +105,56 @@ def systemd_socket(folder: Path) -> Iterator[socket.socket]:
         yield receiver
 
 
+def words_of(receiver: socket.socket) -> list[str]:
+    """What has come by now."""
+    receiver.setblocking(False)
+    words = []
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            words.append(receiver.recv(64).decode())
+    return words
+
+
 def test_the_watchdog_is_fed_by_the_event_loop_only(tmp_path, monkeypatch):
-    async def serve() -> None:
+    async def serve(receiver: socket.socket) -> None:
         stop = asyncio.Event()
         async with watched_by_systemd(stop):
             await asyncio.sleep(0.12)
+            first, *fed = words_of(receiver)
+            assert first == "READY=1"
+            assert len(fed) >= 2
+            assert set(fed) == {"WATCHDOG=1"}
             time.sleep(0.2)  # noqa: ASYNC251 - a loop that hangs
+            assert words_of(receiver) == []
+            await asyncio.sleep(0.1)
+            assert set(words_of(receiver)) == {"WATCHDOG=1"}
             stop.set()
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
+            await asyncio.sleep(0.01)
+            assert words_of(receiver)[-1] == "STOPPING=1"
 
     with systemd_socket(tmp_path) as receiver:
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
         monkeypatch.setenv("WATCHDOG_USEC", "100000")
-        asyncio.run(serve())
-        receiver.setblocking(False)
-        words = []
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                words.append(receiver.recv(64).decode())
-    assert words[0] == "READY=1"
-    assert words[-1] == "STOPPING=1"
-    assert 2 <= words.count("WATCHDOG=1") <= 5  # at 0, 50 and 100 ms, once more after the hang
+        asyncio.run(serve(receiver))
+
+
+def test_up_serves_the_figures_of_its_children(clock):
+    async def hear() -> list[str]:
+        with MemoryBus() as bus:
+            statuses = bus.subscribe("wetwell/*/status/*")
+            board = HealthBoard(clock)
+            running = asyncio.create_task(_show_health(statuses, board, 10.0))
+            status = Status(
+                time=0, station="alpha", service="detector", state="running", figures={"sample_age_s": 99.0}
+            )
+            publisher = bus.publisher("wetwell/alpha/status/detector")
+            publisher.put(b"no status")
+            publisher.put(status.encode())
+            await asyncio.sleep(0.01)
+            running.cancel()
+            return board.reasons(60.0)
+
+    assert asyncio.run(hear()) == ["detector of 'alpha': no sample for 99 s"]
 
 
 def test_without_systemd_or_with_a_dead_socket_nothing_happens(tmp_path, monkeypatch, caplog):

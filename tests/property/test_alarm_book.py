@@ -2,7 +2,7 @@
 
 import json
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
@@ -120,5 +120,7 @@ class Alarms(RuleBasedStateMachine):
                 assert alarm.is_active == self.is_there[name]
 
 
-Alarms.TestCase.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+Alarms.TestCase.settings = settings(
+    max_examples=150, stateful_step_count=40, suppress_health_check=[HealthCheck.too_slow]
+)
 TestAlarms = Alarms.TestCase
