@@ -104,7 +104,7 @@ async def gateway_figures(bus: Bus, plcs: list[Plc], seconds: float) -> dict[str
         "skipped_polls": sum(each.get("skipped_polls", 0.0) for each in latest.values()),
     }
     for name in ("delay_p50_s", "delay_p99_s", "latency_p50_s", "latency_p99_s"):
-        values = [each[name] for each in latest.values()]
+        values = [each[name] for each in latest.values() if name in each]
         figures[f"{name}_of_the_median_plc"] = round(statistics.median(values), 5)
         figures[f"{name}_of_the_worst_plc"] = round(max(values), 5)
     return figures
