@@ -63,6 +63,14 @@ class Archive:
         except (OSError, pa.ArrowException) as error:
             raise StoreError(f"{self.path('samples', station, day_ns)}: cannot be read: {error}") from error
 
+    def count(self, station: str, day_ns: int, start_ns: int, end_ns: int) -> int:
+        """Number of samples of a span in the file of a day; 0 if there is none."""
+        table = self._read(self.path("samples", station, day_ns), ["time"])
+        if table is None:
+            return 0
+        time_ns = _stamps(table)
+        return int(np.count_nonzero((time_ns >= start_ns) & (time_ns < end_ns)))
+
     def minutes(self, station: str, day_ns: int) -> Summary | None:
         """Minutes of a day; None if there is no file."""
         table = self._read(self.path("minutes", station, day_ns))
@@ -111,9 +119,9 @@ class Archive:
         except OSError as error:
             raise StoreError(f"{path}: cannot be deleted: {error.strerror or error}") from error
 
-    def _read(self, path: Path) -> pa.Table | None:
+    def _read(self, path: Path, columns: list[str] | None = None) -> pa.Table | None:
         try:
-            return pa.parquet.ParquetFile(path).read()
+            return pa.parquet.ParquetFile(path).read(columns)
         except FileNotFoundError:
             return None
         except (OSError, pa.ArrowException) as error:

@@ -22,10 +22,11 @@ from wetwell.services.historian.store import (
     EventKind,
     StationSpan,
     StoreError,
+    blocks,
     day_of,
     span_of,
 )
-from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller
+from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
 log = logging.getLogger(__name__)
 
@@ -185,16 +186,33 @@ class PostgresStore:
         )
         return None if width is None else (width - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
 
-    def summaries(self, station: str, start_ns: int, end_ns: int) -> Iterator[Summary]:
-        """Minutes of the days of which the samples are gone."""
+    def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
+        """Whether a span has at most so many samples, and none that have become minutes."""
+        ((samples, minutes),) = self._read(
+            "WITH s AS (SELECT id FROM wetwell.station WHERE name = %(station)s) SELECT "
+            "(SELECT count(*) FROM (SELECT 1 FROM wetwell.sample WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s LIMIT %(most)s) AS few), "
+            "EXISTS (SELECT 1 FROM wetwell.minute WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s)",
+            {"station": station, "start": start_ns, "end": end_ns, "most": points + 1},
+        )
+        return samples <= points and not minutes
+
+    def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
+        parts = [Summary.of(block).over(start_ns, span_ns) for block in blocks(self, station, start_ns, end_ns)]
+        # after the samples: they turn into minutes, and what is seen twice changes no mean, least or largest value
+        parts.append(self._minutes(station, start_ns, end_ns).over(start_ns, span_ns))
+        return joined(parts).over(start_ns, span_ns)
+
+    def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:
         rows = self._read(
             "SELECT time_ns, array_send(count), array_send(mean), array_send(low), array_send(high) "
             "FROM wetwell.minute WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
             "AND time_ns >= %s AND time_ns < %s ORDER BY time_ns",
             (station, start_ns, end_ns),
         )
-        if rows:
-            yield Summary.of_rows([(time_ns, *map(from_postgres, arrays)) for time_ns, *arrays in rows])
+        return Summary.of_rows([(time_ns, *map(from_postgres, arrays)) for time_ns, *arrays in rows])
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""
@@ -237,7 +255,7 @@ class PostgresStore:
         day_ns = next(iter(self.days_ns(station, summed_ns, end_ns)), None) if summed_ns < end_ns else None
         if day_ns is None:
             return None
-        has_minutes = any(True for _ in self.summaries(station, day_ns, day_ns + DAY_NS))
+        has_minutes = len(self._minutes(station, day_ns, day_ns + DAY_NS)) > 0
         around = self.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
         hours = Hours.of_samples(around, day_ns, day_ns + DAY_NS)
         with self._transaction() as database:
@@ -263,8 +281,7 @@ class PostgresStore:
         day_ns = days_ns[0]
         samples = self.samples(station, day_ns, day_ns + DAY_NS)
         minutes = Summary.of(samples).over(day_ns, MINUTE_NS)
-        for earlier in self.summaries(station, day_ns, day_ns + DAY_NS):
-            minutes = fuller(earlier, minutes)
+        minutes = fuller(self._minutes(station, day_ns, day_ns + DAY_NS), minutes)
         keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
         with self._transaction() as database:
             ((number,),) = database.execute("SELECT id FROM wetwell.station WHERE name = %s", (station,)).fetchall()

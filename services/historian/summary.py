@@ -38,7 +38,7 @@ class Summary:
     @classmethod
     def of(cls, samples: Samples) -> "Summary":
         """Samples, each as a span of its own."""
-        values = np.where(np.isfinite(samples.values), samples.values, np.nan)
+        values = samples.values
         count = (~np.isnan(values)).astype(np.float64)
         return cls(time_ns=samples.time_ns, count=count, mean=values, low=values, high=values)
 
