@@ -59,11 +59,13 @@ def site(store: FolderStore, plant: Simulation) -> dict[str, object]:
     payloads = [[sample.encode() for sample in recording.samples(name)] for name in names]
     historian = Historian(store)
     take_s, commit_s, walls_s = 0.0, 0.0, []
+    written = written_bytes()
     for second in range(SECONDS):
         take_s += spent(lambda second=second: [historian.take("samples", each[second]) for each in payloads])[1]
         wall_s, cpu_s = spent(lambda: historian.commit(0))
         commit_s += cpu_s
         walls_s.append(wall_s)
+    written = written_bytes() - written
     store.close()
     walls_s.sort()
     samples = STATIONS * SECONDS
@@ -72,9 +74,15 @@ def site(store: FolderStore, plant: Simulation) -> dict[str, object]:
         "taken_per_cpu_s": round(samples / take_s),
         "committed_each_second_per_cpu_s": round(samples / commit_s),
         "cpu_at_1_hz": round((take_s + commit_s) / SECONDS, 3),
+        "written_bytes_a_second": round(written / SECONDS),
         "commit_of_a_second_median_ms": round(1e3 * walls_s[SECONDS // 2], 1),
         "commit_of_a_second_longest_ms": round(1e3 * walls_s[-1], 1),
     }
+
+
+def written_bytes() -> int:
+    """What this process has given to the system to write."""
+    return int(Path("/proc/self/io").read_text().split("wchar: ")[1].split()[0])
 
 
 def batches(store: FolderStore, samples: Samples) -> dict[str, int]:

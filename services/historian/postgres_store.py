@@ -162,7 +162,7 @@ class PostgresStore:
             "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
             "AND time_ns >= %(start)s AND time_ns < %(end)s) AS at UNION ALL "
             "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
-            "AND time_ns >= (floor(at::numeric / %(day)s) + 1) * %(day)s AND time_ns < %(end)s) "
+            "AND time_ns >= ((floor(at::numeric / %(day)s) + 1) * %(day)s)::bigint AND time_ns < %(end)s) "
             "FROM next WHERE at IS NOT NULL) SELECT at FROM next WHERE at IS NOT NULL",
             {"station": station, "start": start_ns, "end": end_ns, "day": DAY_NS},
         )
@@ -244,9 +244,8 @@ class PostgresStore:
         return None
 
     def figures(self) -> dict[str, float]:
-        """Size of the database."""
-        ((size,),) = self._read("SELECT pg_database_size(current_database())")
-        return {"database_bytes": float(size)}
+        """Whether it is connected."""
+        return {"is_connected": float(self._writer is not None)}
 
     def _sum_up(self, station: str, newest_ns: int) -> str | None:
         """Work out the hours of the oldest complete day that has none yet, or has had late samples since."""

@@ -1,13 +1,17 @@
 """Whatever comes in whatever order, crashes between: what was committed is read back exactly, and once."""
 
+import json
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import settings as limits
 from hypothesis import strategies as st
 
+from wetwell.protocols.history_messages import LONGEST_NS, History
 from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
@@ -97,3 +101,32 @@ def test_summing_up_twice_is_summing_up_once(values: list[list[float]], first: i
     assert np.allclose(twice.mean, once.mean, rtol=1e-9, atol=1e-6, equal_nan=True)
     assert np.array_equal(twice.low, once.low, equal_nan=True)
     assert np.array_equal(twice.high, once.high, equal_nan=True)
+
+
+WORDS = st.sampled_from(["samples", "kpi", "verdicts", "stations", "2025-01-01T00:00:00Z", "-1", "", "alpha"])
+VALUE = st.none() | st.booleans() | st.integers() | st.floats() | WORDS
+NAMES = ["schema", "kind", "start", "end", "points", "raw", "station", "time", "seq", "pumps", "level_m"]
+NEARLY = st.dictionaries(st.sampled_from(NAMES), VALUE | st.lists(VALUE, max_size=2)).map(
+    lambda told: json.dumps(told).encode()
+)
+
+
+@limits(max_examples=300)
+@given(payload=st.binary(max_size=200) | NEARLY)
+def test_no_payload_takes_it_down(filled: Historian, payload: bytes) -> None:
+    for kind in ("samples", "verdicts", "alarms"):
+        filled.take(kind, payload)
+    assert History.decode(filled.answer("alpha", payload)).station
+
+
+@pytest.fixture(scope="module")
+def filled() -> Iterator[Historian]:
+    """A historian that knows a station with samples at the ends of time."""
+    with tempfile.TemporaryDirectory() as name:
+        store = FolderStore(Path(name))
+        historian = Historian(store)
+        for time in (-LONGEST_NS, 0, 1, LONGEST_NS):
+            historian.take("samples", Sample(station="alpha", seq=0, time=time, pumps=()).encode())
+        assert historian.commit(0) == 4
+        yield historian
+        store.close()
