@@ -120,18 +120,23 @@ class FolderStore:
             return self._summary(station, start_ns, end_ns, span_ns)  # a file has gone on while it was to be read
 
     def _summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        live_ns = set(self.live.days_ns(station, start_ns, end_ns))
+        of_samples = set(self._filed("samples", station, start_ns, end_ns))
+        of_minutes = set(self._filed("minutes", station, start_ns, end_ns))
         parts = []
-        live_ns = self.live.days_ns(station, start_ns, end_ns)
-        for day_ns in live_ns:
-            samples = self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS))
-            parts.append(Summary.of(samples).over(start_ns, span_ns))
-        filed: dict[Form, list[int]] = {
-            "samples": [day for day in self._filed("samples", station, start_ns, end_ns) if day not in live_ns],
-            "minutes": self._filed("minutes", station, start_ns, end_ns),
-        }  # what is in both, because a step was broken off, changes no mean, least or largest value
+        for day_ns in sorted(live_ns | (of_samples & of_minutes)):
+            day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
+            minutes = self.archive.minutes(station, day_ns)
+            if minutes is not None:  # late samples, or a downsampling that was broken off
+                day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
+            parts.append(day.over(start_ns, span_ns))
+        filed: dict[Form, set[int]] = {
+            "samples": of_samples - live_ns - of_minutes,
+            "minutes": of_minutes - live_ns - of_samples,
+        }
         for form, days_ns in filed.items():
             if days_ns:
-                paths = [self.archive.path(form, station, day_ns) for day_ns in days_ns]
+                paths = [self.archive.path(form, station, day_ns) for day_ns in sorted(days_ns)]
                 parts.append(summary_of_files(form, paths, start_ns, end_ns, start_ns, span_ns))
         return joined(parts).over(start_ns, span_ns)
 

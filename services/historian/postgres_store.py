@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, LiteralString
 
+import numpy as np
 import psycopg
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
@@ -22,7 +23,6 @@ from wetwell.services.historian.store import (
     EventKind,
     StationSpan,
     StoreError,
-    blocks,
     day_of,
     span_of,
 )
@@ -200,9 +200,16 @@ class PostgresStore:
 
     def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
         """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
-        parts = [Summary.of(block).over(start_ns, span_ns) for block in blocks(self, station, start_ns, end_ns)]
-        # after the samples: they turn into minutes, and what is seen twice changes no mean, least or largest value
-        parts.append(self._minutes(station, start_ns, end_ns).over(start_ns, span_ns))
+        days_ns = self.days_ns(station, start_ns, end_ns)
+        parts = []
+        for day_ns in days_ns:
+            day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
+            minutes = self._minutes(station, day_ns, day_ns + DAY_NS)
+            if len(minutes):  # late samples, or a day that has become minutes just now
+                day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
+            parts.append(day.over(start_ns, span_ns))
+        minutes = self._minutes(station, start_ns, end_ns)
+        parts.append(minutes.take(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
         return joined(parts).over(start_ns, span_ns)
 
     def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:

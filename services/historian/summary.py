@@ -103,6 +103,10 @@ class Summary:
             high=self.high[rows],
         )
 
+    def between(self, start_ns: int, end_ns: int) -> "Summary":
+        """Those that begin from `start_ns` until before `end_ns`."""
+        return self.take((self.time_ns >= start_ns) & (self.time_ns < end_ns))
+
     def columns(self) -> dict[str, Floats]:
         """Columns by name: `level_m`, `level_m_min`, `level_m_max`, and so on."""
         names = columns_of((self.mean.shape[1] - 2) // 5)
