@@ -1,8 +1,10 @@
 """The historian under kill -9, a full disk and a lost database: what was acknowledged is there, once."""
 
+import asyncio
 import os
 import random
 import shutil
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -12,8 +14,10 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.history_messages import History, HistoryQuery
+from wetwell.protocols.keys import history_key, sample_key
 from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.zenoh_link import open_router
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.historian.live_database import LiveDatabase
@@ -62,6 +66,48 @@ def test_a_historian_that_is_killed_again_and_again_loses_nothing_acknowledged(t
         assert len(set(numbers)) == len(numbers) <= acknowledged + 20
         assert writer.returncode == -9
     assert list(tmp_path.glob("samples/station=alpha/*.parquet"))
+
+
+async def killed_beside_a_station(folder: Path) -> tuple[History, int]:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        place = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+    command = [sys.executable, "-m", "wetwell.services", "historian", "--data", str(folder), "--zenoh", place]
+    question = HistoryQuery(kind="samples", raw=True, points=2000)
+    with open_router(place) as bus:
+        publisher = bus.publisher(sample_key("alpha"), history=600)
+
+        async def kept(number: int) -> History:
+            async with asyncio.timeout(60.0):
+                while True:
+                    answers = await bus.ask(history_key("alpha"), question.encode(), timeout_s=1.0)
+                    if answers and len((history := History.decode(answers[0])).time) >= number:
+                        return history
+                    await asyncio.sleep(0.05)
+
+        for first in (0, 400):
+            historian = await asyncio.create_subprocess_exec(*command)
+            try:
+                for number in range(first, first + 200):
+                    publisher.put(sample(number).encode())
+                await kept(first + 200)
+            finally:
+                historian.kill()
+                await historian.wait()
+            for number in range(first + 200, first + 400):
+                publisher.put(sample(number).encode())  # nobody listens
+        historian = await asyncio.create_subprocess_exec(*command)
+        try:
+            history = await kept(800)
+        finally:
+            historian.terminate()
+        return history, await historian.wait()
+
+
+def test_a_historian_that_was_killed_gets_what_it_missed_from_the_publishers(tmp_path: Path) -> None:
+    history, code = asyncio.run(killed_beside_a_station(tmp_path))
+    assert history.columns["seq"] == tuple(map(float, range(800)))
+    assert code == 0
 
 
 class Killed(BaseException):
