@@ -7,6 +7,7 @@ a power failure. One connection writes; each reading has a connection of its own
 import contextlib
 import hashlib
 import logging
+import operator
 import sqlite3
 import threading
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,9 @@ log = logging.getLogger(__name__)
 VERSION = 1
 BUSY_S = 10.0
 """So long one process waits for another that writes."""
+
+_BY_KEY = operator.itemgetter(0, 1, 2)
+"""Station, time, `seq` of a `SampleRow`: inserting in this order takes half the time."""
 
 _SCHEMA = f"""
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
@@ -74,7 +78,10 @@ class LiveDatabase:
             before = database.total_changes
             database.executemany(
                 "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?)",
-                [(ids[row.station], row.time_ns, row.seq, row.quality, row.data) for row in batch.samples],
+                [
+                    (ids[row.station], row.time_ns, row.seq, row.quality, row.data)
+                    for row in sorted(batch.samples, key=_BY_KEY)  # rows of a page together
+                ],
             )
             database.executemany(
                 "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?)",
