@@ -18,8 +18,8 @@ log = logging.getLogger(__name__)
 SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
-CAPACITY = 100_000
-"""Messages of one kind that wait to be taken: 100 s of a thousand stations."""
+CAPACITY = 1_000_000
+"""Most messages of one kind that wait to be taken: after a start a thousand publishers send what they hold."""
 
 SLICE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
