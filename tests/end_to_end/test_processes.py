@@ -202,11 +202,12 @@ def _figures(statuses: Iterator[zenoh.Sample], service: str, *, least_samples: f
     raise AssertionError("the statuses have ended")
 
 
-def test_children_stop_when_the_supervisor_is_killed() -> None:
+def test_children_stop_when_the_supervisor_is_killed(tmp_path: Path) -> None:
     flags = ["--zenoh", f"tcp/127.0.0.1:{free_port()}", "--modbus", f"127.0.0.1:{free_port()}"]
+    flags += ["--data", str(tmp_path)]
     with wetwell("up", *flags) as up:
         end = time.monotonic() + DEADLINE_S
-        while len(children := _children(up.pid)) < 2 and time.monotonic() < end:
+        while len(children := _children(up.pid)) < 3 and time.monotonic() < end:
             time.sleep(0.05)  # real processes: there is no virtual time here
         assert len(children) == 3
         up.kill()
