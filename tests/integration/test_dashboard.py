@@ -17,7 +17,6 @@ from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.dashboard.app import Desk, dashboard_app
 from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.hub import Hub
-from wetwell.services.dashboard.questions import ROWS_A_QUESTION
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
 
@@ -201,15 +200,17 @@ def test_what_is_no_question_to_the_historian_is_told(query) -> None:
     assert answer.json()["error"]
 
 
-def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path) -> None:
-    rows = ROWS_A_QUESTION + 500
+def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("wetwell.services.dashboard.questions.ROWS_A_QUESTION", 100)
+    rows = 250
+    every = [json.loads(a_sample(second).encode()) for second in range(rows)]
 
     def answer(payload):
         query = HistoryQuery.decode(payload)
         assert query.raw
-        found = [second for second in range(rows) if query.start <= second * NS_PER_S < query.end]
-        messages = tuple(json.loads(a_sample(second).encode()) for second in found[: query.points])
-        return History(station="alpha", kind="samples", messages=messages, more=len(found) > query.points).encode()
+        found = every[-(-query.start // NS_PER_S) : query.end // NS_PER_S]
+        messages, more = tuple(found[: query.points]), len(found) > query.points
+        return History(station="alpha", kind="samples", messages=messages, more=more).encode()
 
     async def run():
         bus = MemoryBus()
@@ -277,3 +278,49 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
     events, state = asyncio.run(run())
     assert [row[0] for event in events for row in event["rows"]] == [1000]
     assert state["rows"] == events[0]["rows"]
+
+
+async def until(is_so):
+    """Wait for what the server does in this very loop."""
+    async with asyncio.timeout(30):
+        while not is_so():  # noqa: ASYNC110 - it is the server's doing, not a wait for time
+            await asyncio.sleep(0)
+
+
+def test_200_open_pages_get_each_frame_at_once() -> None:
+    pages, frames = 200, 4
+
+    async def look(client, delays_s, sent_s):
+        async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
+            async for line in stream.aiter_lines():
+                if line.startswith('data: {"id"'):
+                    number = json.loads(line.removeprefix("data: "))["id"]
+                    delays_s.append(asyncio.get_running_loop().time() - sent_s[number])
+                    if number == frames:
+                        return
+
+    async def run():
+        desk = desk_with(MemoryBus())
+        listener = open_socket("127.0.0.1", 0)
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        delays_s, sent_s = [], {}
+        limits = httpx.Limits(max_connections=None)
+        loop = asyncio.get_running_loop()
+        async with (
+            httpx.AsyncClient(base_url=address, timeout=30, limits=limits) as client,
+            web_server(dashboard_app(desk), listener, desk.hub),
+            asyncio.TaskGroup() as group,
+        ):
+            for _ in range(pages):
+                group.create_task(look(client, delays_s, sent_s))
+            await until(lambda: desk.hub.clients == pages)
+            for number in range(1, frames + 1):
+                desk.view.take_sample(a_sample(number).encode())
+                sent_s[number] = loop.time()
+                desk.hub.send("alpha", desk.view.advance(loop.time())["alpha"])
+                await until(lambda: len(delays_s) == number * pages)  # noqa: B023 - awaited in this turn
+        return sorted(delays_s)
+
+    delays_s = asyncio.run(run())
+    assert len(delays_s) == pages * frames, "everybody must get every frame"
+    assert delays_s[int(0.99 * len(delays_s))] < 1.0
