@@ -107,6 +107,7 @@ async def _child(
         "WETWELL_LOG": settings.log.model_dump_json(),
         "WETWELL_HEALTH": settings.health.model_dump_json(),
         "WETWELL_DASHBOARD": settings.dashboard.model_dump_json(),
+        "WETWELL_SECURITY": settings.security.model_dump_json(),
     }
     child = await asyncio.create_subprocess_exec(
         sys.executable,

@@ -13,14 +13,13 @@ from pathlib import Path
 
 import httpx
 import pytest
+from playwright.sync_api import sync_playwright
 
 from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
 from wetwell.protocols.history_messages import History, HistoryQuery
 from wetwell.protocols.keys import alarm_act_key, alarm_key, history_key
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.zenoh_link import connect_client
-
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 CHROMIUM = Path("/usr/bin/chromium")
 SCREENSHOTS = Path(__file__).parents[2] / "build" / "screenshots"
@@ -174,7 +173,7 @@ def site(tmp_path_factory):
 @pytest.fixture(scope="module")
 def browser():
     flags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
-    with playwright.sync_playwright() as tools:
+    with sync_playwright() as tools:
         chromium = tools.chromium.launch(executable_path=str(CHROMIUM), args=flags)
         yield chromium
         chromium.close()

@@ -6,8 +6,7 @@ import signal
 from pathlib import Path
 
 import pytest
-
-expect = pytest.importorskip("playwright.sync_api", reason="playwright is not installed").expect
+from playwright.sync_api import expect
 
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 SLOW_MS = 30_000
