@@ -52,7 +52,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
         (["up", "--page", "here"], "--page: got 'here', must be HOST:PORT such as 127.0.0.1:8080"),
         (
             ["dashboard", "--page", "0.0.0.0:80"],
-            "settings: dashboard.host: got '0.0.0.0', input should be '127.0.0.1'",
+            "dashboard.host: refuses to listen on 0.0.0.0, where others reach it",
         ),
         (["up", "--zenoh", "udp"], "settings: zenoh.endpoint: got 'udp', string should match pattern"),
         (["export", "--data", "{tmp}/no", "--out", "{tmp}/x.csv"], "historian.folder: {tmp}/no: there is no history"),
