@@ -219,13 +219,6 @@ class DashboardSettings(Table):
     stale_s: Positive = 10.0
 
 
-class SecuritySettings(Table):
-    """Who is let in: tokens of the dashboard, made by `wetwell token`; whether to listen to all without asking."""
-
-    tokens_file: Path | None = None
-    insecure: bool = False
-
-
 class Settings(BaseSettings):
     """All settings of a service."""
 
@@ -242,7 +235,6 @@ class Settings(BaseSettings):
     gateway: GatewaySettings = GatewaySettings()
     fleet: FleetSettings = FleetSettings()
     dashboard: DashboardSettings = DashboardSettings()
-    security: SecuritySettings = SecuritySettings()
 
 
 def load_settings(path: Path | None = None, flags: dict[str, Any] | None = None) -> Settings:

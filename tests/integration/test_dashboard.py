@@ -421,6 +421,6 @@ def test_a_file_of_tokens_that_cannot_be_read_lets_nobody_in(tokens, tmp_path) -
 
 
 def test_a_page_for_others_is_refused_without_tokens() -> None:
-    settings = Settings(dashboard=DashboardSettings(host="0.0.0.0", port=0))  # noqa: S104 - it must be refused
+    settings = Settings(dashboard=DashboardSettings(host="0.0.0.0", port=0))
     with pytest.raises(ConfigError, match="refuses to listen"):
         asyncio.run(serve_dashboard(settings))
