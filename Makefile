@@ -38,7 +38,7 @@ docs: $(VENV)/.dev  ## Build the documentation site in build/site, with its link
 	@mkdir -p build/mermaid
 	@test -d build/mermaid/package || (cd build/mermaid && npm pack --silent mermaid@11 > /dev/null && tar xzf mermaid-*.tgz) || \
 	  echo "diagrams will be shown as text: npm or its registry is not there"
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 sbom: build/sbom.json  ## Bill of materials of what runs, CycloneDX, in build/sbom.json
 

@@ -196,7 +196,7 @@ def test_an_act_goes_to_the_alarm_service_and_its_answer_comes_back() -> None:
 
 
 @pytest.mark.parametrize(
-    "query", ["", "kind=samples", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
+    "query", ["", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
 )
 def test_what_is_no_question_to_the_historian_is_told(query) -> None:
     answer = get(f"/api/stations/alpha/history?{query}", desk_with(MemoryBus()))

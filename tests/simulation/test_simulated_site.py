@@ -20,7 +20,7 @@ from wetwell.services.presets import find_scenario
 @pytest.fixture
 def folder(tmp_path: Path) -> Iterator[Path]:
     """In memory where that can be: what a crash of the machine does to its disks is not simulated."""
-    memory = Path("/dev/shm")
+    memory = Path("/dev/shm")  # noqa: S108 -- its folder there has a name of its own
     if not memory.is_dir():
         yield tmp_path
         return

@@ -6,7 +6,7 @@ import pytest
 
 from wetwell.services.historian.opening import open_store
 from wetwell.services.historian.store import Batch, StoreError
-from wetwell.services.settings import load_settings
+from wetwell.services.settings import environment_of, load_settings
 
 URL = "postgresql://wetwell:sesame@127.0.0.1:1/history"
 
@@ -14,7 +14,7 @@ URL = "postgresql://wetwell:sesame@127.0.0.1:1/history"
 def test_it_is_masked_where_settings_are_shown_and_reaches_a_child(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = load_settings(None, {"historian": {"url": URL}})
     assert "sesame" not in settings.model_dump_json() + repr(settings)
-    monkeypatch.setenv("WETWELL_HISTORIAN", settings.historian.for_child())
+    monkeypatch.setenv("WETWELL_HISTORIAN", environment_of(settings)["WETWELL_HISTORIAN"])
     assert load_settings() == settings
 
 
