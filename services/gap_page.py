@@ -86,7 +86,7 @@ def _traces(diagnosis: Diagnosis) -> str:
     by_cycle = np.bincount(bins.cycle[found.held], found.plain[found.held] ** 2)
     begin = max(int(np.argmax(diagnosis.regimes.cycle == int(np.argmax(by_cycle)))) - SHOWN_S // 6, 0)
     window = slice(begin, begin + SHOWN_S)
-    time_ns = traces.start_ns + NS_PER_S * np.arange(traces.seconds)[window]
+    time_ns = traces.start_ns + NS_PER_S * traces.time_s[window].astype(np.int64)
     added = effects_of(diagnosis.station)[len(replay.own) :]
     lines: dict[str, list[Series]] = {}
     running = int(np.argmax((traces.frequency_hz[:, window] > 0.0).sum(axis=1)))

@@ -52,7 +52,6 @@ class Replay:
         self.traces = traces
         self.station = station
         self.own = tuple(own)
-        self._time_s = np.arange(traces.seconds, dtype=np.float64)
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
         self._forcing = healthy_forcing(inflow_m3h, traces.pumps)
         self._level_m = np.empty(traces.seconds)
@@ -118,7 +117,7 @@ class Replay:
             return self._forcing
         forcing = healthy_forcing(later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps)
         for effect in writing:
-            effect.force(forcing, self._time_s)
+            effect.force(forcing, self.traces.time_s)
         return forcing
 
     @staticmethod

@@ -30,6 +30,8 @@ class Traces:
     ----------
     start_ns : int
         Time of the first second.
+    time_s : (n,) array
+        Seconds since then.
     frequency_hz : (pumps, n) array
         Without NaN.
     level_m : (n,) array
@@ -40,6 +42,7 @@ class Traces:
     """
 
     start_ns: int
+    time_s: Floats
     frequency_hz: Floats
     level_m: Floats
     inflow_m3h: Floats | None
@@ -107,6 +110,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     is_known = np.isfinite(inflow_m3h).mean() > 0.5 * (np.unique(second).size / seconds)
     return Traces(
         start_ns=int(recording.time_ns[0]),
+        time_s=np.arange(seconds, dtype=np.float64),
         frequency_hz=frequency_hz,
         level_m=on_seconds("level_m"),
         inflow_m3h=filled(inflow_m3h, seconds, 0.0) if is_known else None,
