@@ -15,6 +15,7 @@ from wetwell.sim2real.candidates import Freedom, candidates_of
 from wetwell.sim2real.culprit import culprit
 from wetwell.sim2real.excerpt import excerpt
 from wetwell.sim2real.misfit import Misfit
+from wetwell.sim2real.plausibility import check_plausible
 from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, REGIMES, STEADY, Regimes, regimes_of
 from wetwell.sim2real.replay import Replay
 from wetwell.sim2real.shrinkage import Interval, Shrinkage, bootstrap, shrinkage_of
@@ -122,13 +123,15 @@ def diagnose(
     Raises
     ------
     ValueError
-        If recording and station do not fit, the recording is too short, or a name is not in the library.
+        If recording and station do not fit, the recording is too short or in other units, or a name is not in the
+        library.
     """
     candidates = candidates_of(len(station.pump), only=only, without=without)
     traces = excerpt(traces_of(recording, station))
     regimes = regimes_of(traces, station)
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
+    check_plausible(traces, station, regimes, plain)
     misfit = Misfit(traces, station, regimes, plain)
     found = Attributor(replay, misfit, candidates, progress).search()
     bins, pumps = misfit.bins, traces.pumps

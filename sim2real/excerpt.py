@@ -39,7 +39,7 @@ def excerpt(traces: Traces, most_s: int = MOST_S) -> Traces:
     for k in range(count):
         begin = round(k * stretch_s + (k * GOLDEN % 1.0) * (stretch_s - WINDOW_S))
         first = max(_near(idle, begin), last)
-        last = max(min(_near(idle, begin + WINDOW_S), traces.seconds), first)
+        last = max(min(_near(idle, begin + WINDOW_S) + 1, traces.seconds), first)
         parts.append(np.arange(first, last))
     return _of_rows(traces, parts)
 
