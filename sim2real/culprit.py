@@ -111,7 +111,9 @@ def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParame
     flow, head = flow[of_flow], head[of_head]
     calm = (bins.regime[flow] == STEADY) | (bins.regime[flow] == MULTI_PUMP)
     weight = np.maximum(excess[flow] + excess[head], 0.0)
-    is_steady = bool(weight[calm].mean() > 0.3 * weight[~calm].mean()) if calm.any() and not calm.all() else True
+    is_steady = (
+        bool(weight[calm].mean() > 0.3 * weight[~calm].mean()) if calm.any() and not calm.all() else bool(calm.any())
+    )
     if is_steady:
         flow, head = flow[calm], head[calm]
     pump = bins.pump[flow]
