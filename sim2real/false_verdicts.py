@@ -12,7 +12,7 @@ from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import Station
 from wetwell.simulator.effects import effective_parameters
 
-MOST_S = 172_800
+MOST_S = 86_400
 """Of a longer recording the first part is judged. [s]"""
 
 
