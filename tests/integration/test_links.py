@@ -66,6 +66,17 @@ def put_until_it_comes(publisher: Publisher, payload: bytes, subscription: Subsc
     return asyncio.run(receive())
 
 
+def test_messages_come_in_order_without_recovery_too(buses):
+    here, there = buses
+    subscription = there.subscribe("wetwell/*/sample", recover=False)
+    publisher = here.publisher("wetwell/alpha/sample", history=5)
+    put_until_it_comes(publisher, b"first", subscription)
+    for number in range(20):
+        publisher.put(str(number).encode())
+    numbers = [str(number).encode() for number in range(20)]
+    assert [payload for payload in collect(subscription, 20) if payload in numbers] == numbers
+
+
 def test_messages_come_in_order(buses):
     here, there = buses
     subscription = there.subscribe("wetwell/*/sample", history=200)
