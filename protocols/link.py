@@ -53,8 +53,14 @@ class Bus(Protocol):
     def publisher(self, key: str, *, history: int = 1) -> Publisher:
         """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss."""
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Subscription[bytes]:
-        """Subscription to a key expression, beginning with up to `history` kept messages."""
+    def subscribe(
+        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
+    ) -> Subscription[bytes]:
+        """Subscription to a key expression, beginning with up to `history` kept messages.
+
+        Without `recover`, and without `history`, what is lost on the way stays lost: a tenth of the work, for those
+        who show the newest of very many.
+        """
 
     def answer(self, key: str) -> Subscription[Request]:
         """Questions that are asked on a key from now on; each is to be answered."""

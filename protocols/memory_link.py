@@ -73,7 +73,14 @@ class MemoryBus:
                 if matches(expression, key):
                     mailbox.put(payload)
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox[bytes]:
+    def subscribe(
+        self,
+        key: str,
+        *,
+        history: int = 0,
+        capacity: int = 10_000,
+        recover: bool = True,  # noqa: ARG002 - nothing is lost here
+    ) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each key in it."""
         mailbox: Mailbox[bytes] = Mailbox(capacity)
         with self._lock:

@@ -147,8 +147,12 @@ class ZenohBus:
         self._declared.append(publisher)
         return publisher
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox[bytes]:
+    def subscribe(
+        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
+    ) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
+
+        Without `recover`, and without `history`, what is lost on the way stays lost.
 
         Raises
         ------
@@ -161,6 +165,12 @@ class ZenohBus:
             if sample.kind == zenoh.SampleKind.PUT:
                 mailbox.put(sample.payload.to_bytes())
 
+        if not recover and not history:
+            try:
+                self._declared.append(self._session.declare_subscriber(key, deliver))
+            except zenoh.ZError as error:
+                raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
+            return mailbox
         kept = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history) if history else None
         try:
             subscriber = zenoh.ext.declare_advanced_subscriber(

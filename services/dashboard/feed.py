@@ -15,19 +15,31 @@ log = logging.getLogger(__name__)
 
 FRAME_S = 0.25
 FRAMES_A_SECOND = 4
-SAMPLE_HISTORY = 60
 VERDICT_HISTORY = 60
+FIRST_S = 2.0
 
 T = TypeVar("T")
 
 
 class Feed:
-    """Keeps a `SiteView` up to date from a bus and sends what is new to the browsers."""
+    """Keeps a `SiteView` up to date from the bus and sends what is new to the browsers.
 
-    def __init__(self, bus: Bus, view: SiteView, hub: Hub) -> None:
+    Parameters
+    ----------
+    bus : Bus
+        For all but the samples.
+    sample_bus : Bus
+        For the samples. A connection of their own makes them a tenth as dear: Zenoh looks through all publishers that
+        a session knows for each message.
+    view : SiteView
+    hub : Hub
+    """
+
+    def __init__(self, bus: Bus, sample_bus: Bus, view: SiteView, hub: Hub) -> None:
         self._view = view
         self._hub = hub
-        self._samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
+        self._sample_bus = sample_bus
+        self._samples = sample_bus.subscribe(sample_key("*"), capacity=100_000, recover=False)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
             (self._samples, view.take_sample),
             (bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY), view.take_verdict),
@@ -38,7 +50,9 @@ class Feed:
         self._presence = bus.watch(alive_key("*", "*"))
 
     async def run(self) -> None:
-        """Take and send for ever."""
+        """Take and send for ever, from the last sample of each station on."""
+        for payload in await self._sample_bus.ask(sample_key("*"), timeout_s=FIRST_S):
+            self._view.take_sample(payload)
         async with asyncio.TaskGroup() as group:
             for subscription, take in self._messages:
                 group.create_task(_take(subscription, take))
@@ -68,6 +82,8 @@ class Feed:
 
 
 async def _take(subscription: Subscription[T], take: Callable[[T], None]) -> None:
+    """Take in batches: to wake the loop for every message costs more than the message."""
     while True:
         for item in await subscription.receive():
             take(item)
+        await asyncio.sleep(FRAME_S / 2.0)

@@ -30,7 +30,6 @@ class Client:
     """
 
     def __init__(self) -> None:
-        self.resyncs = 0
         self._events: asyncio.Queue[bytes | None] = asyncio.Queue()
         self._events.put_nowait(RESYNC)
 
@@ -39,7 +38,6 @@ class Client:
         if self._events.qsize() >= QUEUE:
             while not self._events.empty():
                 self._events.get_nowait()
-            self.resyncs += 1
             data = RESYNC
         self._events.put_nowait(data)
 
@@ -70,10 +68,6 @@ class Hub:
     def clients(self) -> int:
         """How many browsers listen."""
         return sum(len(clients) for clients in self._clients.values())
-
-    def topics(self) -> set[str]:
-        """Topics that somebody looks at."""
-        return {topic for topic, clients in self._clients.items() if clients}
 
     async def listen(self, topic: str) -> AsyncIterator[bytes]:
         """Events of a topic for one browser, until it goes or the hub closes."""

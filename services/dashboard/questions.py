@@ -1,6 +1,6 @@
 """What a browser asks of the other services of the site: history, recordings, acts on alarms."""
 
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -10,11 +10,13 @@ from wetwell.protocols.errors import WetwellError, first_fault
 from wetwell.protocols.history_messages import History, HistoryQuery
 from wetwell.protocols.keys import alarm_act_key, history_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import MessageError, PumpReading, Sample
+from wetwell.protocols.messages import MessageError, Number, PumpReading, Sample
 from wetwell.protocols.stamps import to_iso
 
 ANSWER_S = 10.0
 ROWS_A_QUESTION = 10_000
+_NO_COLUMNS = frozenset({"seq", "quality"})
+"""Of raw samples the historian tells these too; a recording has no column for them."""
 
 
 class RefusalError(WetwellError):
@@ -76,35 +78,41 @@ async def recording_pieces(bus: Bus, station: str, query: Mapping[str, str]) -> 
     Raises
     ------
     RefusalError
-        As for `history`; or if nothing was kept of that time.
+        As for `history`; or if the historian refuses, or nothing was kept of that time.
     """
     start = query.get("start", "")
     span = {"kind": "samples", "end": query.get("end", ""), "points": str(ROWS_A_QUESTION)}
-    pumps = 0
+    names: list[str] = []
     while True:
         answer = await history(bus, station, span | {"start": start}, raw=True)
-        samples = [Sample.model_validate(message) for message in answer.messages]
-        if not pumps:
-            if not samples:
+        if answer.error:
+            raise RefusalError(502, answer.error)
+        time_ns, columns = _as_columns(answer)
+        if not names:
+            if not time_ns:
                 raise RefusalError(404, "nothing was kept of that time")
-            pumps = max(len(sample.pumps) for sample in samples)
-            yield ",".join(_columns(pumps)) + "\n"
-        yield "".join(_line(sample, pumps) for sample in samples)
-        if not answer.more or not samples:
+            names = list(columns)
+            yield ",".join(["time", *names]) + "\n"
+        blank = [None] * len(time_ns)
+        rows = zip(map(to_iso, time_ns), *(columns.get(name, blank) for name in names), strict=True)
+        yield "".join(",".join("" if value is None else str(value) for value in row) + "\n" for row in rows)
+        if not answer.more or not time_ns:
             return
-        start = to_iso(samples[-1].time + 1)
+        start = to_iso(time_ns[-1] + 1)
 
 
-def _columns(pumps: int) -> list[str]:
-    names = ["time", "level_m", "inflow_m3h"]
-    for pump in range(1, pumps + 1):
-        names += [f"pump{pump}_{name}" for name in PumpReading.model_fields]
-    return names
-
-
-def _line(sample: Sample, pumps: int) -> str:
-    values: list[Any] = [to_iso(sample.time), sample.level_m, sample.inflow_m3h]
-    for pump in (*sample.pumps, *[PumpReading()] * (pumps - len(sample.pumps))):
-        running = None if pump.running is None else int(pump.running)
-        values += [pump.frequency_hz, pump.flow_m3h, pump.head_m, pump.power_kw, running]
-    return ",".join("" if value is None else str(value) for value in values) + "\n"
+def _as_columns(answer: History) -> tuple[Sequence[int], Mapping[str, Sequence[Number]]]:
+    """Stamps and columns of a recording in an answer, which holds the samples as columns or as messages."""
+    if not answer.messages:
+        return answer.time, {name: values for name, values in answer.columns.items() if name not in _NO_COLUMNS}
+    samples = [Sample.model_validate(message) for message in answer.messages]
+    columns: dict[str, list[Number]] = {
+        "level_m": [sample.level_m for sample in samples],
+        "inflow_m3h": [sample.inflow_m3h for sample in samples],
+    }
+    for pump in range(max(len(sample.pumps) for sample in samples)):
+        readings = [sample.pumps[pump] if pump < len(sample.pumps) else PumpReading() for sample in samples]
+        for name in PumpReading.model_fields:
+            values = (getattr(reading, name) for reading in readings)
+            columns[f"pump{pump + 1}_{name}"] = [None if value is None else float(value) for value in values]
+    return [sample.time for sample in samples], columns

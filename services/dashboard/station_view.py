@@ -7,7 +7,7 @@ from typing import Any
 from wetwell.protocols.alarm_messages import Alarm
 from wetwell.protocols.messages import Sample, State, Status, Verdict
 from wetwell.protocols.model_messages import Model
-from wetwell.services.dashboard.rows import live_figures, sample_row, thinned
+from wetwell.services.dashboard.rows import NS_PER_MS, live_figures, sample_row, thinned
 
 ROWS_A_FRAME = 8
 """Most samples that go into one frame: a station that runs faster than life is drawn in steps."""
@@ -195,7 +195,7 @@ class StationView:
         """JSON array of place, time in ms, level, flow, power and running pumps."""
         if self.sample is None:
             return f"[{self.index},null,null,null,null,[]]"
-        return f"[{self.index},{self.sample.time // 1_000_000},{live_figures(self.sample)}]"
+        return f"[{self.index},{self.sample.time // NS_PER_MS},{live_figures(self.sample)}]"
 
     def _live(self, rows: list[str]) -> list[str]:
         sample = self.sample

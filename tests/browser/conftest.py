@@ -55,14 +55,14 @@ def free_port():
 
 
 @contextlib.contextmanager
-def wetwell(*arguments):
+def wetwell(*arguments, **environment):
     """A command as a process; killed at the end if it has not ended."""
     process = subprocess.Popen(
         [sys.executable, "-m", "wetwell.services", *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"WETWELL_HEALTH__PERIOD_S": "1"},
+        env=os.environ | {"WETWELL_HEALTH__PERIOD_S": "1"} | environment,
     )
     try:
         yield process
@@ -94,8 +94,8 @@ class Site:
         return f"http://127.0.0.1:{self.port}"
 
     @contextlib.contextmanager
-    def dashboard(self, port):
-        with wetwell("dashboard", "--zenoh", self.endpoint, "--page", f"127.0.0.1:{port}") as process:
+    def dashboard(self, port, **environment):
+        with wetwell("dashboard", "--zenoh", self.endpoint, "--page", f"127.0.0.1:{port}", **environment) as process:
             wait_for(f"http://127.0.0.1:{port}")
             yield process
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
+from wetwell.services.tokens import new_token
+
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 SLOW_MS = 30_000
 
@@ -116,6 +118,25 @@ def test_the_page_comes_back_when_the_server_does(site, open_page, unused_port) 
         told = page.locator("#station-time")
         before = told.inner_text()
         expect(told).not_to_have_text(before, timeout=SLOW_MS)
+
+
+def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_port, tmp_path) -> None:
+    file, port = tmp_path / "tokens.toml", unused_port()
+    token = new_token(file, "ada", "operator")
+    with site.dashboard(port, WETWELL_SECURITY__TOKENS_FILE=str(file)):
+        page = open_page(f"http://127.0.0.1:{port}/alarms")
+        for given in ("wrong", token):
+            page.get_by_label("Token").fill(given)
+            page.get_by_role("button", name="enter").click()
+            if given == "wrong":
+                expect(page.get_by_role("alert")).to_have_text("This token is not known.")
+        expect(page.locator("#link")).to_have_text("live", timeout=SLOW_MS)
+        page.reload()
+        row = page.get_by_role("row").filter(has_text="gamma: high level")
+        row.get_by_role("button", name="shelve").click()
+        expect(page.get_by_label("Your name")).to_have_value("ada")
+        expect(page.get_by_label("Your name")).not_to_be_editable()
+        page.close()  # before its server goes
 
 
 @pytest.mark.parametrize(

@@ -204,7 +204,8 @@ def test_what_is_no_question_to_the_historian_is_told(query) -> None:
     assert answer.json()["error"]
 
 
-def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkeypatch) -> None:
+@pytest.mark.parametrize("form", ["messages", "columns"])
+def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkeypatch, form) -> None:
     monkeypatch.setattr("wetwell.services.dashboard.questions.ROWS_A_QUESTION", 100)
     rows = 250
     every = [json.loads(a_sample(second).encode()) for second in range(rows)]
@@ -213,8 +214,16 @@ def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkey
         query = HistoryQuery.decode(payload)
         assert query.raw
         found = every[-(-query.start // NS_PER_S) : query.end // NS_PER_S]
-        messages, more = tuple(found[: query.points]), len(found) > query.points
-        return History(station="alpha", kind="samples", messages=messages, more=more).encode()
+        page, more = found[: query.points], len(found) > query.points
+        if form == "messages":
+            return History(station="alpha", kind="samples", messages=tuple(page), more=more).encode()
+        pumps = [message["pumps"][0] for message in page]
+        columns = {"seq": [message["seq"] for message in page], "level_m": [message["level_m"] for message in page]}
+        columns |= {
+            f"pump1_{name}": [pump[name] for pump in pumps] for name in ("flow_m3h", "frequency_hz", "running")
+        }
+        times = tuple(message["time"] for message in page)
+        return History(station="alpha", kind="samples", time=times, columns=columns, more=more).encode()
 
     async def run():
         bus = MemoryBus()
@@ -234,6 +243,8 @@ def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkey
     assert recording.time_ns.tolist() == [second * NS_PER_S for second in range(rows)]
     assert recording.column("pump1_flow_m3h")[-1] == 200.5
     assert recording.column("pump1_running")[-1] == 1.0
+    assert recording.column("level_m").tolist() == [1.25] * rows
+    assert not recording.ignored
 
 
 def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_path) -> None:
@@ -264,7 +275,7 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
             httpx.AsyncClient(base_url=address, timeout=10) as client,
             web_server(dashboard_app(desk), listener, desk.hub),
         ):
-            feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+            feeding = asyncio.create_task(Feed(bus, bus, desk.view, desk.hub).run())
             publisher = bus.publisher(sample_key("alpha"))
             async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
                 assert stream.headers["content-type"].startswith("text/event-stream")

@@ -66,6 +66,18 @@ def put_until_it_comes(publisher: Publisher, payload: bytes, subscription: Subsc
     return asyncio.run(receive())
 
 
+def test_messages_come_in_order_without_recovery_too(buses):
+    here, there = buses
+    subscription = there.subscribe("wetwell/*/sample", recover=False)
+    publisher = here.publisher("wetwell/alpha/sample", history=5)
+    put_until_it_comes(publisher, b"first", subscription)
+    numbers = [str(number).encode() for number in range(20)]
+    for payload in numbers[:-1]:
+        publisher.put(payload)
+    got = put_until_it_comes(publisher, numbers[-1], subscription)
+    assert [payload for payload in got if payload != b"first"][:20] == numbers
+
+
 def test_messages_come_in_order(buses):
     here, there = buses
     subscription = there.subscribe("wetwell/*/sample", history=200)

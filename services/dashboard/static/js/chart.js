@@ -13,8 +13,8 @@ export const pen = (number) => ({ pen: PENS[(number - 1) % PENS.length], dash: D
 
 /**
  * @param {string} label what is drawn, for those who do not see it
- * @param {() => object[]} series each {label, pen, dash, width, fill, band, paths, points, digits}
- * @param {object} options {height, unit, sync, legend, onZoom, drawn, limits}
+ * @param {() => object[]} series each {label, pen, dash, width, fill, band, paths, points, digits}; band: place of the other edge
+ * @param {object} options {height, unit, sync, legend, onZoom, limits, range, splits, scale}
  */
 export function chart(label, series, options = {}) {
   const element = html("div", { class: "chart", role: "img", "aria-label": label });
@@ -54,7 +54,7 @@ export function chart(label, series, options = {}) {
             value: (_, value) => (value == null ? "–" : figure(value, line.digits ?? 2)),
           })),
         ],
-        bands: lines.flatMap((line, place) => (line.band ? [{ series: [place + 1 + line.band, place + 1], fill: `${colour(line.bandPen ?? "soft")}` }] : [])),
+        bands: lines.flatMap((line, place) => (line.band ? [{ series: [place + 1 + line.band, place + 1], fill: colour("soft") }] : [])),
         hooks: {
           draw: options.limits ? [(self) => drawLimits(self, options.limits())] : [],
           setSelect: options.onZoom ? [(self) => zoomed(self)] : [],

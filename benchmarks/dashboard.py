@@ -1,0 +1,211 @@
+"""Cost of the control-room page: one JSON object on standard output.
+
+    python benchmarks/dashboard.py [--stations 1000] [--seconds 20]
+
+Router and dashboard run as processes of their own on free ports of this machine. The server's share of a core is its
+time on the processor over the time on the wall, while so many stations send a sample a second and one page follows
+the overview. The browser (Debian's chromium, by playwright) opens the overview and one station; of first paints the
+least and the median of several are told, each with an empty cache. Without chromium its figures are null.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import os
+import platform
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from wetwell.detector.nominal import nominal_of
+from wetwell.detector.station_model import station_model
+from wetwell.protocols.keys import model_key, sample_key, verdict_key
+from wetwell.protocols.messages import PumpReading, Sample, Verdict
+from wetwell.protocols.zenoh_link import ZenohBus, connect_client
+from wetwell.services.clock import now_ns
+from wetwell.services.daemon import ticks
+from wetwell.services.presets import find_station
+
+CHROMIUM = Path("/usr/bin/chromium")
+WARM_UP_S = 5.0
+PAINTS = 7
+
+
+def free_port() -> int:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port: int = listener.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def wetwell(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(  # noqa: S603 - the command is ours
+        [sys.executable, "-m", "wetwell.services", *arguments], stderr=subprocess.DEVNULL
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def processor_s(pid: int) -> float:
+    """Time that a process has had on the processor. [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+class Fleet:
+    """Stations that each send a sample a second, spread over it."""
+
+    def __init__(self, bus: ZenohBus, stations: int) -> None:
+        station = find_station("alpha")
+        names = [f"station-{number:04d}" for number in range(stations)]
+        self._samples = [(name, bus.publisher(sample_key(name))) for name in names]
+        for name in names:
+            verdict = Verdict(
+                time=now_ns(),
+                station=name,
+                pump=1,
+                state="normal",
+                probability={"normal": 1.0},
+                evidence={},
+                window=(now_ns(), now_ns()),
+            )
+            bus.publisher(verdict_key(name, 1)).put(verdict.encode())
+        model = station_model(
+            station.model_copy(update={"name": names[0]}), (None,) * nominal_of(station).pumps, {}, now_ns()
+        )
+        bus.publisher(model_key(names[0])).put(model.encode())
+
+    async def run(self) -> None:
+        """Send for ever, a tenth of the stations each tenth of a second."""
+        seq = 0
+        async for elapsed_s in ticks(0.1, asyncio.Event()):
+            pump = PumpReading(
+                frequency_hz=50.0, flow_m3h=200.0 + elapsed_s % 7, head_m=26.0, power_kw=18.0, running=True
+            )
+            rest = PumpReading(frequency_hz=0.0, flow_m3h=0.0, head_m=0.0, power_kw=0.4, running=False)
+            for name, publisher in self._samples[seq % 10 :: 10]:
+                sample = Sample(
+                    station=name,
+                    seq=seq,
+                    time=now_ns(),
+                    level_m=1.0 + elapsed_s % 1.0,
+                    inflow_m3h=150.0,
+                    pumps=(pump, rest, rest),
+                )
+                publisher.put(sample.encode())
+            seq += 1
+
+
+async def follow(url: str, counts: dict[str, int]) -> None:
+    """Count the bytes and frames of the overview."""
+    async with httpx.AsyncClient(timeout=None) as client, client.stream("GET", f"{url}/events") as stream:  # noqa: S113
+        async for data in stream.aiter_raw():
+            counts["bytes"] += len(data)
+            counts["frames"] += data.count(b"data: ")
+
+
+def paints(url: str) -> dict[str, Any] | None:
+    """First paints of a page and what it transfers."""
+    if not CHROMIUM.exists():
+        return None
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - may be missing
+
+    first_ms, sizes = [], []
+    with sync_playwright() as tools:
+        flags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
+        browser = tools.chromium.launch(executable_path=str(CHROMIUM), args=flags)
+        for _ in range(PAINTS):
+            context = browser.new_context(viewport={"width": 1600, "height": 1000})
+            page = context.new_page()
+            page.goto(url)
+            page.locator("#link", has_text="live").wait_for()
+            first_ms.append(page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime"))
+            sizes.append(
+                page.evaluate(
+                    "[...performance.getEntriesByType('navigation'), ...performance.getEntriesByType('resource')]"
+                    ".filter(entry => !entry.name.includes('/history?'))"
+                    ".reduce((sum, entry) => sum + entry.transferSize, 0)"
+                )
+            )
+            context.close()
+        browser.close()
+    return {
+        "first_paint_least_s": round(min(first_ms) / 1000, 3),
+        "first_paint_median_s": round(statistics.median(first_ms) / 1000, 3),
+        "transferred_kb": round(max(sizes) / 1000, 1),
+    }
+
+
+async def measured(stations: int, seconds: float) -> dict[str, Any]:
+    endpoint, port = f"tcp/127.0.0.1:{free_port()}", free_port()
+    url = f"http://127.0.0.1:{port}"
+    with (
+        wetwell("router", "--zenoh", endpoint),
+        wetwell("dashboard", "--zenoh", endpoint, "--page", f"127.0.0.1:{port}") as server,
+        await connect_client(endpoint) as bus,
+    ):
+        sending = asyncio.create_task(Fleet(bus, stations).run())
+        async with httpx.AsyncClient() as client:
+            known = 0
+            while known < stations:
+                await asyncio.sleep(0.5)
+                with contextlib.suppress(httpx.TransportError):
+                    known = len((await client.get(f"{url}/api/stations")).json()["stations"])
+        alone_share = await share_of_a_core(server.pid, seconds)
+        counts = {"bytes": 0, "frames": 0}
+        following = asyncio.create_task(follow(url, counts))
+        await asyncio.sleep(WARM_UP_S)
+        before = dict(counts)
+        followed_share = await share_of_a_core(server.pid, seconds)
+        stream = {name: (counts[name] - before[name]) / seconds for name in counts}
+        following.cancel()
+        pages = {
+            name: await asyncio.to_thread(paints, url + path)
+            for name, path in {"overview": "/", "station": "/station/station-0000"}.items()
+        }
+        sending.cancel()
+    return {
+        "stations": stations,
+        "share_of_a_core": round(followed_share, 4),
+        "share_of_a_core_without_page": round(alone_share, 4),
+        "stream_kb_per_s": round(stream["bytes"] / 1000, 1),
+        "stream_frames_per_s": round(stream["frames"], 2),
+        "pages": pages,
+    }
+
+
+async def share_of_a_core(pid: int, seconds: float) -> float:
+    """Time on the processor over time on the wall."""
+    before_s, start_s = processor_s(pid), time.monotonic()
+    await asyncio.sleep(seconds)
+    return (processor_s(pid) - before_s) / (time.monotonic() - start_s)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--stations", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    arguments = parser.parse_args()
+    figures = asyncio.run(measured(arguments.stations, arguments.seconds))
+    figures["machine"] = {
+        "processors": os.cpu_count(),
+        "load": os.getloadavg()[0],
+        "python": platform.python_version(),
+    }
+    print(json.dumps(figures, indent=2))
+
+
+if __name__ == "__main__":
+    main()
