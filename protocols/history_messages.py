@@ -39,7 +39,7 @@ class HistoryQuery(Message):
 
 
 class History(Message):
-    """Answer to a `HistoryQuery`: columns of samples and KPI, messages of all else (raw samples too), or an error."""
+    """Answer to a `HistoryQuery`: columns of samples and KPI, messages of all else, or an error."""
 
     schema_name: Literal["wetwell.history/1"] = Field("wetwell.history/1", alias="schema")
     station: str

@@ -2,12 +2,15 @@
 
 import logging
 from collections.abc import AsyncIterator
+from typing import get_args
+
+import numpy as np
 
 from wetwell.protocols.history_messages import History, HistoryQuery
 from wetwell.protocols.keys import history_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import MessageError, Sample
-from wetwell.protocols.stamps import MAX_STAMP_NS
+from wetwell.protocols.messages import MessageError, Quality, Sample
+from wetwell.protocols.recording import Recording
 
 log = logging.getLogger(__name__)
 
@@ -19,14 +22,30 @@ async def missed_samples(bus: Bus, station: str, since_ns: int) -> AsyncIterator
     """Samples after a time, page by page, oldest first; none if no historian answers."""
     start_ns, more = since_ns + 1, True
     while more:
-        query = HistoryQuery(kind="samples", start=start_ns, end=MAX_STAMP_NS, points=PAGE, raw=True)
+        query = HistoryQuery(kind="samples", start=start_ns, points=PAGE, raw=True)
         page = await _answer(bus, station, query)
-        if page is None or not page.messages:
+        if page is None or not page.time:
             return
-        samples = [Sample.model_validate(message) for message in page.messages]
-        log.info("station '%s': takes %d samples from the historian", station, len(samples))
-        yield samples
-        start_ns, more = samples[-1].time + 1, page.more
+        log.info("station '%s': takes %d samples from the historian", station, len(page.time))
+        yield samples_of(page)
+        start_ns, more = page.time[-1] + 1, page.more
+
+
+def samples_of(page: History) -> list[Sample]:
+    """Samples in an answer to a question for raw ones."""
+    columns = {
+        name: np.array(values, dtype=np.float64)
+        for name, values in page.columns.items()
+        if name not in {"seq", "quality"}
+    }
+    recording = Recording(time_ns=np.array(page.time, dtype=np.int64), columns=columns)
+    qualities = get_args(Quality)
+    return [
+        sample.model_copy(update={"seq": int(seq or 0), "quality": qualities[int(quality or 0)]})
+        for sample, seq, quality in zip(
+            recording.samples(page.station), page.columns["seq"], page.columns["quality"], strict=True
+        )
+    ]
 
 
 async def _answer(bus: Bus, station: str, query: HistoryQuery) -> History | None:

@@ -16,13 +16,14 @@ from distributed import Client, LocalCluster
 
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.history_messages import History, HistoryQuery
 from wetwell.protocols.keys import alive_key, history_key, sample_key, status_key, verdict_key
 from wetwell.protocols.link import Presence, Request, Subscription
 from wetwell.protocols.messages import Sample, Status, Verdict
 from wetwell.protocols.zenoh_link import ZenohBus, open_router
 from wetwell.services.fleet.controller import Fleet
 from wetwell.services.fleet.inventory import Inventory
+from wetwell.services.historian.core import Historian
+from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.settings import DetectorSettings, FleetSettings, HealthSettings, Settings, ZenohSettings
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -84,16 +85,18 @@ async def judged_and_wanted(tmp_path: Path) -> tuple[Verdicts, Verdicts]:
                 for number, (name, station) in enumerate(inventory.items())
             }
             publishers = {name: bus.publisher(sample_key(name), history=HOURS * 3600) for name in NAMES}
-            known: dict[str, list[Sample]] = {name: [] for name in NAMES}
-            historian = asyncio.create_task(answer(bus.answer(history_key("*")), known))
+            store = FolderStore(tmp_path / "history", keep_live_days=1)
+            historian = Historian(store)
+            answering = asyncio.create_task(answer(bus.answer(history_key("*")), historian))
             statuses = bus.subscribe(status_key("*", "detector"))
             await judged(bus.watch(alive_key("*", "detector")))
             got: Verdicts = {name: {} for name in NAMES}
             for first in range(0, HOURS * 3600, PART):
                 for name in NAMES:
                     for sample in samples[name][first : first + PART]:
-                        known[name].append(sample)
-                        publishers[name].put(sample.encode())
+                        payload = sample.encode()
+                        historian.take("samples", payload)
+                        publishers[name].put(payload)
                 if first == 3 * 3600:
                     workers = await client.run(os.getpid)
                     os.kill(next(iter(workers.values())), signal.SIGKILL)
@@ -103,7 +106,8 @@ async def judged_and_wanted(tmp_path: Path) -> tuple[Verdicts, Verdicts]:
                 async with asyncio.timeout(60):
                     while any(wanted[name].keys() - got[name].keys() for name in NAMES):
                         await collect(verdicts, got, quiet_s=0.5)
-            historian.cancel()
+            answering.cancel()
+            store.close()
     return got, wanted
 
 
@@ -132,15 +136,12 @@ async def caught_up(statuses: Subscription[bytes], number: int) -> None:
                     behind.discard(status.station)
 
 
-async def answer(requests: Subscription[Request], known: dict[str, list[Sample]]) -> None:
-    """A historian that has every sample."""
+async def answer(requests: Subscription[Request], historian: Historian) -> None:
+    """Let a historian answer."""
     while True:
         for request in await requests.receive():
-            query, name = HistoryQuery.decode(request.payload), request.key.split("/")[1]
-            rows = [sample for sample in known[name] if query.start <= sample.time < query.end]
-            page = tuple(sample.model_dump(mode="json") for sample in rows[: query.points])
-            more = len(rows) > query.points
-            request.reply(History(station=name, kind="samples", messages=page, more=more).encode())
+            historian.commit(0)
+            request.reply(historian.answer(request.key.split("/")[1], request.payload))
 
 
 async def collect(verdicts, got: Verdicts, quiet_s: float) -> None:

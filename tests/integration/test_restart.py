@@ -1,7 +1,6 @@
 """A detector that is killed at any moment: its verdicts are those of one that was not."""
 
 import asyncio
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.history_messages import History, HistoryQuery
 from wetwell.protocols.keys import history_key, sample_key, verdict_key
 from wetwell.protocols.link import Request, Subscription
 from wetwell.protocols.memory_link import MemoryBus
@@ -17,6 +15,8 @@ from wetwell.protocols.messages import Sample, Verdict
 from wetwell.services.detector.catch_up import missed_samples
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.judge import StationJudge
+from wetwell.services.historian.core import Historian
+from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.presets import find_scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -35,16 +35,12 @@ def undisturbed(alpha, samples) -> list[Verdict]:
     return [verdict for sample in samples for verdict in detector.update(sample)]
 
 
-async def answer(requests: Subscription[Request], known: Sequence[Sample]) -> None:
-    """A historian that has every sample and gives a few a page."""
+async def answer(requests: Subscription[Request], historian: Historian) -> None:
+    """Let a historian answer."""
     while True:
         for request in await requests.receive():
-            query = HistoryQuery.decode(request.payload)
-            rows = [sample for sample in known if query.start <= sample.time < query.end]
-            page = [sample.model_dump(mode="json") for sample in rows[: query.points]]
-            more = len(rows) > query.points
-            history = History(station="alpha", kind="samples", messages=tuple(page), more=more)
-            request.reply(history.encode())
+            historian.commit(0)
+            request.reply(historian.answer("alpha", request.payload))
 
 
 async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: list[int], away: int) -> list[Verdict]:
@@ -53,8 +49,9 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
     with MemoryBus() as bus:
         publisher = bus.publisher(sample_key("alpha"), history=KEPT)
         verdicts = bus.subscribe(verdict_key("alpha"))
-        known: list[Sample] = []
-        historian = asyncio.create_task(answer(bus.answer(history_key("*")), known))
+        store = FolderStore(folder / "history", keep_live_days=1)
+        historian = Historian(store)
+        answering = asyncio.create_task(answer(bus.answer(history_key("*")), historian))
         position = 0
         for cut in [*cuts, len(samples)]:
             judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
@@ -64,7 +61,7 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
             running = asyncio.create_task(judge.run())
             checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
             for number in range(position, cut):
-                known.append(samples[number])
+                historian.take("samples", samples[number].encode())
                 publisher.put(samples[number].encode())
                 if number % 200 == 0 or number + 1 == checkpoint_at:
                     await asyncio.sleep(0.0)
@@ -76,9 +73,10 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
             running.cancel()
             position = min(cut + away, len(samples))
             for sample in samples[cut:position]:
-                known.append(sample)
+                historian.take("samples", sample.encode())
                 publisher.put(sample.encode())
-        historian.cancel()
+        answering.cancel()
+        store.close()
         for payload in await verdicts.receive():
             got.setdefault(payload, Verdict.decode(payload))
     return list(got.values())
