@@ -14,7 +14,7 @@ from wetwell.detector.drawdown import draw_down
 from wetwell.detector.gate import let_through
 from wetwell.detector.meter_watch import watch_meters
 from wetwell.detector.nominal import Table
-from wetwell.detector.rolling_f_test import take
+from wetwell.detector.rolling_f_test import FIGURES, LEAST_SAMPLES, LOG_P, solve, take
 from wetwell.detector.runs import SEGMENT_SAMPLES, collect, note_running, steady_rows
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
@@ -96,5 +96,9 @@ def _take_steady(
         last = rows[row]
         time_s = now_ns // NS_PER_S + now_ns % NS_PER_S / NS_PER_S
         take(windows[number], moments[number], counts[number], time_s, last[2], last[3], last[4], last[5])
+        figures = moments[number, FIGURES:]
+        if counts[number, 0] >= LEAST_SAMPLES and solve(moments[number], figures):
+            pump["pump_log_p"] = min(pump["pump_log_p"], figures[0, LOG_P])
+            pump["system_log_p"] = min(pump["system_log_p"], figures[1, LOG_P])
         is_full = is_full or (not pump["is_learning"] and pump["samples"] % SEGMENT_SAMPLES == 0)
     return is_full

@@ -367,12 +367,14 @@ class Detector:
         evidence: dict[str, Any],
     ) -> Verdict:
         pump = self._pumps[index]
-        rolling = self._rolling.value(index)
+        running, rolling = self._runs.pumps[index], self._rolling.value(index)
         if rolling is not None:
             evidence["rolling_f_test"] = {
                 "pump": f_test_figures(rolling.pump),
                 "system": f_test_figures(rolling.system),
+                "strongest_log_p": {"pump": float(running["pump_log_p"]), "system": float(running["system_log_p"])},
             }
+            running["pump_log_p"] = running["system_log_p"] = 0.0
         return Verdict(
             time=time_ns,
             station=self._station,

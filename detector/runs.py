@@ -58,14 +58,17 @@ PUMP = np.dtype(
             "stuck",
         )
     ]
-    + [(name, np.float64) for name in ("speed_ratio", "duty_speed", "duty_m3h", "run_s", "log_ratio")]
+    + [
+        (name, np.float64)
+        for name in ("speed_ratio", "duty_speed", "duty_m3h", "run_s", "log_ratio", "pump_log_p", "system_log_p")
+    ]
 )
 """What is known of a pump from sample to sample.
 
 The open run: its start, that of the part being collected, its last sample, when it will be steady, how many steady
 samples it has, a bit for each signal that it has had, and whether one that is needed has never come. Speed and flow
 by the datasheet. For others: whether the pump is being learnt, a bit for each meter that was stuck in the run, time
-that it ran, and the drawdown figure of its last run.
+that it ran, the drawdown figure of its last run, and the smallest log p of the rolling tests since they were told.
 """
 COLUMNS = 10
 """Of a steady sample: pump, time, flow, head, speed ratio, total flow, level, power, both flows by the datasheet."""
