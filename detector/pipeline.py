@@ -286,7 +286,7 @@ class Detector:
         if pump.known is None or not filled:
             return []
         baseline = pump.known.baseline
-        deviation_m = np.sqrt(np.diag(baseline.segment_covariance + baseline.run_covariance))
+        deviation_m = np.sqrt(baseline.segment_covariance.diagonal() + baseline.run_covariance.diagonal())
         since = pump.cusum.update(baseline.shifts(self._runs.last_segment(index))[0], deviation_m)
         if since < EARLY_SEGMENTS or self._runs.pumps["stuck"][index]:
             pump.early = None

@@ -368,8 +368,7 @@ class RunTracker:
 
     def full_pumps(self) -> list[int]:
         """Pumps that have just filled a segment."""
-        is_full = (self.pumps["is_steady"] > 0) & (self.pumps["samples"] % SEGMENT_SAMPLES == 0)
-        return [int(pump) for pump in np.flatnonzero(is_full)]
+        return [pump for pump in range(len(self.pumps)) if self.full_segments(pump)]
 
     def full_segments(self, pump: int) -> int:
         """Number of segments of an open run, when it has just filled one; else 0."""
