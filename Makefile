@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 UV := VIRTUAL_ENV=$(VENV) $(BIN)/uv
 SCENARIO ?= demo
 
-.PHONY: help up test lint types imports format requirements clean
+.PHONY: help up test lint types imports format docs requirements clean
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -31,13 +31,19 @@ format: $(VENV)/.dev  ## Bring all files into form
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+docs: $(VENV)/.dev  ## Build the documentation site in build/site, with its links checked
+	@mkdir -p build/mermaid
+	@test -d build/mermaid/package || (cd build/mermaid && npm pack --silent mermaid@11 > /dev/null && tar xzf mermaid-*.tgz) || \
+	  echo "diagrams will be shown as text: npm or its registry is not there"
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
 requirements: $(VENV)/.uv  ## Pin the newest versions anew
 	cd requirements && for name in runtime build dev; do \
 	  ../$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	    --no-header --upgrade $$name.in --output-file $$name.txt || exit 1; done
 
 clean:  ## Remove what the targets made
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(VENV)/.uv:

@@ -99,7 +99,7 @@ class Gate:
     A value that is absent, NaN or outside its range becomes NaN and is counted. A sample that is doubled or late is
     dropped and counted. A sample that jumps more than `MAX_JUMP_S` ahead ("future"), and samples that are behind, may
     come from a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another,
-    the gate follows them and counts a clock step. Where their numbers are old too they are most likely sent again
+    the gate follows them and counts a clock step. Those that are behind with old numbers are most likely sent again
     after a lost link, and it takes more than `RESENT_SAMPLES` of them: then the source has begun anew.
 
     `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has
@@ -167,17 +167,19 @@ def _is_in_order(state: Any, time_ns: int, seq: int) -> bool:
     if MIN_GAP_S <= gap_s <= MAX_JUMP_S:
         state["gap_s"] = gap_s
         return True
-    if 0.0 <= gap_s < MIN_GAP_S:
+    since_other_s = seconds_between(state["other_ns"], time_ns)
+    if 0.0 <= gap_s < MIN_GAP_S or (state["other_count"] > 0 and 0.0 <= since_other_s < MIN_GAP_S):
         state["doubled"] += 1
         return False
     if gap_s < 0.0:
         state["late"] += 1
     else:
         state["future"] += 1
-    follows = state["other_count"] > 0 and 0.0 < seconds_between(state["other_ns"], time_ns) <= MAX_JUMP_S
+    follows = state["other_count"] > 0 and 0.0 < since_other_s <= MAX_JUMP_S
     state["other_count"] = state["other_count"] + 1 if follows else 1
     state["other_ns"] = time_ns
-    if state["other_count"] < (CONFIRMATIONS if seq > state["seq"] else RESENT_SAMPLES):
+    may_be_resent = gap_s < 0.0 and seq <= state["seq"]
+    if state["other_count"] < (RESENT_SAMPLES if may_be_resent else CONFIRMATIONS):
         return False
     state["clock_steps"] += 1
     state["gap_s"] = math.inf

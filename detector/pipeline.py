@@ -92,6 +92,16 @@ class Detector:
         """How many samples and values the gate has let through, marked or dropped."""
         return dict(self._gate.counts)
 
+    @property
+    def seen_until_ns(self) -> int:
+        """Time of the last sample that was let through; 0 before the first."""
+        return int(self._gate.state["time_ns"][0])
+
+    @property
+    def baselines(self) -> tuple[Baseline | None, ...]:
+        """What was learnt of each pump; None while it is being learnt."""
+        return tuple(None if pump.known is None else pump.known.baseline for pump in self._pumps)
+
     def update(self, sample: Readings) -> tuple[Verdict, ...]:
         """Verdicts that a sample brings."""
         return tuple(self.take(self._live.fill(sample)))

@@ -56,6 +56,8 @@ def _one_line(fault: Mapping[str, Any]) -> str:
         return message
     if isinstance(fault["input"], Mapping) or fault["type"] == "value_error":
         return f"{path}: {message}" if path else message
+    if path.endswith(("password", "secret", "token")):
+        return f"{path}: {message}"
     return f"{path}: got {fault['input']!r}, {message}"
 
 

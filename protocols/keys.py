@@ -1,6 +1,8 @@
 """Zenoh key expressions: `wetwell/{station}/...`, one function a kind of message."""
 
 ROOT = "wetwell"
+SITE = "_site"
+"""In place of a station: a service that is there for all of them."""
 
 
 def sample_key(station: str) -> str:
@@ -26,3 +28,33 @@ def status_key(station: str, service: str) -> str:
 def alive_key(station: str, service: str) -> str:
     """Key of the liveliness token of one service of a station."""
     return f"{ROOT}/{station}/alive/{service}"
+
+
+def model_key(station: str) -> str:
+    """Key of the curves that the detector believes in."""
+    return f"{ROOT}/{station}/model"
+
+
+def alarm_key(station: str, alarm: str = "*") -> str:
+    """Key of one alarm, or of all alarms of a station."""
+    return f"{ROOT}/{station}/alarm/{alarm}"
+
+
+def alarm_act_key(station: str) -> str:
+    """Key of the acts of operators on the alarms of a station, which are questions."""
+    return f"{ROOT}/{station}/alarm-act"
+
+
+def alarm_report_key() -> str:
+    """Key of the question for rates, chattering and stale alarms of the whole site."""
+    return f"{ROOT}/{SITE}/alarm-report"
+
+
+def history_key(station: str) -> str:
+    """Key of the questions to the historian about a station."""
+    return f"{ROOT}/{station}/history"
+
+
+def plan_key(shard: int) -> str:
+    """Key of the plan of a shard of the fleet."""
+    return f"{ROOT}/{SITE}/plan/{shard}"

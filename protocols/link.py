@@ -3,7 +3,10 @@
 A key is a Zenoh key expression; in subscriptions `*` stands for one chunk between slashes.
 """
 
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
 
 
 class Publisher(Protocol):
@@ -13,7 +16,7 @@ class Publisher(Protocol):
         """Send a message. Never waits: a subscriber that cannot keep up loses messages, not the sender time."""
 
 
-class Subscription(Protocol):
+class Subscription(Protocol[T]):
     """Messages of a key, waiting to be received by one event loop.
 
     Characteristics: buffered: up to `capacity` · when full: drops the oldest and counts it in `dropped` ·
@@ -22,21 +25,48 @@ class Subscription(Protocol):
 
     dropped: int
 
-    async def receive(self) -> list[bytes]:
+    async def receive(self) -> list[T]:
         """Wait until a message is there, then return all that are, oldest first."""
 
 
+class Request(Protocol):
+    """A question that somebody has asked on a key."""
+
+    key: str
+    payload: bytes
+
+    def reply(self, payload: bytes) -> None:
+        """Answer it, once, from any thread. Who asked may be gone: then nothing happens."""
+
+
+@dataclass(frozen=True)
+class Presence:
+    """A service that has come (`is_alive`) or gone, by the key that it had announced."""
+
+    key: str
+    is_alive: bool
+
+
 class Bus(Protocol):
-    """A connection that publishes, subscribes and shows that a service lives."""
+    """A connection that publishes, subscribes, asks and answers, and shows that a service lives."""
 
     def publisher(self, key: str, *, history: int = 1) -> Publisher:
         """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss."""
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Subscription:
+    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Subscription[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages."""
+
+    def answer(self, key: str) -> Subscription[Request]:
+        """Questions that are asked on a key from now on; each is to be answered."""
+
+    async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
+        """Answers to a question; of a key with a publisher also its last message. None in time: an empty list."""
 
     def announce(self, key: str) -> None:
         """Show under a key that this service lives, until the connection ends."""
+
+    def watch(self, key: str) -> Subscription[Presence]:
+        """Services that are announced under a key expression: those that live now, then each change."""
 
     @property
     def is_connected(self) -> bool:

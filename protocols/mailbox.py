@@ -4,9 +4,12 @@ import asyncio
 import contextlib
 import threading
 from collections import deque
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
 
 
-class Mailbox:
+class Mailbox(Generic[T]):
     """Messages that wait for one asyncio reader; a `Subscription` of every link.
 
     Characteristics: buffered: up to `capacity` messages · when full: drops the oldest and counts it in `dropped` ·
@@ -25,7 +28,7 @@ class Mailbox:
 
     Examples
     --------
-    >>> mailbox = Mailbox(capacity=2)
+    >>> mailbox: Mailbox[bytes] = Mailbox(capacity=2)
     >>> for payload in (b"1", b"2", b"3"):
     ...     mailbox.put(payload)
     >>> asyncio.run(mailbox.receive()), mailbox.dropped
@@ -37,23 +40,23 @@ class Mailbox:
             raise ValueError(f"capacity must be at least 1, got {capacity}")
         self.dropped = 0
         self._capacity = capacity
-        self._messages: deque[bytes] = deque()
+        self._messages: deque[T] = deque()
         self._reader: asyncio.Future[None] | None = None
         self._lock = threading.Lock()
 
-    def put(self, payload: bytes) -> None:
+    def put(self, message: T) -> None:
         """Add a message; never waits for the reader."""
         with self._lock:
             if len(self._messages) == self._capacity:
                 self._messages.popleft()
                 self.dropped += 1
-            self._messages.append(payload)
+            self._messages.append(message)
             reader, self._reader = self._reader, None
         if reader is not None:
             with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is left to wake
                 reader.get_loop().call_soon_threadsafe(_wake, reader)
 
-    async def receive(self) -> list[bytes]:
+    async def receive(self) -> list[T]:
         """Wait until a message is there, then return all that are, oldest first.
 
         Lets other tasks run each time, even if messages are always there. Cancelling loses no message.

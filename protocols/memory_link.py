@@ -1,11 +1,17 @@
 """Bus within one process: for `wetwell up` without a network, for replays and for tests."""
 
+import asyncio
+import contextlib
 import functools
 import threading
 from collections import deque
 from typing import Self
 
+from wetwell.protocols.link import Presence, Request
 from wetwell.protocols.mailbox import Mailbox
+
+REQUESTS = 1_000
+"""Most questions, or changes of presence, that wait for one reader."""
 
 
 class MemoryBus:
@@ -28,7 +34,9 @@ class MemoryBus:
     def __init__(self) -> None:
         self.alive: set[str] = set()
         self._kept: dict[str, deque[bytes]] = {}
-        self._subscriptions: list[tuple[str, Mailbox]] = []
+        self._subscriptions: list[tuple[str, Mailbox[bytes]]] = []
+        self._answerers: list[tuple[str, Mailbox[Request]]] = []
+        self._watchers: list[tuple[str, Mailbox[Presence]]] = []
         self._lock = threading.Lock()
 
     def __enter__(self) -> Self:
@@ -39,7 +47,9 @@ class MemoryBus:
 
     def close(self) -> None:
         """Forget what was announced, as if the process had left the network."""
-        self.alive.clear()
+        for key in list(self.alive):
+            self.alive.discard(key)
+            self._tell(Presence(key, is_alive=False))
 
     def publisher(self, key: str, *, history: int = 1) -> "MemoryPublisher":
         """Publisher on a key that keeps the last `history` messages for late joiners.
@@ -63,9 +73,9 @@ class MemoryBus:
                 if matches(expression, key):
                     mailbox.put(payload)
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox:
+    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each key in it."""
-        mailbox = Mailbox(capacity)
+        mailbox: Mailbox[bytes] = Mailbox(capacity)
         with self._lock:
             for kept_key, kept in self._kept.items():
                 if matches(key, kept_key):
@@ -80,14 +90,69 @@ class MemoryBus:
             kept = self._kept.get(key)
             return kept[-1] if kept else None
 
+    def answer(self, key: str) -> Mailbox[Request]:
+        """Questions that are asked on a key from now on; each is to be answered."""
+        mailbox: Mailbox[Request] = Mailbox(REQUESTS)
+        with self._lock:
+            self._answerers.append((key, mailbox))
+        return mailbox
+
+    async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
+        """Answers to a question, and the last message of each key in it that has a publisher."""
+        with self._lock:
+            answers = [kept[-1] for kept_key, kept in self._kept.items() if kept and matches(key, kept_key)]
+            waiting = [mailbox for asked, mailbox in self._answerers if matches(key, asked) or matches(asked, key)]
+        requests = [MemoryRequest(key, payload) for _ in waiting]
+        for mailbox, request in zip(waiting, requests, strict=True):
+            mailbox.put(request)
+        if requests:
+            done, late = await asyncio.wait([request.answered for request in requests], timeout=timeout_s)
+            answers += [answer.result() for answer in done]
+            for answer in late:
+                answer.cancel()
+        return answers
+
     def announce(self, key: str) -> None:
         """Add the key to `alive`."""
         self.alive.add(key)
+        self._tell(Presence(key, is_alive=True))
+
+    def watch(self, key: str) -> Mailbox[Presence]:
+        """Services that are announced under a key expression: those that live now, then each change."""
+        mailbox: Mailbox[Presence] = Mailbox(REQUESTS)
+        self._watchers.append((key, mailbox))
+        for alive in sorted(self.alive):
+            if matches(key, alive):
+                mailbox.put(Presence(alive, is_alive=True))
+        return mailbox
+
+    def _tell(self, presence: Presence) -> None:
+        for expression, mailbox in self._watchers:
+            if matches(expression, presence.key):
+                mailbox.put(presence)
 
     @property
     def is_connected(self) -> bool:
         """Always true: everybody is in this process."""
         return True
+
+
+class MemoryRequest:
+    """Question on a `MemoryBus`."""
+
+    def __init__(self, key: str, payload: bytes) -> None:
+        self.key = key
+        self.payload = payload
+        self.answered: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+
+    def reply(self, payload: bytes) -> None:
+        """Answer it."""
+        with contextlib.suppress(RuntimeError):  # the loop of who asked has ended
+            self.answered.get_loop().call_soon_threadsafe(self._set, payload)
+
+    def _set(self, payload: bytes) -> None:
+        if not self.answered.done():
+            self.answered.set_result(payload)
 
 
 class MemoryPublisher:

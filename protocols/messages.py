@@ -21,6 +21,9 @@ State = Literal[
 ]
 """What a verdict says of one pump."""
 
+ServiceState = Literal["starting", "running", "waiting", "stopping"]
+"""How a service is: waiting means for somebody else, such as a PLC that is away."""
+
 Quality = Literal["good", "uncertain", "bad"]
 """What the source of a sample thinks of it, in the words of OPC."""
 
@@ -127,11 +130,12 @@ class Order(Message):
 
 
 class Status(Message):
-    """Health figures of one service, once in a while."""
+    """Health figures of one service, once in a while; `reason` says what is wrong, for people."""
 
     schema_name: Literal["wetwell.status/1"] = Field("wetwell.status/1", alias="schema")
     time: Stamp
     station: str
     service: str
-    state: Literal["starting", "running", "waiting", "stopping"]
+    state: ServiceState
     figures: dict[str, float]
+    reason: str = ""

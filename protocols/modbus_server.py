@@ -5,8 +5,10 @@ asked for from the image, or hands the values to be written to the PLC program, 
 """
 
 import asyncio
+import contextvars
 import logging
 import socket
+import ssl
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
@@ -14,10 +16,12 @@ from typing import Self
 from pymodbus.constants import ExcCodes, ModbusStatus
 from pymodbus.datastore import ModbusServerContext
 from pymodbus.exceptions import ModbusIOException
+from pymodbus.framer import FramerType
 from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.bit_message import WriteSingleCoilRequest
 from pymodbus.pdu.register_message import ReadWriteMultipleRegistersRequest
-from pymodbus.server import ModbusTcpServer
+from pymodbus.server import ModbusTcpServer, ModbusTlsServer
+from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from wetwell.protocols.errors import LinkError
@@ -31,11 +35,21 @@ from wetwell.protocols.registers import (
     measured_words,
     register_table,
 )
+from wetwell.protocols.write_permission import (
+    LOOPBACK_WRITES,
+    WritePermission,
+    allowed_registers,
+    check_permissions,
+)
 
 _log = logging.getLogger(__name__)
 _COIL_CODES = frozenset({1, 5, 15})
 _SERVED_CODES = _COIL_CODES | {3, 4, 6, 16, 22, 23}
 """All others get exception 01; pymodbus would answer some from thin air and some with a traceback in the log."""
+_HANDSHAKE_S = 90.0
+"""So long after it began, a connection that has not come about is forgotten; asyncio gives TLS 60 s."""
+_client: contextvars.ContextVar[str] = contextvars.ContextVar("client")
+"""Address of the client whose request is being served."""
 _UNNAMED = 0x80
 """Function code of pymodbus' answer to a request that it did not decode."""
 
@@ -59,6 +73,11 @@ class ModbusServer:
     on_write : callable
         Gets {register name: new value} of all that one request changes, before it changes; a ValueError refuses the
         request with exception 03. Writes that are no registers, or half of one, or read-only get exception 02.
+    tls : ssl.SSLContext, optional
+        Speak Modbus over TLS only.
+    write_allow : sequence of WritePermission
+        Who may write what. A client that may write nothing gets exception 01, one that may not write all that a
+        request asks for gets 02; both are logged.
 
     Attributes
     ----------
@@ -76,14 +95,18 @@ class ModbusServer:
         pumps: int,
         levels: int,
         on_write: Callable[[Mapping[str, float]], None],
+        tls: ssl.SSLContext | None = None,
+        write_allow: Sequence[WritePermission] = LOOPBACK_WRITES,
     ) -> None:
         if not 0 <= unit_id <= 255:
             raise ValueError(f"unit_id must lie in [0, 255], got {unit_id}")
         self._host, self._port, self._unit_id, self._word_order = host, port, unit_id, word_order
-        self._on_write = on_write
+        self._on_write, self._tls, self._write_allow = on_write, tls, write_allow
         self._measured_words, self._setting_words = measured_words(pumps), 4 * levels
         self._rows = {row.name: row for row in register_table(pumps, levels) if row.table != "input"}
         self._writable = {(row.table, row.address): row for row in self._rows.values() if row.access == "rw"}
+        self._names = [row.name for row in self._writable.values()]
+        check_permissions(write_allow, self._names)
         self._image: dict[Table, list[int]] = {
             "coil": [0] * pumps,
             "holding": [0] * (SETTINGS_BLOCK + self._setting_words),
@@ -102,7 +125,8 @@ class ModbusServer:
     @property
     def clients(self) -> int:
         """Number of open connections."""
-        return len(self._server.active_connections) if self._server else 0
+        connections = self._server.active_connections.values() if self._server else ()
+        return sum(connection.transport is not None for connection in connections)
 
     def update(self, values: Mapping[str, float | None]) -> None:
         """Set values in the process image, all or none; a request sees them before or after, never half.
@@ -132,13 +156,7 @@ class ModbusServer:
             reason = str(error.strerror or error).rpartition(": ")[2]
             raise LinkError(f"{endpoint}: cannot listen: {reason}") from error
         trial.close()
-        server = ModbusTcpServer(
-            self._device(),
-            address=(self._host, self._port),
-            trace_packet=self._trace_packet,
-            trace_pdu=self._trace_pdu,
-            custom_pdu=[_WriteCoil, _ReadWrite],
-        )
+        server = self._make_server()
         try:
             await server.serve_forever(background=True)
         except RuntimeError as error:
@@ -162,6 +180,26 @@ class ModbusServer:
         server.close()
         for _ in range(5):  # passes of the loop that a request just received, or a lost connection, needs to end
             await asyncio.sleep(0)
+
+    def _make_server(self) -> ModbusTcpServer:
+        address, custom_pdu = (self._host, self._port), [_WriteCoil, _ReadWrite]
+        if self._tls is None:
+            return _TcpServer(
+                self._device(),
+                address=address,
+                trace_packet=self._trace_packet,
+                trace_pdu=self._trace_pdu,
+                custom_pdu=custom_pdu,
+            )
+        return _TlsServer(
+            self._device(),
+            address=address,
+            trace_packet=self._trace_packet,
+            trace_pdu=self._trace_pdu,
+            custom_pdu=custom_pdu,
+            sslctx=self._tls,
+            framer=FramerType.SOCKET,  # the same on the wire as pymodbus' own for TLS, which needs whole frames
+        )
 
     def _device(self) -> SimDevice:
         coils = SimData(0, values=[False] * len(self._image["coil"]), datatype=DataType.BITS)
@@ -195,6 +233,11 @@ class ModbusServer:
         return None
 
     def _write(self, table: Table, address: int, values: Sequence[int]) -> ExcCodes | None:
+        client = _client.get()
+        allowed = allowed_registers(self._write_allow, client, self._names)
+        if not allowed:
+            _log.warning("write from %s refused: it may write nothing (modbus.write_allow)", client)
+            return ExcCodes.ILLEGAL_FUNCTION
         changes: dict[str, float] = {}
         at, end = 0, len(values)
         while at < end:
@@ -206,11 +249,16 @@ class ModbusServer:
                 return ExcCodes.ILLEGAL_VALUE
             changes[row.name] = value
             at += row.count
+        forbidden = [name for name in changes if name not in allowed]
+        if forbidden:
+            _log.warning("write of %s from %s refused (modbus.write_allow)", ", ".join(forbidden), client)
+            return ExcCodes.ILLEGAL_ADDRESS
         try:
             self._on_write(changes)
         except ValueError as error:
-            _log.info("write of %s refused: %s", ", ".join(changes), error)
+            _log.info("write of %s from %s refused: %s", ", ".join(changes), client, error)
             return ExcCodes.ILLEGAL_VALUE
+        _log.info("%s writes %s", client, ", ".join(f"{name} = {value:g}" for name, value in changes.items()))
         self._image[table][address : address + end] = map(int, values)
         return None
 
@@ -238,6 +286,38 @@ class ModbusServer:
         if unit_id != self._unit_id:
             return ExcCodes.GATEWAY_NO_RESPONSE
         return ExcCodes.ILLEGAL_VALUE if function in _SERVED_CODES else ExcCodes.ILLEGAL_FUNCTION
+
+
+class _Handler(ServerRequestHandler):
+    """One connection, which knows whose request it serves."""
+
+    def __init__(self, server: ModbusTcpServer, begin_s: float) -> None:
+        super().__init__(server, server.trace_packet, server.trace_pdu, server.trace_connect)  # type: ignore[no-untyped-call]
+        self.begin_s = begin_s
+
+    async def handle_request(self) -> None:
+        if isinstance(self.transport, asyncio.Transport):
+            _client.set(self.transport.get_extra_info("peername", ("::",))[0])  # each request is a task of its own
+            await super().handle_request()  # type: ignore[no-untyped-call]
+
+
+class _Connections(ModbusTcpServer):
+    """What both servers do with a new connection."""
+
+    def callback_new_connection(self) -> _Handler:
+        now_s = asyncio.get_running_loop().time()
+        for name, old in tuple(self.active_connections.items()):  # pymodbus keeps those whose handshake has failed
+            if old.transport is None and isinstance(old, _Handler) and now_s - old.begin_s > _HANDSHAKE_S:
+                del self.active_connections[name]
+        return _Handler(self, now_s)
+
+
+class _TcpServer(_Connections):
+    """Modbus TCP."""
+
+
+class _TlsServer(_Connections, ModbusTlsServer):
+    """Modbus over TLS."""
 
 
 class _WriteCoil(WriteSingleCoilRequest):

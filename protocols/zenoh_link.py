@@ -18,8 +18,10 @@ import zenoh
 import zenoh.ext
 
 from wetwell.protocols.errors import ConfigError, LinkError
+from wetwell.protocols.link import Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 from wetwell.protocols.messages import JSON_ENCODING
+from wetwell.protocols.zenoh_access import OPEN, ZenohAccess
 
 logger = logging.getLogger(__name__)
 
@@ -28,6 +30,9 @@ RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_facto
 
 LAST_LOSS_S = 1.0
 """So long after it a message that was lost, and that no other followed, is noticed."""
+
+REQUESTS = 1_000
+"""Most questions, or changes of presence, that wait for one reader."""
 
 
 class ZenohPublisher:
@@ -65,6 +70,21 @@ class ZenohPublisher:
         with query:
             if self._last is not None:
                 query.reply(self._key, self._last, encoding=JSON_ENCODING)
+
+
+class ZenohRequest:
+    """Question that came over Zenoh."""
+
+    def __init__(self, query: zenoh.Query, reply_key: str) -> None:
+        self.key = str(query.key_expr)
+        self.payload = b"" if query.payload is None else query.payload.to_bytes()
+        self._query = query
+        self._reply_key = reply_key
+
+    def reply(self, payload: bytes) -> None:
+        """Answer it; nothing happens if who asked is gone."""
+        with contextlib.suppress(zenoh.ZError), self._query:
+            self._query.reply(self._reply_key, payload, encoding=JSON_ENCODING)
 
 
 class ZenohBus:
@@ -127,7 +147,7 @@ class ZenohBus:
         self._declared.append(publisher)
         return publisher
 
-    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox:
+    def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
         Raises
@@ -135,7 +155,7 @@ class ZenohBus:
         LinkError
             If the key is not a key expression or the bus is closed.
         """
-        mailbox = Mailbox(capacity)
+        mailbox: Mailbox[bytes] = Mailbox(capacity)
 
         def deliver(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
@@ -153,6 +173,76 @@ class ZenohBus:
         except zenoh.ZError as error:
             raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
         self._declared.append(subscriber)
+        return mailbox
+
+    def answer(self, key: str) -> Mailbox[Request]:
+        """Questions that are asked on a key from now on; each is to be answered.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Request] = Mailbox(REQUESTS)
+
+        def deliver(query: zenoh.Query) -> None:
+            mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
+
+        try:
+            self._declared.append(self._session.declare_queryable(key, deliver))
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot answer '{key}': {_reason(error)}") from error
+        return mailbox
+
+    async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
+        """Answers to a question; of a key with a publisher also its last message. None in time: an empty list.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        loop, ended, answers = asyncio.get_running_loop(), asyncio.Event(), list[bytes]()
+
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.append(reply.ok.payload.to_bytes())
+
+        def end() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits
+                loop.call_soon_threadsafe(ended.set)
+
+        try:
+            self._session.get(
+                key,
+                zenoh.handlers.Callback(take, end),
+                payload=payload,
+                encoding=JSON_ENCODING,
+                target=zenoh.QueryTarget.ALL,
+                timeout=timeout_s,
+            )
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot ask '{key}': {_reason(error)}") from error
+        await ended.wait()
+        return answers
+
+    def watch(self, key: str) -> Mailbox[Presence]:
+        """Services that are announced under a key expression: those that live now, then each change.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Presence] = Mailbox(REQUESTS)
+
+        def deliver(sample: zenoh.Sample) -> None:
+            mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
+
+        try:
+            self._declared.append(self._session.liveliness().declare_subscriber(key, deliver, history=True))
+        except zenoh.ZError as error:
+            raise LinkError(f"cannot watch '{key}': {_reason(error)}") from error
         return mailbox
 
     def announce(self, key: str) -> None:
@@ -177,22 +267,24 @@ class ZenohBus:
             return self._is_router or bool(self._session.info.routers_zid())
 
 
-def open_router(endpoint: str) -> ZenohBus:
+def open_router(endpoint: str, access: ZenohAccess = OPEN) -> ZenohBus:
     """Bus to which others connect.
 
     Parameters
     ----------
     endpoint : str
-        Where to listen, such as `tcp/127.0.0.1:7447`.
+        Where to listen, such as `tcp/127.0.0.1:7447`, or `tls/...` with a certificate.
+    access : ZenohAccess
+        Who may come, and what they may do.
 
     Raises
     ------
     ConfigError
-        If `endpoint` is not of that form.
+        If `endpoint` is not of that form, or something of `access` is missing or cannot be read.
     LinkError
         If the endpoint cannot be listened on, most often because another program does.
     """
-    config = _config("router", endpoint)
+    config = _config("router", endpoint, access)
     config.insert_json5("scouting/delay", "0")  # nobody is scouted: do not wait for answers
     try:
         return ZenohBus(zenoh.open(config), is_router=True)
@@ -200,34 +292,37 @@ def open_router(endpoint: str) -> ZenohBus:
         raise LinkError(f"cannot listen on {endpoint}: {_reason(error)}") from error
 
 
-def open_client(endpoint: str, *, timeout_s: float = 2.0) -> ZenohBus:
+def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0) -> ZenohBus:
     """Bus through the router at an endpoint; waits up to `timeout_s` for it.
 
     Raises
     ------
     ConfigError
-        If `endpoint` is not of the form `tcp/127.0.0.1:7447`.
+        If `endpoint` is not of the form `tcp/127.0.0.1:7447`, or something of `access` is missing or cannot be read.
     LinkError
         If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
     """
-    config = _config("client", endpoint)
+    config = _config("client", endpoint, access)
     config.insert_json5("connect/timeout_ms", str(max(1, round(timeout_s * 1000))))
     config.insert_json5("connect/retry", json.dumps(RECONNECT))
     try:
         return ZenohBus(zenoh.open(config), is_router=False)
     except zenoh.ZError as error:
-        raise LinkError(
-            f"no router reached at {endpoint} within {timeout_s:g} s (wrong credentials look the same)"
-        ) from error
+        doubt = f"it is away or refuses {access.shown}" if access.shown else "wrong credentials look the same"
+        raise LinkError(f"no router reached at {endpoint} within {timeout_s:g} s ({doubt})") from error
 
 
-async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_s: float = 10.0) -> ZenohBus:
+async def connect_client(
+    endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0, longest_wait_s: float = 10.0
+) -> ZenohBus:
     """Bus through the router at an endpoint; tries until it is there, with full jitter, and logs each failure.
 
     Parameters
     ----------
     endpoint : str
         Where the router listens, such as `tcp/127.0.0.1:7447`.
+    access : ZenohAccess
+        Who this client is.
     timeout_s : float
         Time limit of one try. [s]
     longest_wait_s : float
@@ -236,12 +331,12 @@ async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_
     Raises
     ------
     ConfigError
-        If `endpoint` is not of that form: no later try would help.
+        If `endpoint` is not of that form or `access` is wrong in itself: no later try would help.
     """
     attempt = 0
     while True:
         try:
-            return await _open_in_thread(endpoint, timeout_s)
+            return await _open_in_thread(endpoint, access, timeout_s)
         except LinkError as error:
             attempt += 1
             wait_s = random.uniform(0.0, min(longest_wait_s, 1.5 ** min(attempt, 100)))
@@ -249,10 +344,10 @@ async def connect_client(endpoint: str, *, timeout_s: float = 2.0, longest_wait_
         await asyncio.sleep(wait_s)
 
 
-async def _open_in_thread(endpoint: str, timeout_s: float) -> ZenohBus:
+async def _open_in_thread(endpoint: str, access: ZenohAccess, timeout_s: float) -> ZenohBus:
     """Open a client without blocking the loop; a bus that comes after a cancellation is closed in the thread."""
     executor = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh-open")
-    opening = executor.submit(open_client, endpoint, timeout_s=timeout_s)
+    opening = executor.submit(open_client, endpoint, access, timeout_s=timeout_s)
     executor.shutdown(wait=False)
     try:
         return await asyncio.wrap_future(opening)
@@ -277,7 +372,7 @@ def _recovery(*, with_history: bool) -> zenoh.ext.RecoveryConfig:
     return zenoh.ext.RecoveryConfig(heartbeat=None, periodic_queries=period)
 
 
-def _config(mode: Literal["router", "client"], endpoint: str) -> zenoh.Config:
+def _config(mode: Literal["router", "client"], endpoint: str, access: ZenohAccess) -> zenoh.Config:
     config = zenoh.Config()
     settings: dict[str, Any] = {
         "mode": mode,
@@ -291,6 +386,11 @@ def _config(mode: Literal["router", "client"], endpoint: str) -> zenoh.Config:
             config.insert_json5(name, json.dumps(value))
     except zenoh.ZError as error:
         raise ConfigError(f"endpoint must be of the form tcp/ADDRESS:PORT, got '{endpoint}'") from error
+    for name, value in access.settings(mode, endpoint).items():
+        try:
+            config.insert_json5(name, json.dumps(value))
+        except zenoh.ZError:  # its text may hold a password
+            raise ConfigError(f"zenoh refuses the settings of {name}") from None
     return config
 
 

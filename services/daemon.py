@@ -10,20 +10,15 @@ from collections.abc import AsyncIterator, Callable
 
 from wetwell.protocols.keys import alive_key, status_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import Status
+from wetwell.protocols.messages import ServiceState, Status
 from wetwell.services.clock import now_ns
+from wetwell.services.health.board import BOARD
+from wetwell.services.systemd.notify import watched_by_systemd
 
 log = logging.getLogger(__name__)
 
 PARENT_VARIABLE = "WETWELL_STOP_WITH_PARENT"
 """Set for the children of a supervisor: they stop when their standard input ends, even if it was killed."""
-
-
-def start_logging(level: str) -> None:
-    """Log to standard error, one line an event."""
-    logging.basicConfig(
-        level=level, stream=sys.stderr, format="%(asctime)s %(levelname)s %(name)s: %(message)s", force=True
-    )
 
 
 @contextlib.asynccontextmanager
@@ -49,7 +44,8 @@ async def stop_event() -> AsyncIterator[asyncio.Event]:
     if has_parent:
         loop.add_reader(sys.stdin.fileno(), read_parent)
     try:
-        yield stop
+        async with watched_by_systemd(stop):
+            yield stop
     finally:
         for sig in signals:
             loop.remove_signal_handler(sig)
@@ -82,13 +78,26 @@ async def until(stop: asyncio.Event, task: asyncio.Task[None]) -> None:
         raise error
 
 
+def _running() -> tuple[ServiceState, str]:
+    return "running", ""
+
+
 async def report_health(
-    bus: Bus, station: str, service: str, period_s: float, figures: Callable[[], dict[str, float]]
+    bus: Bus,
+    station: str,
+    service: str,
+    period_s: float,
+    figures: Callable[[], dict[str, float]],
+    condition: Callable[[], tuple[ServiceState, str]] = _running,
 ) -> None:
-    """Show that a service lives, and publish its figures for ever."""
+    """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`."""
     bus.announce(alive_key(station, service))
     publisher = bus.publisher(status_key(station, service))
     never = asyncio.Event()
     async for _ in ticks(period_s, never):
-        status = Status(time=now_ns(), station=station, service=service, state="running", figures=figures())
+        state, reason = condition()
+        status = Status(
+            time=now_ns(), station=station, service=service, state=state, figures=figures(), reason=reason
+        )
+        BOARD.report(station, service, period_s, status.figures)
         publisher.put(status.encode())

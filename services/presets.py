@@ -1,5 +1,6 @@
 """Stations and scenarios by name or by file."""
 
+from collections.abc import Iterable
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,28 @@ def find_station(name_or_path: str) -> Station:
     except ValueError as error:
         raise ConfigError(f"{path}: {error}") from error
     return station
+
+
+def find_stations(names_or_paths: Iterable[str]) -> list[Station]:
+    """Stations as `find_station` finds them; of a folder, those of all its TOML files.
+
+    Raises
+    ------
+    ConfigError
+        If one is wrong, a folder holds none, or two have the same name.
+    """
+    stations: dict[str, Station] = {}
+    for name_or_path in names_or_paths:
+        folder = Path(name_or_path)
+        paths = [str(path) for path in sorted(folder.glob("*.toml"))] if folder.is_dir() else [name_or_path]
+        if not paths:
+            raise ConfigError(f"{folder}: must hold a station file (*.toml)")
+        for file in paths:
+            station = find_station(file)
+            if station.name in stations:
+                raise ConfigError(f"{file}: station '{station.name}' is given twice")
+            stations[station.name] = station
+    return list(stations.values())
 
 
 def find_scenario(name_or_path: str) -> Scenario:

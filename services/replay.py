@@ -7,7 +7,7 @@ import logging
 from wetwell.protocols.keys import sample_key
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.bus import connect
 from wetwell.services.clock import tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
 from wetwell.services.settings import Settings
@@ -29,7 +29,7 @@ async def serve_replay(settings: Settings, recording: Recording, station: str, s
 async def _run(
     settings: Settings, recording: Recording, station: str, speed: float, stack: contextlib.AsyncExitStack
 ) -> None:
-    bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
+    bus = stack.enter_context(await connect(settings))
     publisher = bus.publisher(sample_key(station), history=HISTORY)
     published = 0
     health = asyncio.create_task(

@@ -3,17 +3,22 @@
 import asyncio
 import contextlib
 import logging
+import ssl
 from collections.abc import Callable
 
+from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.keys import sample_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.modbus_server import ModbusServer
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.protocols.tls import server_context
+from wetwell.protocols.write_permission import WritePermission
+from wetwell.services.bus import connect
 from wetwell.services.clock import due_seconds, tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
-from wetwell.services.settings import Settings
+from wetwell.services.exposure import is_loopback
+from wetwell.services.settings import ModbusSettings, Settings
 from wetwell.simulator.simulation import Simulation
 
 log = logging.getLogger(__name__)
@@ -31,6 +36,8 @@ async def serve_simulator(
 
     Raises
     ------
+    ConfigError
+        If the settings of Modbus name a register that is not there, or a file that cannot be read.
     LinkError
         If the Modbus port cannot be opened. A router that is away is waited for.
     """
@@ -56,7 +63,7 @@ async def _run(
 ) -> None:
     async with asyncio.TaskGroup() as group:
         if zenoh:
-            bus = stack.enter_context(await connect_client(settings.zenoh.endpoint))
+            bus = stack.enter_context(await connect(settings))
             sinks.append(_zenoh_sink(bus, simulation))
             group.create_task(
                 report_health(
@@ -94,9 +101,31 @@ def _zenoh_sink(bus: Bus, simulation: Simulation) -> Sink:
     return publish
 
 
+def tls_of(modbus: ModbusSettings) -> ssl.SSLContext | None:
+    """What the Modbus server needs for TLS; None where no certificate is set. Warns if everybody may read.
+
+    Raises
+    ------
+    ConfigError
+        If a certificate, its key or the authority is missing or cannot be read.
+    """
+    tls = modbus.tls
+    if not is_loopback(modbus.host) and tls.client_ca is None:
+        log.warning(
+            "Modbus TCP on %s: whoever reaches it may read, for Modbus knows no passwords; writes are held against"
+            " modbus.write_allow (set modbus.tls, or put a firewall before it)",
+            modbus.host,
+        )
+    if tls.certificate is None and tls.private_key is None and tls.client_ca is None:
+        return None
+    if tls.certificate is None or tls.private_key is None:
+        raise ConfigError("modbus.tls: certificate and private_key are both needed")
+    return server_context(tls.certificate, tls.private_key, tls.client_ca, f"Modbus TCP {modbus.host}:{modbus.port}")
+
+
 async def _modbus_sink(settings: Settings, simulation: Simulation, stack: contextlib.AsyncExitStack) -> Sink:
-    server = await stack.enter_async_context(
-        ModbusServer(
+    try:
+        server = ModbusServer(
             host=settings.modbus.host,
             port=settings.modbus.port,
             unit_id=settings.modbus.unit_id,
@@ -104,8 +133,12 @@ async def _modbus_sink(settings: Settings, simulation: Simulation, stack: contex
             pumps=len(simulation.station.pump),
             levels=len(simulation.station.control.start_levels_m),
             on_write=simulation.change_settings,
+            tls=tls_of(settings.modbus),
+            write_allow=[WritePermission(rule.client, rule.registers) for rule in settings.modbus.write_allow],
         )
-    )
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    await stack.enter_async_context(server)
     server.update(simulation.settings)
 
     def show(recording: Recording) -> None:

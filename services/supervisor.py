@@ -1,4 +1,4 @@
-"""The whole service on one machine: router, simulator with its PLC, detector; verdicts on the terminal."""
+"""The whole service on one machine: router, simulator with its PLC, detector, historian; verdicts on the terminal."""
 
 import asyncio
 import contextlib
@@ -8,12 +8,13 @@ import sys
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.protocols.keys import verdict_key
+from wetwell.protocols.keys import status_key, verdict_key
 from wetwell.protocols.link import Bus, Subscription
-from wetwell.protocols.messages import MessageError, Verdict
-from wetwell.protocols.zenoh_link import open_router
+from wetwell.protocols.messages import MessageError, Status, Verdict
+from wetwell.services.bus import listen
 from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
-from wetwell.services.settings import Settings
+from wetwell.services.health.board import BOARD, HealthBoard
+from wetwell.services.settings import Settings, environment_of
 
 log = logging.getLogger(__name__)
 
@@ -54,7 +55,7 @@ async def serve_all(
         If a child ends before it was asked to.
     """
     async with stop_event() as stop:
-        with open_router(settings.zenoh.endpoint) as bus:
+        with listen(settings) as bus:
             running = asyncio.create_task(_run(settings, bus, station, commands, show), name="up.run")
             if limit_s is not None:
                 asyncio.get_running_loop().call_later(limit_s, stop.set)
@@ -65,29 +66,45 @@ async def _run(
     settings: Settings, bus: Bus, station: str, commands: Mapping[str, Sequence[str]], show: Callable[[Verdict], None]
 ) -> None:
     verdicts = bus.subscribe(verdict_key(station))
+    statuses = bus.subscribe(status_key("*", "*"))
     async with contextlib.AsyncExitStack() as stack:
         children = {
             name: await stack.enter_async_context(_child(settings, name, arguments))
             for name, arguments in commands.items()
         }
         waits = [asyncio.create_task(_watch(name, child), name=f"up.{name}") for name, child in children.items()]
-        shows = asyncio.create_task(_show(verdicts, show), name="up.verdicts")
+        shows = [
+            asyncio.create_task(_show(verdicts, show), name="up.verdicts"),
+            asyncio.create_task(_show_health(statuses, BOARD, settings.health.period_s), name="up.health"),
+        ]
         try:
-            done, _ = await asyncio.wait([*waits, shows], return_when=asyncio.FIRST_COMPLETED)
+            done, _ = await asyncio.wait([*waits, *shows], return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
         finally:
-            for task in (*waits, shows):
+            for task in (*waits, *shows):
                 task.cancel()
 
 
-async def _show(verdicts: Subscription, show: Callable[[Verdict], None]) -> None:
+async def _show(verdicts: Subscription[bytes], show: Callable[[Verdict], None]) -> None:
     while True:
         for payload in await verdicts.receive():
             try:
                 show(Verdict.decode(payload))
             except MessageError as error:  # anybody may publish on the bus
                 log.warning("%s", error)
+
+
+async def _show_health(statuses: Subscription[bytes], board: HealthBoard, period_s: float) -> None:
+    """Put the figures of all services behind the health page of this process."""
+    while True:
+        for payload in await statuses.receive():
+            try:
+                status = Status.decode(payload)
+            except MessageError as error:
+                log.warning("%s", error)
+            else:
+                board.report(status.station, status.service, period_s, status.figures)
 
 
 async def _watch(name: str, child: asyncio.subprocess.Process) -> None:
@@ -100,13 +117,10 @@ async def _child(
     settings: Settings, name: str, arguments: Sequence[str]
 ) -> AsyncIterator[asyncio.subprocess.Process]:
     """Start a child in a session of its own; at the end ask it to stop, and make it stop if it does not."""
-    environment = os.environ | {
-        PARENT_VARIABLE: "1",
-        "WETWELL_ZENOH": settings.zenoh.model_dump_json(),
-        "WETWELL_MODBUS": settings.modbus.model_dump_json(),
-        "WETWELL_LOG": settings.log.model_dump_json(),
-        "WETWELL_HEALTH": settings.health.model_dump_json(),
-    }
+    alone = settings.health.model_copy(update={"http": None})  # the page is the supervisor's
+    given = environment_of(settings.model_copy(update={"health": alone}))
+    environment = os.environ | given | {PARENT_VARIABLE: "1"}
+    environment.pop("WETWELL_HEALTH__HTTP", None)
     child = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",

@@ -28,9 +28,13 @@ def banner(settings: Settings, station: Station, scenario: str, speed: float) ->
     table = register_table(len(station.pump), len(station.control.start_levels_m))
     level = next(register for register in table if register.name == "level_m" and register.table == "input")
     modbus = settings.modbus
+    host, port = settings.dashboard.host, settings.dashboard.port
+    page = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     order = "-B " if modbus.word_order == "ABCD" else ""
     return f"""\
 wetwell: station '{station.name}', {len(station.pump)} pumps, scenario '{scenario}', {speed:g} times as fast as life
+
+Page         http://{page}
 
 Modbus TCP   {modbus.host}:{modbus.port}, unit id {modbus.unit_id}, {modbus.word_order}; map: wetwell modbus-map
   mbpoll -m tcp -p {modbus.port} -a {modbus.unit_id} -0 -r {level.address} -t 3:float {order}-1 {modbus.host}

@@ -40,6 +40,13 @@ class Kpis:
         Beginning of each day since 1970. [ns]
     hourly_energy_kwh : (pumps, hours) array
         [kWh]
+    hourly_volume_m3 : (pumps, hours) array
+        [m³]
+    hourly_run_h : (pumps, hours) array
+        [h]
+    hourly_starts : (pumps, hours) int64
+    hourly_known_h : (hours,) array
+        [h]
     daily_energy_kwh : (pumps, days) array
         [kWh]
     daily_volume_m3 : (pumps, days) array
@@ -55,6 +62,10 @@ class Kpis:
     hour_ns: Integers
     day_ns: Integers
     hourly_energy_kwh: Floats
+    hourly_volume_m3: Floats
+    hourly_run_h: Floats
+    hourly_starts: Integers
+    hourly_known_h: Floats
     daily_energy_kwh: Floats
     daily_volume_m3: Floats
     daily_run_h: Floats
@@ -153,27 +164,35 @@ def kpis(recording: Recording, max_gap_s: float | None = None) -> Kpis:
         max_gap_s = max(MIN_GAP_S, GAP_STEPS * usual_s)
     held_ns = np.where(interval_ns <= max_gap_s * NS_PER_S, interval_ns, 0)
     hour_ns, day_ns = _beginnings_ns(stamps_ns, _HOUR_S), _beginnings_ns(stamps_ns, _DAY_S)
-    hourly_kwh, daily_kwh, daily_m3, daily_h, daily_starts = [], [], [], [], []
-    for pump in range(1, recording.pumps + 1):
-        power_kw = recording.column(f"pump{pump}_power_kw")[order]
-        flow_m3h = recording.column(f"pump{pump}_flow_m3h")[order]
-        running = _running(recording, pump)[order]
-        hourly_kwh.append(_sums(power_kw, held_ns, stamps_ns, hour_ns, _HOUR_S))
-        daily_kwh.append(_sums(power_kw, held_ns, stamps_ns, day_ns, _DAY_S))
-        daily_m3.append(_sums(flow_m3h, held_ns, stamps_ns, day_ns, _DAY_S))
-        daily_h.append(_sums(running, held_ns, stamps_ns, day_ns, _DAY_S))
-        started_ns = stamps_ns[_starts(running)]
-        daily_starts.append(np.bincount((started_ns - day_ns[:1]) // (_DAY_S * NS_PER_S), minlength=day_ns.size))
-    pumps = recording.pumps
+    pumps = range(1, recording.pumps + 1)
+    power_kw = [recording.column(f"pump{pump}_power_kw")[order] for pump in pumps]
+    flow_m3h = [recording.column(f"pump{pump}_flow_m3h")[order] for pump in pumps]
+    running = [_running(recording, pump)[order] for pump in pumps]
+    known = np.ones(stamps_ns.size)
+
+    def sums(rates_per_h: list[Floats], begin_ns: Integers, period_s: int) -> Floats:
+        of_pumps = [_sums(rate_per_h, held_ns, stamps_ns, begin_ns, period_s) for rate_per_h in rates_per_h]
+        return np.reshape(of_pumps, (len(pumps), begin_ns.size))
+
+    def starts(begin_ns: Integers, period_s: int) -> Integers:
+        started_ns = [stamps_ns[_starts(state)] for state in running]
+        period_ns = period_s * NS_PER_S
+        of_pumps = [np.bincount((at_ns - begin_ns[:1]) // period_ns, minlength=begin_ns.size) for at_ns in started_ns]
+        return np.reshape(np.array(of_pumps, dtype=np.int64), (len(pumps), begin_ns.size))
+
     return Kpis(
         hour_ns=hour_ns,
         day_ns=day_ns,
-        hourly_energy_kwh=np.reshape(hourly_kwh, (pumps, hour_ns.size)),
-        daily_energy_kwh=np.reshape(daily_kwh, (pumps, day_ns.size)),
-        daily_volume_m3=np.reshape(daily_m3, (pumps, day_ns.size)),
-        daily_run_h=np.reshape(daily_h, (pumps, day_ns.size)),
-        daily_starts=np.reshape(np.array(daily_starts, dtype=np.int64), (pumps, day_ns.size)),
-        daily_known_h=_sums(np.ones(stamps_ns.size), held_ns, stamps_ns, day_ns, _DAY_S),
+        hourly_energy_kwh=sums(power_kw, hour_ns, _HOUR_S),
+        hourly_volume_m3=sums(flow_m3h, hour_ns, _HOUR_S),
+        hourly_run_h=sums(running, hour_ns, _HOUR_S),
+        hourly_starts=starts(hour_ns, _HOUR_S),
+        hourly_known_h=_sums(known, held_ns, stamps_ns, hour_ns, _HOUR_S),
+        daily_energy_kwh=sums(power_kw, day_ns, _DAY_S),
+        daily_volume_m3=sums(flow_m3h, day_ns, _DAY_S),
+        daily_run_h=sums(running, day_ns, _DAY_S),
+        daily_starts=starts(day_ns, _DAY_S),
+        daily_known_h=_sums(known, held_ns, stamps_ns, day_ns, _DAY_S),
     )
 
 

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -117,26 +118,30 @@ def test_blockage_is_seen_on_zenoh_and_every_daemon_stops_with_0(tmp_path: Path)
 
 
 def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
-    zenoh_port, modbus_port = free_port(), free_port()
+    zenoh_port, modbus_port, page_port = free_port(), free_port(), free_port()
     flags = ["--zenoh", f"tcp/127.0.0.1:{zenoh_port}", "--modbus", f"127.0.0.1:{modbus_port}", "--for", "60s"]
+    flags += ["--page", f"127.0.0.1:{page_port}"]
     with (
         wetwell("up", "--scenario", "nominal", "--speed", "100", *flags) as up,
-        listener(zenoh_port, "wetwell/alpha/status/*") as statuses,
+        listener(zenoh_port, "wetwell/*/status/*") as statuses,
     ):
         services = set()
         for sample in statuses:
             services.add(json.loads(sample.payload.to_string())["service"])
-            if services == {"simulator", "detector"}:
+            if services == {"simulator", "detector", "alarms"}:
                 break
         with socket.create_connection(("127.0.0.1", modbus_port), timeout=10) as plc:
             plc.sendall(bytes.fromhex("000100000006010400000002"))  # read level_m by function code 04
             answer = plc.recv(64)
         assert answer[7:9] == bytes([4, 4])
+        with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/stations/alpha", timeout=10) as page:
+            assert json.load(page)["model"]["station"] == "alpha"
         children = _children(up.pid)
-        assert len(children) == 2
+        assert len(children) == 3
         code, out, err = stop(up, signal.SIGINT)
         assert code == 0, err
         assert f"mbpoll -m tcp -p {modbus_port}" in out
+        assert f"http://127.0.0.1:{page_port}" in out
         assert "declare_subscriber" in out
         assert "Traceback" not in out + err
         assert not [child for child in children if Path(f"/proc/{child}").exists()]
@@ -204,11 +209,12 @@ def _figures(statuses: Iterator[zenoh.Sample], service: str, *, least_samples: f
 
 def test_children_stop_when_the_supervisor_is_killed() -> None:
     flags = ["--zenoh", f"tcp/127.0.0.1:{free_port()}", "--modbus", f"127.0.0.1:{free_port()}"]
+    flags += ["--page", f"127.0.0.1:{free_port()}"]
     with wetwell("up", *flags) as up:
         end = time.monotonic() + DEADLINE_S
-        while len(children := _children(up.pid)) < 2 and time.monotonic() < end:
+        while len(children := _children(up.pid)) < 3 and time.monotonic() < end:
             time.sleep(0.05)  # real processes: there is no virtual time here
-        assert len(children) == 2
+        assert len(children) == 3
         up.kill()
         while any(_is_alive(child) for child in children) and time.monotonic() < end:
             time.sleep(0.05)
@@ -223,6 +229,7 @@ def test_a_port_in_use_is_named_and_ends_the_start() -> None:
         for arguments in (
             ["up", "--zenoh", f"tcp/127.0.0.1:{port}"],
             ["plc", "--modbus", f"127.0.0.1:{port}"],
+            ["dashboard", "--page", f"127.0.0.1:{port}"],
             ["router", "--zenoh", f"tcp/127.0.0.1:{port}"],
         ):
             done = subprocess.run(

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from wetwell.protocols.link import Bus, Publisher, Subscription
+from wetwell.protocols.link import Bus, Presence, Publisher, Subscription
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.zenoh_link import open_client, open_router
 
@@ -38,7 +38,7 @@ def buses(request: pytest.FixtureRequest) -> Iterator[Pair]:
         yield here, there
 
 
-def collect(subscription: Subscription, count: int) -> list[bytes]:
+def collect(subscription: Subscription[bytes], count: int) -> list[bytes]:
     """`count` different messages, without doubles, or more; fails if they do not come."""
 
     async def receive() -> list[bytes]:
@@ -51,7 +51,7 @@ def collect(subscription: Subscription, count: int) -> list[bytes]:
     return asyncio.run(receive())
 
 
-def put_until_it_comes(publisher: Publisher, payload: bytes, subscription: Subscription) -> list[bytes]:
+def put_until_it_comes(publisher: Publisher, payload: bytes, subscription: Subscription[bytes]) -> list[bytes]:
     """Everything received up to the first arrival of `payload`, which is put again until then."""
 
     async def receive() -> list[bytes]:
@@ -175,3 +175,63 @@ def test_history_below_one_is_refused(buses):
     here, _ = buses
     with pytest.raises(ValueError, match="history must be at least 1, got 0"):
         here.publisher("wetwell/alpha/sample", history=0)
+
+
+def test_question_is_answered_by_who_answers_its_key(buses):
+    here, there = buses
+
+    async def talk() -> list[bytes]:
+        requests = here.answer("wetwell/*/history")
+        async with asyncio.timeout(20):
+            while True:  # a question that comes before the announcement has spread gets no answer
+                asking = asyncio.create_task(there.ask("wetwell/alpha/history", b"how many?", timeout_s=10.0))
+                receiving = asyncio.create_task(requests.receive())
+                await asyncio.wait([asking, receiving], return_when=asyncio.FIRST_COMPLETED)
+                if receiving.done():
+                    for request in receiving.result():
+                        request.reply(request.key.encode() + b" " + request.payload)
+                    return await asking
+                receiving.cancel()
+
+    assert asyncio.run(talk()) == [b"wetwell/alpha/history how many?"]
+
+
+def test_question_to_nobody_gives_no_answer(buses):
+    _, there = buses
+    assert asyncio.run(there.ask("wetwell/nobody/history", timeout_s=0.2)) == []
+
+
+def test_answer_that_does_not_come_is_not_waited_for(buses):
+    here, there = buses
+    requests = here.answer("wetwell/alpha/history")
+    assert asyncio.run(there.ask("wetwell/alpha/history", timeout_s=0.2)) == []
+    assert requests is not None
+
+
+def test_question_gets_the_last_message_of_a_publisher(buses):
+    here, there = buses
+    publisher = here.publisher("wetwell/alpha/verdict/1")
+    early = there.subscribe("wetwell/alpha/verdict/1", history=1)
+    publisher.put(b"normal")
+    assert collect(early, 1) == [b"normal"]
+    assert set(asyncio.run(there.ask("wetwell/alpha/verdict/*"))) == {b"normal"}
+
+
+def test_watch_shows_who_lives_and_who_comes(buses):
+    here, there = buses
+    here.announce("wetwell/alpha/alive/detector")
+    watch = there.watch("wetwell/*/alive/*")
+
+    async def seen(count: int) -> set[Presence]:
+        got: set[Presence] = set()
+        async with asyncio.timeout(20):
+            while len(got) < count:
+                got |= set(await watch.receive())
+        return got
+
+    assert asyncio.run(seen(1)) == {Presence("wetwell/alpha/alive/detector", is_alive=True)}
+    here.announce("wetwell/beta/alive/detector")
+    assert asyncio.run(seen(1)) == {Presence("wetwell/beta/alive/detector", is_alive=True)}
+    if here is not there:
+        here.close()
+        assert {presence.is_alive for presence in asyncio.run(seen(2))} == {False}

@@ -7,10 +7,10 @@ import pytest
 from wetwell.detector.learning import LEARNING_S
 from wetwell.protocols.keys import order_key, sample_key
 from wetwell.protocols.memory_link import MemoryBus
-from wetwell.protocols.messages import Order, Verdict
-from wetwell.services.checkpoint import Checkpoint
-from wetwell.services.detector import StationJudge
-from wetwell.services.orders import ordered
+from wetwell.protocols.messages import Order, Sample, Verdict
+from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.judge import StationJudge
+from wetwell.services.detector.orders import ordered
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -62,14 +62,44 @@ def test_a_rebaseline_is_carried_out_once_answered_and_can_be_taken_back(alpha, 
 def test_a_checkpoint_is_taken_up_and_a_damaged_one_is_put_aside(alpha, tmp_path, caplog):
     with MemoryBus() as bus:
         checkpoint = Checkpoint(tmp_path / "state", "alpha")
-        judge = StationJudge(bus, alpha)
-        assert not checkpoint.restore(judge.detector)
-        checkpoint.save(judge.detector)
-        other = StationJudge(bus, alpha)
-        assert checkpoint.restore(other.detector)
+        judge = StationJudge(bus, alpha, checkpoint=checkpoint)
+        assert not judge.is_restored
+        judge.keep()
+        other = StationJudge(bus, alpha, checkpoint=checkpoint)
+        assert other.is_restored
         assert other.detector.snapshot() == judge.detector.snapshot()
         (file,) = (tmp_path / "state").iterdir()
-        file.write_bytes(file.read_bytes()[:-10])
-        assert not checkpoint.restore(StationJudge(bus, alpha).detector)
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-10])
+        assert not StationJudge(bus, alpha, checkpoint=checkpoint).is_restored
+        file.write_bytes(whole[5:])
+        assert not StationJudge(bus, alpha, checkpoint=checkpoint).is_restored
     assert "damaged, its checksum differs; kept as alpha.detector.refused, learning starts again" in caplog.text
     assert [path.name for path in (tmp_path / "state").iterdir()] == ["alpha.detector.refused"]
+
+
+def test_a_checkpoint_of_version_0_1_which_is_a_bare_snapshot_is_taken_up(alpha, tmp_path):
+    with MemoryBus() as bus:
+        judge = StationJudge(bus, alpha)
+        (tmp_path / "alpha.detector.json").write_bytes(judge.detector.snapshot())
+        assert StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha")).is_restored
+
+
+def test_an_order_that_was_answered_is_known_after_a_kill(alpha, payloads, tmp_path):
+    async def orders_before_and_after_a_kill() -> tuple[Verdict, Verdict, int]:
+        with MemoryBus() as bus:
+            first = StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            await first.take(Sample.decode(payload) for payload in payloads)
+            obeying = asyncio.create_task(first.obey())
+            answer = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
+            obeying.cancel()
+        with MemoryBus() as bus:  # nothing of the first one is left but its checkpoint
+            second = StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            obeying = asyncio.create_task(second.obey())
+            again = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
+            obeying.cancel()
+            return answer, again, int(second.figures()["samples"])
+
+    answer, again, samples = asyncio.run(orders_before_and_after_a_kill())
+    assert again == answer
+    assert samples == len(payloads)

@@ -14,6 +14,7 @@ import zenoh
 
 from wetwell.protocols.errors import ConfigError, LinkError
 from wetwell.protocols.link import Subscription
+from wetwell.protocols.zenoh_access import ZenohAccess
 from wetwell.protocols.zenoh_link import ZenohBus, connect_client, open_client, open_router
 
 LIMIT_S = 20.0
@@ -272,8 +273,8 @@ def test_bus_that_comes_after_a_cancellation_is_closed(endpoint, monkeypatch):
         loop = asyncio.get_running_loop()
         connecting: asyncio.Task[ZenohBus]
 
-        def slow_open(endpoint: str, *, timeout_s: float) -> ZenohBus:
-            bus = open_client(endpoint, timeout_s=timeout_s)
+        def slow_open(endpoint: str, access: ZenohAccess, *, timeout_s: float) -> ZenohBus:
+            bus = open_client(endpoint, access, timeout_s=timeout_s)
             loop.call_soon_threadsafe(connecting.cancel)
             opened.put(bus)
             wait_until(connecting.cancelled)

@@ -48,7 +48,18 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
         (["convert", "{bad}", "--out", "{tmp}/v.csv"], "{bad}: column 'datetime' is missing, is this a SKAB file?"),
         (["up", "--for", "soon"], "--for: got 'soon', must be a time such as 90s, 10m or 2h"),
         (["up", "--modbus", "here"], "--modbus: got 'here', must be HOST:PORT such as 127.0.0.1:5020"),
+        (["up", "--page", "here"], "--page: got 'here', must be HOST:PORT such as 127.0.0.1:8080"),
+        (
+            ["dashboard", "--page", "0.0.0.0:80"],
+            "settings: dashboard.host: got '0.0.0.0', input should be '127.0.0.1'",
+        ),
         (["up", "--zenoh", "udp"], "settings: zenoh.endpoint: got 'udp', string should match pattern"),
+        (["export", "--data", "{tmp}/no", "--out", "{tmp}/x.csv"], "historian.folder: {tmp}/no: there is no history"),
+        (
+            ["export", "--from", "soon", "--out", "{tmp}/x.csv"],
+            "--from: got 'soon', must be ISO 8601 such as 2025-01",
+        ),
+        (["history", "--last", "ever"], "--last: got 'ever', must be a time such as 90s, 10m or 2h"),
         (["config", "check", "{settings}"], "{settings}: modbus.prot: unknown key"),
     ],
 )

@@ -119,6 +119,22 @@ def test_a_source_that_begins_anew_with_an_old_clock_is_followed_in_the_end(gate
     assert gate.counts["clock_steps"] == 1
 
 
+@pytest.mark.parametrize("period_s", [1, 60])
+def test_a_source_that_begins_anew_after_a_long_silence_is_followed_after_the_confirmations(gate, period_s):
+    for n in range(2_000):
+        gate.update(sample(n * period_s, seq=n))
+    frames = [gate.update(sample((2_000 + n) * period_s + HOUR_S, seq=n)) for n in range(20)]
+    assert [frame is None for frame in frames] == [True] * (CONFIRMATIONS - 1) + [False] * (21 - CONFIRMATIONS)
+
+
+def test_a_double_does_not_put_off_that_a_clock_that_was_set_is_followed(gate):
+    for n in range(20):
+        gate.update(sample(n, seq=n))
+    frames = [gate.update(sample(20 + n // 2 + HOUR_S, seq=20 + n // 2)) for n in range(2 * CONFIRMATIONS)]
+    assert [frame is not None for frame in frames] == [False] * (2 * CONFIRMATIONS - 2) + [True, False]
+    assert gate.counts["doubled"] == CONFIRMATIONS
+
+
 def test_wild_stamps_among_good_ones_are_never_followed(gate):
     for n in range(5 * CONFIRMATIONS):
         assert gate.update(sample(n, seq=2 * n)) is not None

@@ -34,6 +34,10 @@ def test_the_environment_may_name_the_file(monkeypatch: pytest.MonkeyPatch, tmp_
         ("[modbus]\nport = 70000\n", "modbus.port: got 70000, input should be less than or equal to 65535"),
         ("[nosuch]\n", "nosuch: unknown key"),
         ("[log]\nlevel = 'LOUD'\n", "log.level: got 'LOUD', input should be 'DEBUG', 'INFO', 'WARNING' or 'ERROR'"),
+        (
+            "[historian]\nkeep_days = 7\ndownsample_after_days = 9\n",
+            "historian: keep_live_days < downsample_after_days <",
+        ),
         ("[modbus\n", "is not TOML: "),
     ],
 )

@@ -7,7 +7,7 @@ from wetwell.protocols.errors import LinkError
 from wetwell.protocols.keys import order_key, verdict_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import Order, Verdict
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.bus import connect
 from wetwell.services.clock import now_ns
 from wetwell.services.settings import Settings
 
@@ -28,7 +28,7 @@ async def send_order(settings: Settings, station: str, pump: int, act: str, by: 
     )
     try:
         async with asyncio.timeout(ANSWER_S):
-            with await connect_client(settings.zenoh.endpoint) as bus:
+            with await connect(settings) as bus:
                 return await ordered(bus, order)
     except TimeoutError as error:
         raise LinkError(

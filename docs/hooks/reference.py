@@ -1,0 +1,163 @@
+"""Reference pages made from the code: commands, settings, messages, registers, effects, faults, inflow models."""
+
+import importlib
+import json
+import pkgutil
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal, get_args, get_origin
+
+import typer
+from pydantic import BaseModel
+
+import wetwell.protocols
+from wetwell.protocols.messages import Message
+from wetwell.protocols.registers import register_table
+from wetwell.services.cli import app
+from wetwell.services.listing import part_table
+from wetwell.services.settings import Settings
+from wetwell.simulator.effects import effect_table
+from wetwell.simulator.faults import FAULTS
+from wetwell.simulator.inflow import INFLOWS
+
+
+def pages() -> dict[str, str]:
+    """Markdown of each page, by file name."""
+    return {
+        "commands.md": "# Commands\n\n" + "\n".join(_command(typer.main.get_command(app), "wetwell")),
+        "settings.md": _settings(),
+        "messages.md": _messages(),
+        "registers.md": _registers(),
+        "effects.md": _parts("Effects", effect_table()),
+        "faults.md": _parts("Faults", part_table(FAULTS)),
+        "inflows.md": _parts("Inflow models", part_table(INFLOWS)),
+    }
+
+
+def _command(command: Any, name: str) -> Iterator[str]:
+    yield f"## `{name}`\n\n{(command.help or '').strip()}\n"
+    rows = [
+        (_names(option), _default(option), getattr(option, "help", None) or "")
+        for option in command.params
+        if option.name != "help"
+    ]
+    if rows:
+        yield _table(("option", "default", "meaning"), rows)
+    for child_name, child in getattr(command, "commands", {}).items():
+        yield from _command(child, f"{name} {child_name}")
+
+
+def _names(option: Any) -> str:
+    if option.param_type_name == "argument":
+        return f"`{(option.metavar or option.name).upper()}`"
+    return f"`{', '.join(option.opts)}{'' if option.is_flag else ' ' + _value(option)}`"
+
+
+def _value(option: Any) -> str:
+    annotation = option.type_descriptor.annotation
+    if get_origin(annotation) is Literal:
+        return "|".join(map(str, get_args(annotation)))
+    return str(option.metavar or getattr(annotation, "__name__", "VALUE").upper())
+
+
+def _default(option: Any) -> str:
+    if option.required:
+        return "must be given"
+    is_plain = option.default is not None and not callable(option.default) and option.default not in (False, [], ())
+    return f"`{option.default}`" if is_plain else ""
+
+
+def _settings() -> str:
+    text = [
+        "# Settings",
+        "",
+        "In a TOML file that `--config` or `WETWELL_CONFIG` names, or in the environment as `WETWELL_SECTION__KEY`.",
+        "Later ones win: defaults, file, environment, flags. `wetwell config check FILE`, `wetwell config show`.",
+        "",
+    ]
+    for section, field in Settings.model_fields.items():
+        table = field.annotation
+        text += [f"## `[{section}]`", "", _summary(table), ""]
+        text += [_table(("key", "default", "rule"), list(_keys(table, "")))]
+    return "\n".join(text)
+
+
+def _summary(model: Any) -> str:
+    return (model.__doc__ or "").split("Attributes\n")[0].strip()
+
+
+def _keys(table: Any, prefix: str) -> Iterator[tuple[str, str, str]]:
+    rules = table.model_json_schema()["properties"]
+    for key, field in table.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from _keys(field.annotation, f"{prefix}{key}.")
+            continue
+        default = "" if field.default is None else f"`{field.default}`"
+        yield f"`{prefix}{key}`", default, _rule(rules[key])
+
+
+def _rule(schema: dict[str, Any]) -> str:
+    words = {name: value for name, value in schema.items() if name not in {"default", "title", "description"}}
+    return f"`{json.dumps(words)}`" if words else ""
+
+
+def _messages() -> str:
+    text = ["# Messages", "", "JSON on the bus. A key that is not listed is ignored; a new one has a default.", ""]
+    for model in _message_models():
+        schema = model.model_json_schema(mode="serialization")
+        text += [f"## {model.__name__}", "", _summary(model), ""]
+        rows = [
+            (f"`{name}`", "yes" if name in schema.get("required", ()) else "", _rule(rule))
+            for name, rule in schema["properties"].items()
+        ]
+        text += [_table(("key", "always there", "form"), rows)]
+    return "\n".join(text)
+
+
+def _message_models() -> Iterator[type[Message]]:
+    modules = sorted(name for _, name, _ in pkgutil.iter_modules(wetwell.protocols.__path__) if "messages" in name)
+    for name in sorted(modules, key=lambda name: (name != "messages", name)):
+        module = importlib.import_module(f"wetwell.protocols.{name}")
+        for model in vars(module).values():
+            is_own = isinstance(model, type) and model.__module__ == module.__name__
+            if is_own and issubclass(model, Message) and model is not Message:
+                yield model
+
+
+def _registers() -> str:
+    rows = [
+        (str(row.address), row.table, f"`{row.name}`", row.type, row.unit, row.access, row.description)
+        for row in register_table(3, 3)
+    ]
+    head = ("address", "table", "name", "type", "unit", "access", "meaning")
+    intro = "Of a station with three pumps; `wetwell modbus-map --station FILE --format csv` prints those of yours."
+    rules = "Addresses count from zero. Measured values are read by function codes 03 and 04."
+    return f"# Modbus registers\n\n{intro}\n{rules}\n\n" + _table(head, rows)
+
+
+def _parts(title: str, parts: Iterable[dict[str, Any]]) -> str:
+    text = [f"# {title}: parameters", ""]
+    for part in parts:
+        text += [f"## `{part.get('name') or part['kind']}`", "", str(part["summary"]), ""]
+        text += [_table(("parameter", "unit", "range", "default"), [_parameter(row) for row in part["parameters"]])]
+    return "\n".join(text)
+
+
+def _parameter(row: dict[str, Any]) -> tuple[str, ...]:
+    if "choices" in row:
+        limits = ", ".join(row["choices"])
+    elif "low" in row:
+        limits = f"{row['low']:g} to {row['high']:g}"
+    else:
+        limits = row.get("range") or ""
+    default = row.get("default")
+    return f"`{row['name']}`", row.get("unit", ""), limits, "" if default is None else f"`{default}`"
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    if not rows:
+        return ""
+    return "\n".join(map(_line, [head, ("---",) * len(head), *rows])) + "\n"
+
+
+def _line(cells: tuple[str, ...]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"

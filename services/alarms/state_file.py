@@ -1,0 +1,83 @@
+"""The state of the alarms on disk: written whole, with a version; what cannot be read is put aside and told."""
+
+import contextlib
+import logging
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
+from wetwell.protocols.whole_file import whole_file
+from wetwell.services.alarms.book import BookState
+
+log = logging.getLogger(__name__)
+
+
+class StationState(BaseModel):
+    """What is kept of one station over a restart."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    time_ns: int | None
+    seq: int
+    last_verdicts_ns: dict[int, int]
+    services: list[str]
+
+
+class SiteState(BaseModel):
+    """All that is kept over a restart."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    version: Literal["wetwell.alarm-state/1"] = "wetwell.alarm-state/1"
+    book: BookState = Field(default_factory=BookState)
+    stations: dict[str, StationState] = Field(default_factory=dict)
+
+
+class StateFile:
+    """A file with the last state; without a folder nothing is kept. `errors` counts failed writes in a row."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.errors = 0
+        self._path = None if folder is None else folder / "alarms.json"
+
+    def load(self) -> SiteState | None:
+        """The state that was kept; None if there is none, or none that can be read.
+
+        Raises
+        ------
+        ConfigError
+            If the folder cannot be used.
+        """
+        if self._path is None:
+            return None
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            data = self._path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise ConfigError(f"alarms.state_dir: {self._path}: {error.strerror or error}") from error
+        try:
+            return SiteState.model_validate_json(data)
+        except ValidationError as error:
+            aside = self._path.with_suffix(".refused")
+            with contextlib.suppress(OSError):
+                self._path.replace(aside)
+            log.warning("%s: %s; kept as %s, the alarms begin anew", self._path.name, first_fault(error), aside.name)
+            return None
+
+    def save(self, state: SiteState) -> None:
+        """Write the state; a disk that refuses is told once, and the last file stays."""
+        if self._path is None:
+            return
+        try:
+            with whole_file(self._path) as file:
+                file.write(state.model_dump_json().encode())
+        except RecordingError as error:
+            if not self.errors:
+                log.warning("%s; alarms go on without", error)
+            self.errors += 1
+        else:
+            self.errors = 0

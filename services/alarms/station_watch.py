@@ -1,0 +1,173 @@
+"""What is heard of one station: its clock, its samples, verdicts and services, turned into conditions of alarms."""
+
+import math
+from dataclasses import dataclass, field
+
+from wetwell.protocols.keys import SITE
+from wetwell.protocols.messages import Sample, Status, Verdict
+from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.alarms.book import AlarmBook
+from wetwell.services.alarms.rules import VERDICT_RULES, RuleName, verdict_advice, verdict_text
+
+KNOWN_VERDICTS = 200
+"""Times of verdicts of a pump that are remembered, more than a publisher keeps for late joiners."""
+START_S = 30.0
+"""So long after the start older verdicts are those that publishers have kept."""
+FOLLOW_VERDICTS = 3
+"""So many verdicts in a row that are older than the last one mean that the clock was set back."""
+FOLLOW_SAMPLES = 1_000
+"""The same for samples whose `seq` is old too; more than a publisher keeps."""
+
+STATION_SERVICES: dict[str, RuleName] = {"detector": "detector_silent"}
+SITE_SERVICES: dict[str, RuleName] = {"gateway": "gateway_silent", "historian": "historian_silent"}
+"""Services that are missed, of each station and of the whole site."""
+
+
+@dataclass(frozen=True)
+class Now:
+    """The time of day, for stamps, and a clock that nobody sets, for silence."""
+
+    wall_ns: int
+    steady_s: float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Levels that are too high. [m] None: not known."""
+
+    high_m: float | None = None
+    overflow_m: float | None = None
+    deadband_m: float = 0.05
+
+
+@dataclass
+class PumpVerdicts:
+    """Verdicts of one pump that were taken."""
+
+    times_ns: list[int] = field(default_factory=list)
+    older: int = 0
+
+    def is_news(self, time_ns: int, *, is_start: bool) -> bool:
+        """Whether a verdict of this time is to be taken: not one that was, nor one that came too late.
+
+        At the start (`is_start`) older ones come from the caches of their publishers.
+        """
+        if time_ns in self.times_ns:
+            return False
+        if self.times_ns and time_ns < self.times_ns[-1]:
+            if is_start:
+                self.times_ns = [time_ns, *self.times_ns][-KNOWN_VERDICTS:]
+                return False
+            self.older += 1
+            if self.older < FOLLOW_VERDICTS:
+                return False
+        self.older = 0
+        self.times_ns = [*self.times_ns, time_ns][-KNOWN_VERDICTS:]
+        return True
+
+
+@dataclass
+class StationWatch:
+    """What was last heard of a station: `time_ns` and `seq` of its last sample, and when it and its services came."""
+
+    name: str
+    heard_s: float
+    """When the last sample came."""
+    missed_s: float
+    """Since when its absence counts."""
+    start_s: float = 0.0
+    """When the daemon began to know it."""
+    time_ns: int | None = None
+    seq: int = -1
+    older: int = 0
+    has_samples: bool = False
+    verdicts: dict[int, PumpVerdicts] = field(default_factory=dict)
+    gone_s: dict[str, float | None] = field(default_factory=dict)
+
+    def clock_ns(self, now: Now) -> int:
+        """Time of the station: that of its last sample, running on at the pace of the wall."""
+        if self.time_ns is None:
+            return now.wall_ns
+        return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
+
+    def take_sample(self, sample: Sample, now: Now, book: AlarmBook, limits: Limits) -> bool:
+        """Look at a sample; whether it was new."""
+        if self.time_ns is not None and sample.time <= self.time_ns and sample.seq <= self.seq:
+            self.older += 1
+            if self.older < FOLLOW_SAMPLES:
+                return False
+        self.time_ns, self.seq, self.older = sample.time, sample.seq, 0
+        self.heard_s = self.missed_s = now.steady_s
+        self.has_samples = True
+        level_m = sample.level_m
+        if level_m is not None and math.isfinite(level_m) and sample.quality != "bad":
+            self._look_at_level("level_high", level_m, limits.high_m, limits.deadband_m, now, book)
+            self._look_at_level("overflow_risk", level_m, limits.overflow_m, limits.deadband_m, now, book)
+        book.carry_on(self.name, sample.time, now.wall_ns)
+        return True
+
+    def _look_at_level(
+        self, rule: RuleName, level_m: float, limit_m: float | None, deadband_m: float, now: Now, book: AlarmBook
+    ) -> None:
+        if limit_m is None or self.time_ns is None:
+            return
+        least_m = limit_m - deadband_m if book.is_wanted(self.name, rule) else limit_m
+        text = f"{book.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m"
+        book.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
+
+    def take_verdict(self, verdict: Verdict, now: Now, book: AlarmBook) -> bool:
+        """Look at a verdict; whether it was new. "unknown" leaves the alarms of the pump as they are."""
+        is_start = now.steady_s - self.start_s < START_S
+        if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time, is_start=is_start):
+            return False
+        if verdict.state == "unknown":
+            return True
+        for rule in VERDICT_RULES:
+            is_there = verdict.state == rule
+            book.observe(
+                self.name,
+                rule,
+                is_there,
+                verdict.time,
+                now.wall_ns,
+                pump=verdict.pump,
+                text=verdict_text(verdict) if is_there else "",
+                advice=verdict_advice(verdict, book.rules[rule]) if is_there else "",
+            )
+        return True
+
+    @property
+    def services(self) -> dict[str, RuleName]:
+        """Services whose absence is an alarm here, and which."""
+        return SITE_SERVICES if self.name == SITE else STATION_SERVICES
+
+    def take_status(self, status: Status, now: Now, book: AlarmBook, heartbeat_after_s: float) -> None:
+        """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs."""
+        time_ns, age_s = self.clock_ns(now), status.figures.get("heartbeat_age_s")
+        book.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
+        if age_s is not None and status.state == "running":
+            text = f"heartbeat of the PLC stands still for {age_s:.0f} s"
+            book.observe(self.name, "plc_stopped", age_s >= heartbeat_after_s, time_ns, now.wall_ns, text=text)
+
+    def take_presence(self, service: str, *, is_alive: bool, now: Now) -> None:
+        """Note that a service has come or gone."""
+        if service in self.services:
+            gone_s = self.gone_s.get(service)
+            self.gone_s[service] = None if is_alive else now.steady_s if gone_s is None else gone_s
+
+    def look(self, now: Now, book: AlarmBook, stale_after_s: float, silent_after_s: float) -> None:
+        """Look for what does not come any more."""
+        time_ns = self.clock_ns(now)
+        if self.has_samples:
+            self.gone_s.setdefault("detector", now.steady_s)
+            age_s = now.steady_s - self.missed_s
+            text = f"no samples for {age_s:.0f} s"
+            book.observe(self.name, "samples_stale", age_s > stale_after_s, time_ns, now.wall_ns, text=text)
+        for service, gone_s in self.gone_s.items():
+            is_silent = gone_s is not None and now.steady_s - gone_s > silent_after_s
+            book.observe(self.name, self.services[service], is_silent, time_ns, now.wall_ns)
+
+    def begin_again(self, now: Now) -> None:
+        """Count silence from now on: until now it was that of the bus."""
+        self.missed_s = now.steady_s
+        self.gone_s = {service: None if gone_s is None else now.steady_s for service, gone_s in self.gone_s.items()}

@@ -1,0 +1,1 @@
+"""The commands of `wetwell`, one file a group; each parses and calls, nothing else."""

@@ -1,0 +1,164 @@
+"""Alarms: the daemon, and the acts of operators."""
+
+import asyncio
+from typing import Annotated
+
+import typer
+
+from wetwell.services.commands.options import (
+    ConfigOption,
+    JsonOption,
+    ZenohOption,
+    print_result,
+    run,
+    settings_of,
+)
+from wetwell.services.settings import Settings
+
+app = typer.Typer(invoke_without_command=True)
+
+StationName = Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")]
+AlarmArgument = Annotated[str, typer.Argument(metavar="ALARM", help="Such as pump2.pump_fault.")]
+ByOption = Annotated[str, typer.Option("--by", help="Who does it; kept in the audit.")]
+ReasonOption = Annotated[str, typer.Option("--reason", help="Why; kept in the audit.")]
+
+
+@app.callback()
+def alarms(
+    context: typer.Context,
+    station: Annotated[
+        list[str] | None,
+        typer.Option("--station", metavar="FILE", help="Station file, for limits of the level; may be given again."),
+    ] = None,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Raise and clear the alarms of a site after ISA-18.2, and answer the acts of operators."""
+    if context.invoked_subcommand is not None:
+        return
+    from wetwell.services.alarms.serve import serve_alarms
+    from wetwell.services.presets import find_station
+
+    settings = settings_of(config, zenoh)
+    run(settings, serve_alarms(settings, [find_station(name) for name in station or []]))
+
+
+@app.command("list")
+def list_command(
+    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only of this station.")] = "*",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the alarms that are not normal, the most urgent first."""
+    from wetwell.services.alarms.asking import ask_alarms, list_alarms
+    from wetwell.services.alarms.listing import alarm_lines
+
+    found = asyncio.run(ask_alarms(settings_of(config, zenoh), lambda bus: list_alarms(bus, station)))
+    if as_json:
+        print_result({"alarms": [alarm.model_dump(mode="json") for alarm in found]}, as_json=True)
+    else:
+        typer.echo(alarm_lines(found))
+
+
+@app.command()
+def report(zenoh: ZenohOption = None, config: ConfigOption = None, as_json: JsonOption = False) -> None:
+    """Print the alarm rates beside the targets of ISA-18.2, and the chattering and stale alarms."""
+    from wetwell.services.alarms.asking import ask_alarms
+    from wetwell.services.alarms.asking import report as ask_report
+    from wetwell.services.alarms.listing import report_lines
+
+    answer = asyncio.run(ask_alarms(settings_of(config, zenoh), ask_report))
+    if as_json:
+        print_result(answer.model_dump(mode="json"), as_json=True)
+    else:
+        typer.echo(report_lines(answer))
+
+
+@app.command()
+def acknowledge(
+    alarm: AlarmArgument,
+    station: StationName,
+    by: ByOption,
+    reason: ReasonOption = "",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say that an alarm was seen."""
+    _act("acknowledge", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+
+
+@app.command()
+def shelve(
+    alarm: AlarmArgument,
+    station: StationName,
+    by: ByOption,
+    minutes: Annotated[float, typer.Option("--minutes", help="For how long on the wall clock, at most a week.")],
+    reason: ReasonOption = "",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Put an alarm on the shelf for a time: nobody is called by it."""
+    _act("shelve", (station, alarm, by, reason), minutes, settings_of(config, zenoh), as_json=as_json)
+
+
+@app.command()
+def unshelve(
+    alarm: AlarmArgument,
+    station: StationName,
+    by: ByOption,
+    reason: ReasonOption = "",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Take an alarm from the shelf before its time."""
+    _act("unshelve", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+
+
+@app.command("out-of-service")
+def out_of_service(
+    alarm: AlarmArgument,
+    station: StationName,
+    by: ByOption,
+    reason: ReasonOption = "",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Take an alarm out of service, for maintenance, until it is put in again."""
+    _act("out_of_service", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+
+
+@app.command("in-service")
+def in_service(
+    alarm: AlarmArgument,
+    station: StationName,
+    by: ByOption,
+    reason: ReasonOption = "",
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Put an alarm into service again."""
+    _act("in_service", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+
+
+def _act(
+    act: str, words: tuple[str, str, str, str], minutes: float | None, settings: Settings, *, as_json: bool
+) -> None:
+    from wetwell.services.alarms.asking import ask_alarms, new_act, send_act
+
+    station, alarm, by, reason = words
+    order = new_act(station, alarm, act, by, minutes, reason)
+    answer = asyncio.run(ask_alarms(settings, lambda bus: send_act(bus, order)))
+    result: dict[str, object] = {"done": answer.is_done}
+    if answer.alarm is not None:
+        result |= answer.alarm.model_dump(mode="json", exclude_none=True)
+    else:
+        result["reason"] = answer.reason
+    print_result(result, as_json=as_json)
+    if not answer.is_done:
+        raise typer.Exit(1)

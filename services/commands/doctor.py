@@ -1,0 +1,35 @@
+"""A look at a running site."""
+
+from typing import Annotated
+
+import typer
+
+from wetwell.services.commands.options import ConfigOption, JsonOption, ZenohOption, positive, print_result
+
+app = typer.Typer()
+
+
+@app.command()
+def doctor(
+    station: Annotated[
+        list[str] | None,
+        typer.Option("--station", metavar="FILE", help="Station that must be there; may be given again."),
+    ] = None,
+    seconds: Annotated[float, typer.Option("--seconds", help="How long to listen.")] = 5.0,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a running site and say what is wrong and what to do; exit code 0 well, 1 warnings, 2 errors."""
+    import asyncio
+    from dataclasses import asdict
+
+    from wetwell.services.doctor.examine import examine
+    from wetwell.services.doctor.finding import exit_code, finding_lines
+
+    findings = asyncio.run(examine(config, zenoh, station or [], positive(seconds, "--seconds")))
+    if as_json:
+        print_result({"findings": [asdict(finding) for finding in findings]}, as_json=True)
+    else:
+        typer.echo(finding_lines(findings))
+    raise typer.Exit(exit_code(findings))

@@ -1,0 +1,100 @@
+"""The gap between simulation and reality."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from wetwell.services.commands.options import (
+    JsonOption,
+    RecordingOption,
+    SeedOption,
+    StationOption,
+    positive,
+    print_result,
+)
+
+app = typer.Typer(no_args_is_help=True, help="The gap between simulation and reality.")
+
+
+@app.command("trial")
+def gap_trial(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")],
+    seed: SeedOption = 1,
+    cases: Annotated[int, typer.Option(min=1, help="Number of sealed cases.")] = 50,
+    plant: Annotated[Literal["fine", "swmm", "both"], typer.Option(help="What stands for reality.")] = "fine",
+    kinds: Annotated[
+        str, typer.Option(help="Of single, pair, none, open, leave_one_out; with commas.")
+    ] = "single,pair,none,open,leave_one_out",
+    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    workers: Annotated[int, typer.Option(min=1, help="Diagnoses at once.")] = 1,
+    recalibration: Annotated[
+        bool, typer.Option("--recalibration", help="Diagnose each case once more by recalibration only.")
+    ] = False,
+    unseen: Annotated[
+        bool, typer.Option("--unseen", help="Measure the shrinkage on recordings that no diagnosis has seen.")
+    ] = False,
+    diagnoser: Annotated[
+        str | None, typer.Option("--diagnoser", metavar="COMMAND", help="In place of wetwell gap diagnose.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check the diagnosis on sealed recordings of other plants; run again to resume."""
+    import shlex
+
+    from wetwell.services.trial import DIAGNOSE, REPLAY, TrialPlan, brief, parse_kinds, run_trial
+
+    plan = TrialPlan(
+        seed=seed,
+        count=cases,
+        kinds=parse_kinds(kinds),
+        plants=("fine", "swmm") if plant == "both" else (plant,),
+        seconds=round(positive(days, "--days") * 86_400.0),
+        command=DIAGNOSE if diagnoser is None else tuple(shlex.split(diagnoser)),
+        replay=REPLAY if unseen else (),
+        has_recalibration=recalibration,
+    )
+    result = run_trial(plan, out, workers)
+    print_result(result if as_json else brief(result, out), as_json=as_json)
+
+
+@app.command("diagnose")
+def gap_diagnose(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for report and station file.")],
+    station: StationOption = "alpha",
+    without: Annotated[
+        list[str] | None, typer.Option("--without", metavar="NAME", help="Leave this effect out; may be given again.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say where a recording departs from the simulator, which effect causes it, and how far that closes the gap."""
+    from wetwell.services.gap import diagnose_file
+    from wetwell.services.gap_terminal import gap_lines, progress_bar
+    from wetwell.services.presets import find_station
+
+    plant = find_station(station)
+    with progress_bar("diagnosis") as progress:
+        report = diagnose_file(plant, recording, out, only=only, without=without or (), progress=progress)
+    typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
+
+
+@app.command("replay")
+def gap_replay(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    station: StationOption = "alpha",
+    closed_loop: Annotated[
+        bool,
+        typer.Option("--closed-loop", help="Take only the inflow from the recording, not frequencies and level."),
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write what the simulator says for a recording, second by second."""
+    from wetwell.services.gap import replay_file
+    from wetwell.services.presets import find_station
+
+    print_result(replay_file(find_station(station), recording, out, closed_loop=closed_loop), as_json=as_json)

@@ -1,0 +1,133 @@
+"""History: the daemon that keeps it, questions to it, recordings out of it and into it."""
+
+import asyncio
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.history_messages import LONGEST_NS
+from wetwell.protocols.stamps import from_iso
+from wetwell.services.commands.options import (
+    ConfigOption,
+    JsonOption,
+    RecordingOption,
+    ZenohOption,
+    parse_duration_s,
+    print_result,
+    run,
+    settings_of,
+    with_history,
+)
+
+app = typer.Typer()
+
+DataOption = Annotated[
+    Path | None, typer.Option("--data", metavar="DIR", help="Folder of the history; default: that of the settings.")
+]
+NameOption = Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")]
+FromOption = Annotated[
+    str | None, typer.Option("--from", metavar="TIME", help="ISO 8601, such as 2026-11-20T06:00:00Z.")
+]
+ToOption = Annotated[str | None, typer.Option("--to", metavar="TIME", help="Until before this time.")]
+
+
+@app.command()
+def historian(data: DataOption = None, zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
+    """Keep samples, verdicts and alarms of all stations, and answer questions about them."""
+    from wetwell.services.historian.daemon import serve_historian
+
+    settings = with_history(settings_of(config, zenoh), data)
+    run(settings, serve_historian(settings))
+
+
+@app.command()
+def history(
+    station: NameOption = "alpha",
+    kind: Annotated[Literal["samples", "verdicts", "alarms", "kpi", "stations"], typer.Option()] = "kpi",
+    last: Annotated[
+        str | None, typer.Option(metavar="TIME", help="So long before the newest sample: 90s, 10m, 2h.")
+    ] = None,
+    start: FromOption = None,
+    end: ToOption = None,
+    points: Annotated[int, typer.Option(min=1, max=100_000, help="Most rows.")] = 100,
+    raw: Annotated[bool, typer.Option("--raw", help="Samples themselves, from the oldest on.")] = False,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Ask a running historian for samples, verdicts, alarms or figures; `--kind stations` lists what it knows."""
+    from wetwell.protocols.keys import SITE
+    from wetwell.services.historian.questions import ask_history
+    from wetwell.services.historian.tables import history_table
+
+    if last is not None and (start is not None or end is not None):
+        raise ConfigError("history: give either --last or --from and --to")
+    asking = ask_history(
+        settings_of(config, zenoh),
+        SITE if kind == "stations" else station,
+        kind,
+        last_s=None if last is None else parse_duration_s(last, "--last"),
+        span=_span(start, end),
+        points=points,
+        raw=raw,
+    )
+    answer = asyncio.run(asking)
+    if as_json:
+        typer.echo(answer.encode().decode())
+    else:
+        print_result(history_table(answer), as_json=False)
+
+
+@app.command()
+def export(
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    station: NameOption = "alpha",
+    start: FromOption = None,
+    end: ToOption = None,
+    data: DataOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a recording from the history; needs no running historian."""
+    from wetwell.services.historian.opening import open_store
+    from wetwell.services.historian.transfer import export_recording
+
+    settings, span = with_history(settings_of(config), data), _span(start, end)
+    with open_store(settings.historian, alone=False, must_exist=True) as store:
+        rows = export_recording(store, station, *span, out)
+    print_result({"recording": str(out), "station": station, "rows": rows}, as_json=as_json)
+
+
+@app.command("import")
+def import_(
+    recording: RecordingOption,
+    station: NameOption = "alpha",
+    data: DataOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Fill the history from a recording; what is there already stays as it is."""
+    from wetwell.services.historian.opening import open_store
+    from wetwell.services.historian.transfer import import_recording
+
+    settings = with_history(settings_of(config), data)
+    with open_store(settings.historian, alone=False) as store:
+        rows, new = import_recording(store, station, recording)
+    print_result({"station": station, "rows": rows, "new": new, "doubled": rows - new}, as_json=as_json)
+
+
+def _span(start: str | None, end: str | None) -> tuple[int, int]:
+    start_ns = -LONGEST_NS if start is None else _stamp_ns(start, "--from")
+    end_ns = LONGEST_NS if end is None else _stamp_ns(end, "--to")
+    if end_ns <= start_ns:
+        raise ConfigError(f"--to: got '{end}', must lie after --from")
+    return start_ns, end_ns
+
+
+def _stamp_ns(text: str, flag: str) -> int:
+    try:
+        return min(max(from_iso(text), -LONGEST_NS), LONGEST_NS)
+    except ValueError as error:
+        raise ConfigError(f"{flag}: got '{text}', must be ISO 8601 such as 2025-01-31T06:00:00Z") from error

@@ -1,0 +1,70 @@
+"""Verdicts on recordings, and how good they are."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wetwell.services.commands.options import JsonOption, StationOption, positive, print_result
+
+app = typer.Typer()
+
+
+@app.command()
+def detect(
+    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Verdicts, one JSON object a line.")],
+    station: StationOption = "alpha",
+    as_json: JsonOption = False,
+) -> None:
+    """Judge a recording with the streaming detector."""
+    from wetwell.protocols.recording import read_recording
+    from wetwell.services.batch import detect as judge
+    from wetwell.services.presets import find_station
+
+    plant = find_station(station)
+    rows = read_recording(recording)
+    for name in rows.ignored:
+        typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
+    print_result(judge(plant, rows, out), as_json=as_json)
+
+
+@app.command()
+def backtest(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for backtest.json and backtest.html.")],
+    station: StationOption = "alpha",
+    recording: Annotated[
+        list[Path] | None, typer.Option("--recording", metavar="FILE", help="With truth columns; may be given again.")
+    ] = None,
+    scenario: Annotated[
+        list[str] | None, typer.Option("--scenario", metavar="NAME", help="To simulate; may be given again.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds of each scenario.")] = 1,
+    first_seed: Annotated[int, typer.Option("--first-seed", min=0, help="The first of them.")] = 1,
+    days: Annotated[float | None, typer.Option(help="Length of each; default: the scenario's.")] = None,
+    dataset: Annotated[
+        Path | None, typer.Option("--dataset", metavar="DIR", help="Folder that `wetwell dataset` has made.")
+    ] = None,
+    detectors: Annotated[
+        str, typer.Option(metavar="NAMES", help="With commas between; `all` for every one.")
+    ] = "wetwell,paper_f_test,paper_tangent,paper_f_shift,paper_tangent_segments",
+    learning_h: Annotated[
+        float, typer.Option("--learning-h", min=0.0, help="Runs that end in these first hours are not scored.")
+    ] = 6.0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Score verdicts against truth: ours, the paper's two methods, their best readings and outside detectors."""
+    from wetwell.services.backtest import detector_names, overview, run_backtest, sources_of, write_backtest
+    from wetwell.services.presets import find_scenario, find_station
+
+    names = detector_names(detectors)
+    length_s = None if days is None else max(round(positive(days, "--days") * 86_400.0), 1)
+    plans = [find_scenario(name) for name in scenario or []]
+    sources = sources_of(
+        find_station(station), recording or [], plans, range(first_seed, first_seed + seeds), length_s, dataset
+    )
+    result = run_backtest(sources, names, min(workers or os.cpu_count() or 1, len(sources)), learning_h * 3600.0)
+    write_backtest(result, out)
+    print_result(result if as_json else overview(result), as_json=as_json)

@@ -1,0 +1,220 @@
+"""Services that run until they are stopped."""
+
+import asyncio
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wetwell.services.commands.options import (
+    ConfigOption,
+    JsonOption,
+    ModbusOption,
+    PageOption,
+    ScenarioOption,
+    SeedOption,
+    SpeedOption,
+    StationOption,
+    WordOrderOption,
+    ZenohOption,
+    live_plant,
+    parse_duration_s,
+    positive,
+    print_result,
+    run,
+    settings_of,
+    with_data,
+)
+from wetwell.services.settings import LogSettings, Settings
+
+app = typer.Typer()
+
+
+@app.command()
+def up(
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "demo",
+    seed: SeedOption = 1,
+    speed: SpeedOption = None,
+    limit: Annotated[
+        str | None, typer.Option("--for", metavar="TIME", help="Stop after this time on the wall: 90s, 10m, 2h.")
+    ] = None,
+    zenoh: ZenohOption = None,
+    modbus: ModbusOption = None,
+    word_order: WordOrderOption = None,
+    page: PageOption = None,
+    config: ConfigOption = None,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="DIR", help="Where all is kept; default: gone at the end."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
+) -> None:
+    """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
+    from wetwell.services.supervisor import serve_all
+    from wetwell.services.terminal import banner, line_printer
+
+    settings = settings_of(config, zenoh, modbus, word_order, page=page)
+    if settings.log == LogSettings():
+        settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
+    limit_s = None if limit is None else parse_duration_s(limit)
+    plant, speed = live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
+    if not as_json:
+        typer.echo(banner(settings, plant.station, plant.scenario.name, speed))
+    live = [
+        "--station",
+        station,
+        "--scenario",
+        scenario,
+        "--seed",
+        str(seed),
+        "--speed",
+        str(speed),
+        "--modbus-server",
+    ]
+    commands = {
+        "historian": ["historian"],
+        "dashboard": ["dashboard"],
+        "detector": ["detector", "--station", station],
+        "alarms": ["alarms", "--station", station],
+        "simulator": ["simulator", *live],
+    }
+    with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
+        settings = with_data(settings, data, Path(folder))
+        run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
+
+
+@app.command()
+def simulator(
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "nominal",
+    seed: SeedOption = 1,
+    speed: SpeedOption = None,
+    modbus_server: Annotated[
+        bool, typer.Option("--modbus-server", help="Also serve the same plant on Modbus TCP.")
+    ] = False,
+    zenoh: ZenohOption = None,
+    modbus: ModbusOption = None,
+    word_order: WordOrderOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Simulate a station live and publish its samples on Zenoh."""
+    _serve_plant(
+        settings_of(config, zenoh, modbus, word_order),
+        station,
+        scenario,
+        seed,
+        speed,
+        zenoh=True,
+        modbus=modbus_server,
+    )
+
+
+@app.command()
+def plc(
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "nominal",
+    seed: SeedOption = 1,
+    speed: SpeedOption = None,
+    modbus: ModbusOption = None,
+    word_order: WordOrderOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Simulate a station live behind a Modbus TCP server, as its PLC would show it; needs no Zenoh."""
+    _serve_plant(
+        settings_of(config, None, modbus, word_order), station, scenario, seed, speed, zenoh=False, modbus=True
+    )
+
+
+detector_app = typer.Typer(invoke_without_command=True)
+app.add_typer(detector_app, name="detector")
+
+
+@detector_app.callback()
+def detector(
+    context: typer.Context,
+    station: Annotated[
+        list[str] | None,
+        typer.Option("--station", metavar="FILE", help="Station file or built-in station; may be given again."),
+    ] = None,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Judge the samples of stations on Zenoh and publish verdicts."""
+    if context.invoked_subcommand is not None:
+        return
+    from wetwell.services.detector.serve import serve_detector
+    from wetwell.services.presets import find_stations
+
+    settings = settings_of(config, zenoh)
+    run(settings, serve_detector(settings, find_stations(station or ["alpha"])))
+
+
+@detector_app.command()
+def rebaseline(
+    pump: Annotated[int, typer.Option(min=1, help="Pump, from 1.")],
+    by: Annotated[str, typer.Option(help="Who orders it; kept in the log and in the verdict.")],
+    station: StationOption = "alpha",
+    revert: Annotated[bool, typer.Option("--revert", help="Take the baseline back that was put aside last.")] = False,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Order a running detector to learn a pump anew, after a repair; what it knew is put aside."""
+    from wetwell.services.detector.orders import send_order
+    from wetwell.services.presets import find_station
+
+    name = find_station(station).name
+    settings = settings_of(config, zenoh)
+    verdict = asyncio.run(send_order(settings, name, pump, "revert" if revert else "rebaseline", by))
+    answer = {"station": name, "pump": pump, "state": verdict.state, "reason": verdict.evidence.get("reason")}
+    print_result(answer | {"baseline": verdict.evidence.get("baseline")}, as_json=as_json)
+
+
+@detector_app.command()
+def release(
+    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")],
+    config: ConfigOption = None,
+) -> None:
+    """Judge a station again, from the next start on, that was left out because the detector had crashed at it."""
+    from wetwell.services.detector.quarantine import Quarantine
+
+    kept = settings_of(config).detector
+    Quarantine(kept.state_dir, "release", kept.crash_tries).release(station)
+
+
+@app.command()
+def replay(
+    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    station: StationOption = "alpha",
+    speed: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Publish a recording on Zenoh as if it were live, then end."""
+    from wetwell.protocols.recording import read_recording
+    from wetwell.services.presets import find_station
+    from wetwell.services.replay import serve_replay
+
+    settings = settings_of(config, zenoh)
+    rows = read_recording(recording)
+    run(settings, serve_replay(settings, rows, find_station(station).name, positive(speed, "--speed")))
+
+
+@app.command()
+def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
+    """Run a Zenoh router, for sites that have none."""
+    from wetwell.services.router import serve_router
+
+    settings = settings_of(config, zenoh)
+    run(settings, serve_router(settings))
+
+
+def _serve_plant(
+    settings: Settings, station: str, scenario: str, seed: int, speed: float | None, *, zenoh: bool, modbus: bool
+) -> None:
+    from wetwell.services.simulator import serve_simulator
+
+    plant, speed = live_plant(station, scenario, seed, speed)
+    run(settings, serve_simulator(settings, plant, speed, zenoh=zenoh, modbus=modbus))

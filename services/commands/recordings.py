@@ -1,0 +1,153 @@
+"""Recordings: made, prepared, converted, summed up."""
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal, cast
+
+import typer
+
+from wetwell.protocols.errors import ConfigError
+from wetwell.services.commands.options import (
+    JsonOption,
+    PreparationOption,
+    RecordingOption,
+    ScenarioOption,
+    SeedOption,
+    StationOption,
+    plant_of,
+    positive,
+    print_result,
+)
+
+app = typer.Typer()
+
+
+@app.command()
+def simulate(
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    station: StationOption = "alpha",
+    scenario: ScenarioOption = "nominal",
+    days: Annotated[float | None, typer.Option(help="Length; default: the scenario's.")] = None,
+    seed: SeedOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a simulated recording, with truth columns."""
+    from wetwell.services.batch import simulate as write
+    from wetwell.services.presets import find_scenario
+    from wetwell.simulator.scenario import DEFAULT_START_NS
+
+    plant = plant_of(station, find_scenario(scenario), seed, DEFAULT_START_NS)
+    length_s = plant.scenario.duration_s if days is None else positive(days, "--days") * 86_400.0
+    rows = write(plant, max(round(length_s), 1), out)
+    summary = {"recording": str(out), "rows": rows, "station": plant.station.name, "seed": seed}
+    print_result(summary, as_json=as_json)
+
+
+@app.command()
+def dataset(
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, help="Number of recordings.")] = 100,
+    seed: SeedOption = 1,
+    station: Annotated[
+        list[str] | None, typer.Option("--station", metavar="FILE", help="Base station; may be given again.")
+    ] = None,
+    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    form: Annotated[
+        Literal["parquet", "csv.gz"], typer.Option("--format", help="Form of the recordings.")
+    ] = "parquet",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    check: Annotated[
+        Path | None, typer.Option("--check", metavar="DIR", help="Make nothing: verify the checksums of a dataset.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a balanced, labelled set of recordings over sampled stations and faults; run again to resume."""
+    from wetwell.services.dataset import check_dataset, make_dataset, plan_of
+    from wetwell.services.presets import find_station
+
+    if (out is None) == (check is None):
+        raise ConfigError("dataset: give either --out DIR or --check DIR")
+    if check is not None:
+        return print_result(check_dataset(check), as_json=as_json)
+    bases = [find_station(name) for name in station or ["alpha"]]
+    plan = plan_of(bases, seed, count, positive(days, "--days"), form)
+    processes = min(workers or os.cpu_count() or 1, count)
+    return print_result(make_dataset(plan, cast("Path", out), processes), as_json=as_json)
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(help="File in a foreign form.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    form: Annotated[Literal["skab"], typer.Option("--from", help="Form of the file.")] = "skab",
+    as_json: JsonOption = False,
+) -> None:
+    """Turn a file of another origin into a recording."""
+    from wetwell.protocols.importers import IMPORTERS
+    from wetwell.protocols.recording import write_recording
+
+    recording = IMPORTERS[form](source)
+    write_recording(recording, out)
+    print_result(
+        {"recording": str(out), "rows": len(recording), "columns": sorted(recording.columns)}, as_json=as_json
+    )
+
+
+@app.command()
+def prepare(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
+    preparation: PreparationOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Prepare a recording from the field: units, offsets, order, doubles; list its gaps."""
+    from wetwell.services.field_data import prepare_file
+
+    print_result(prepare_file(recording, preparation, out), as_json=as_json)
+
+
+@app.command()
+def calibrate(
+    recording: RecordingOption,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Station file that is written.")],
+    station: StationOption = "alpha",
+    preparation: PreparationOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a station file to a recording, with intervals; says what the recording cannot tell."""
+    from wetwell.services.field_data import calibrate_file
+    from wetwell.services.presets import find_station
+
+    print_result(calibrate_file(find_station(station), recording, preparation, out), as_json=as_json)
+
+
+@app.command()
+def validate(
+    recording: RecordingOption,
+    station: StationOption = "alpha",
+    preparation: PreparationOption = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Simulated recording that is written.")
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Page with plots that is written; needs no network.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run the simulator under the inflow of a recording and compare level, starts and run time."""
+    from wetwell.services.field_data import validate_file
+    from wetwell.services.presets import find_station
+
+    print_result(validate_file(find_station(station), recording, preparation, out, html), as_json=as_json)
+
+
+@app.command()
+def kpi(recording: RecordingOption, as_json: JsonOption = False) -> None:
+    """Print energy, starts, run time and volume of a recording, by day and in total."""
+    from wetwell.protocols.recording import read_recording
+    from wetwell.services.terminal import kpi_table
+    from wetwell.simulator.kpi import kpis
+
+    print_result(kpi_table(kpis(read_recording(recording)), with_hours=as_json), as_json=as_json)

@@ -1,0 +1,66 @@
+"""Tokens for the dashboard and for acts on alarms."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wetwell.protocols.errors import ConfigError
+from wetwell.services.commands.options import ConfigOption, JsonOption, print_result
+from wetwell.services.settings import load_settings
+from wetwell.services.tokens import Role
+
+app = typer.Typer(no_args_is_help=True, help="Tokens of people and programs that use the dashboard.")
+
+FileOption = Annotated[
+    Path | None, typer.Option("--file", help="File of tokens; default: the setting security.tokens_file.")
+]
+NameOption = Annotated[str, typer.Option("--name", help="Who holds it; stands in the record of acts.")]
+
+
+@app.command()
+def new(
+    name: NameOption,
+    role: Annotated[Role, typer.Option("--role", help="viewer: may look; operator: may also act.")] = "viewer",
+    file: FileOption = None,
+    config: ConfigOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a token and print it, this once."""
+    from wetwell.services.tokens import new_token
+
+    path = _file(file, config)
+    token = new_token(path, name, role)
+    if as_json:
+        print_result({"name": name, "role": role, "token": token, "file": str(path)}, as_json=True)
+    else:
+        typer.echo(token)
+
+
+@app.command("list")
+def list_(file: FileOption = None, config: ConfigOption = None, *, as_json: JsonOption = False) -> None:
+    """Print who holds a token."""
+    from wetwell.services.tokens import read_holders
+
+    holders = read_holders(_file(file, config))
+    if as_json:
+        print_result({"holders": [holder.model_dump(include={"name", "role"}) for holder in holders]}, as_json=True)
+    else:
+        for holder in holders:
+            typer.echo(f"{holder.name}\t{holder.role}")
+
+
+@app.command()
+def revoke(name: NameOption, file: FileOption = None, config: ConfigOption = None) -> None:
+    """Take a token out of the file; it is refused from now on."""
+    from wetwell.services.tokens import revoke_token
+
+    revoke_token(_file(file, config), name)
+
+
+def _file(file: Path | None, config: Path | None) -> Path:
+    path = file or load_settings(config).security.tokens_file
+    if path is None:
+        raise ConfigError("no file of tokens: give --file, or set security.tokens_file")
+    return path

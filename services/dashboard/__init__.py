@@ -1,0 +1,1 @@
+"""The control-room page: what is on the bus, in a browser."""

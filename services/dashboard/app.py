@@ -1,0 +1,173 @@
+"""The addresses of the page and what each answers."""
+
+import asyncio
+import gzip
+import json
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from wetwell.protocols.link import Bus
+from wetwell.services.dashboard.assets import Asset, Assets
+from wetwell.services.dashboard.guard import Guard
+from wetwell.services.dashboard.hub import Hub
+from wetwell.services.dashboard.questions import RefusalError, act_on_alarm, history, recording_pieces
+from wetwell.services.dashboard.reports import find_report, report_names
+from wetwell.services.dashboard.site_view import SiteView
+
+GZIP_BYTES = 1000
+GZIP_LEVEL = 5
+
+
+@dataclass
+class Desk:
+    """What the answers are made from; without a bus nothing can be asked."""
+
+    view: SiteView
+    hub: Hub
+    reports: Path | None = None
+    bus: Bus | None = None
+
+    def asked(self) -> Bus:
+        """The bus, to ask on.
+
+        Raises
+        ------
+        RefusalError
+            If there is none yet.
+        """
+        if self.bus is None:
+            raise RefusalError(503, "no connection to the bus yet")
+        return self.bus
+
+
+def dashboard_app(desk: Desk) -> Starlette:
+    """Web application over a desk."""
+    pages, answers = _Pages(), _Answers(desk)
+    shells = ("/", "/station/{station}", "/alarms", "/reports", "/health")
+    return Starlette(
+        routes=[
+            *(Route(path, pages.shell) for path in shells),
+            Route("/static/{version}/{name:path}", pages.static),
+            Route("/favicon.ico", pages.favicon),
+            Route("/events", answers.events),
+            Route("/api/stations", answers.stations),
+            Route("/api/stations/{station}", answers.station),
+            Route("/api/stations/{station}/history", answers.history),
+            Route("/api/stations/{station}/recording.csv", answers.recording),
+            Route("/api/stations/{station}/alarm-act", answers.act, methods=["POST"]),
+            Route("/api/alarms", answers.alarms),
+            Route("/api/health", answers.health),
+            Route("/api/reports", answers.reports),
+            Route("/reports/{name:path}", answers.report),
+        ],
+        middleware=[Middleware(Guard)],
+        exception_handlers={RefusalError: _refuse},
+    )
+
+
+class _Pages:
+    """The files of the page."""
+
+    def __init__(self) -> None:
+        self._assets = Assets()
+
+    async def shell(self, request: Request) -> Response:
+        return _asset(request, self._assets.shell, "no-cache")
+
+    async def static(self, request: Request) -> Response:
+        asset = self._assets.files.get(request.path_params["name"])
+        if asset is None or request.path_params["version"] != self._assets.version:
+            raise RefusalError(404, f"no such file: {request.url.path}")
+        return _asset(request, asset, "public, max-age=31536000, immutable")
+
+    async def favicon(self, request: Request) -> Response:
+        return _asset(request, self._assets.files["favicon.svg"], "public, max-age=86400")
+
+
+class _Answers:
+    """What is known and what can be asked."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+
+    async def events(self, request: Request) -> Response:
+        return StreamingResponse(
+            self._desk.hub.listen(request.query_params.get("station", "")),
+            media_type="text/event-stream",
+            headers={"cache-control": "no-store", "x-accel-buffering": "no"},
+        )
+
+    async def stations(self, request: Request) -> Response:
+        return _json(request, self._desk.view.site_state())
+
+    async def station(self, request: Request) -> Response:
+        return _json(request, self._desk.view.station_state(request.path_params["station"]))
+
+    async def alarms(self, request: Request) -> Response:
+        return _json(request, self._desk.view.alarms())
+
+    async def health(self, request: Request) -> Response:
+        bus = self._desk.bus
+        services = self._desk.view.health(asyncio.get_running_loop().time())
+        return _json(request, json.dumps({"connected": bus is not None and bus.is_connected, "services": services}))
+
+    async def act(self, request: Request) -> Response:
+        answer = await act_on_alarm(self._desk.asked(), request.path_params["station"], await request.body())
+        return JSONResponse(answer)
+
+    async def history(self, request: Request) -> Response:
+        answer = await history(self._desk.asked(), request.path_params["station"], request.query_params)
+        return _json(request, answer.encode().decode())
+
+    async def recording(self, request: Request) -> Response:
+        name = request.path_params["station"]
+        pieces = recording_pieces(self._desk.asked(), name, request.query_params)
+        first = await anext(pieces)  # what is wrong is told before the file begins
+
+        async def content() -> AsyncIterator[str]:
+            yield first
+            async for piece in pieces:
+                yield piece
+
+        headers = {"content-disposition": f'attachment; filename="{name}.csv"', "cache-control": "no-store"}
+        return StreamingResponse(content(), media_type="text/csv; charset=utf-8", headers=headers)
+
+    async def reports(self, request: Request) -> Response:
+        return _json(request, json.dumps(report_names(self._desk.reports)))
+
+    async def report(self, request: Request) -> Response:
+        path = find_report(self._desk.reports, request.path_params["name"])
+        content = await asyncio.to_thread(path.read_bytes)
+        return Response(content, media_type="text/html; charset=utf-8", headers={"cache-control": "no-cache"})
+
+
+async def _refuse(_: Request, error: Exception) -> Response:
+    return JSONResponse({"error": str(error)}, error.status if isinstance(error, RefusalError) else 500)
+
+
+def _asset(request: Request, asset: Asset, caching: str) -> Response:
+    headers = {"etag": asset.etag, "cache-control": caching, "vary": "accept-encoding"}
+    if request.headers.get("if-none-match") == asset.etag:
+        return Response(status_code=304, headers=headers)
+    if _takes_gzip(request):
+        return Response(asset.compressed, media_type=asset.media_type, headers=headers | {"content-encoding": "gzip"})
+    return Response(asset.content, media_type=asset.media_type, headers=headers)
+
+
+def _json(request: Request, text: str) -> Response:
+    content, headers = text.encode(), {"cache-control": "no-store"}
+    if len(content) > GZIP_BYTES and _takes_gzip(request):
+        content = gzip.compress(content, GZIP_LEVEL, mtime=0)
+        headers |= {"content-encoding": "gzip", "vary": "accept-encoding"}
+    return Response(content, media_type="application/json", headers=headers)
+
+
+def _takes_gzip(request: Request) -> bool:
+    return "gzip" in request.headers.get("accept-encoding", "")

@@ -1,0 +1,73 @@
+"""From the bus to the browsers: payloads into the site's state, its frames into the hub."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import TypeVar
+
+from wetwell.protocols.keys import alarm_key, alive_key, model_key, sample_key, status_key, verdict_key
+from wetwell.protocols.link import Bus, Subscription
+from wetwell.services.daemon import ticks
+from wetwell.services.dashboard.hub import Hub
+from wetwell.services.dashboard.site_view import SiteView
+
+log = logging.getLogger(__name__)
+
+FRAME_S = 0.25
+FRAMES_A_SECOND = 4
+SAMPLE_HISTORY = 60
+VERDICT_HISTORY = 60
+
+T = TypeVar("T")
+
+
+class Feed:
+    """Keeps a `SiteView` up to date from a bus and sends what is new to the browsers."""
+
+    def __init__(self, bus: Bus, view: SiteView, hub: Hub) -> None:
+        self._view = view
+        self._hub = hub
+        self._samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
+        self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
+            (self._samples, view.take_sample),
+            (bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY), view.take_verdict),
+            (bus.subscribe(model_key("*"), history=1), view.take_model),
+            (bus.subscribe(alarm_key("*"), history=1), view.take_alarm),
+            (bus.subscribe(status_key("*", "*"), history=1), view.take_status),
+        ]
+        self._presence = bus.watch(alive_key("*", "*"))
+
+    async def run(self) -> None:
+        """Take and send for ever."""
+        async with asyncio.TaskGroup() as group:
+            for subscription, take in self._messages:
+                group.create_task(_take(subscription, take))
+            group.create_task(_take(self._presence, self._view.take_presence))
+            group.create_task(self._send())
+
+    async def _send(self) -> None:
+        number = 0
+        loop = asyncio.get_running_loop()
+        async for _ in ticks(FRAME_S, asyncio.Event()):
+            for name, frame in self._view.advance(loop.time()).items():
+                self._hub.send(name, frame)
+            number += 1
+            if number % FRAMES_A_SECOND == 0:
+                frame_or_none = self._view.site_frame()
+                if frame_or_none is not None:
+                    self._hub.send("", frame_or_none)
+
+    def figures(self) -> dict[str, float]:
+        """Health figures."""
+        return {
+            "stations": float(len(self._view.stations)),
+            "clients": float(self._hub.clients),
+            "malformed": float(self._view.counts["malformed"]),
+            "dropped": float(sum(subscription.dropped for subscription, _ in self._messages)),
+        }
+
+
+async def _take(subscription: Subscription[T], take: Callable[[T], None]) -> None:
+    while True:
+        for item in await subscription.receive():
+            take(item)

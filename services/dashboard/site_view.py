@@ -1,0 +1,164 @@
+"""What the page knows of all stations: takes payloads from the bus, gives frames for the browsers."""
+
+import json
+import logging
+from collections import Counter
+from typing import Any, TypeVar
+
+from wetwell.protocols.alarm_messages import Alarm
+from wetwell.protocols.keys import SITE
+from wetwell.protocols.link import Presence
+from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.model_messages import Model
+from wetwell.services.dashboard.station_view import StationView
+
+log = logging.getLogger(__name__)
+
+ROWS = ((100, 1200), (1000, 200))
+FEWEST_ROWS = 60
+"""Samples of each station that are kept for charts: with up to so many stations, and beyond."""
+
+M = TypeVar("M", bound=Message)
+
+
+class SiteView:
+    """State of all stations. A payload that is none of the site's messages is counted and left out.
+
+    Parameters
+    ----------
+    stale_s : float
+        Without a sample for so long, a station has no data. [s]
+    """
+
+    def __init__(self, stale_s: float) -> None:
+        self.stations: dict[str, StationView] = {}
+        self.services: dict[str, dict[str, Any]] = {}
+        self.counts: Counter[str] = Counter()
+        self.frame_id = 0
+        self._order: list[StationView] = []
+        self._stale_s = stale_s
+        self._now_s = 0.0
+        self._with_news: dict[str, StationView] = {}
+        self._with_live: dict[str, StationView] = {}
+        self._changed: dict[str, StationView] = {}
+
+    def take_sample(self, payload: bytes) -> None:
+        """Take a sample."""
+        sample = self._decoded(Sample, payload)
+        if sample is not None:
+            station = self._station(sample.station)
+            if station.take_sample(sample, self._now_s):
+                self._with_news[station.name] = self._with_live[station.name] = station
+
+    def take_verdict(self, payload: bytes) -> None:
+        """Take a verdict."""
+        verdict = self._decoded(Verdict, payload)
+        if verdict is not None:
+            self._change(verdict.station).take_verdict(verdict)
+
+    def take_model(self, payload: bytes) -> None:
+        """Take the curves of a station."""
+        model = self._decoded(Model, payload)
+        if model is not None:
+            self._change(model.station).take_model(model)
+
+    def take_alarm(self, payload: bytes) -> None:
+        """Take the last state of an alarm."""
+        alarm = self._decoded(Alarm, payload)
+        if alarm is not None:
+            self._change(alarm.station).take_alarm(alarm)
+
+    def take_status(self, payload: bytes) -> None:
+        """Take the health figures of a service."""
+        status = self._decoded(Status, payload)
+        if status is None:
+            return
+        service = self._service(status.station, status.service)
+        service["status"] = json.loads(status.encode())
+        service["seen_s"] = self._now_s
+        if status.station != SITE:
+            self._news(status.station).take_status(status)
+
+    def take_presence(self, presence: Presence) -> None:
+        """Take that a service has come or gone."""
+        _, station, _, service = presence.key.split("/")
+        self._service(station, service)["is_alive"] = presence.is_alive
+        if station != SITE:
+            self._news(station).take_presence(service, is_alive=presence.is_alive)
+
+    def advance(self, now_s: float) -> dict[str, str]:
+        """Next frame of each station that has news, as JSON. [s]."""
+        self._now_s = now_s
+        for station in self._order:
+            if station.settle(now_s, self._stale_s):
+                self._with_news[station.name] = self._changed[station.name] = station
+        self.frame_id += 1
+        with_news, self._with_news = self._with_news, {}
+        frames = {name: station.frame() for name, station in with_news.items()}
+        return {name: f'{{"id":{self.frame_id},{frame}}}' for name, frame in frames.items() if frame is not None}
+
+    def site_frame(self) -> str | None:
+        """JSON of what has changed in the overview since the last one; None if nothing has."""
+        live, self._with_live = self._with_live, {}
+        changed, self._changed = self._changed, {}
+        if not live and not changed:
+            return None
+        return self._overview([station.live() for station in live.values()], changed)
+
+    def site_state(self) -> str:
+        """JSON of the whole overview, in the form of a frame."""
+        return self._overview([station.live() for station in self._order], self.stations)
+
+    def station_state(self, name: str) -> str:
+        """JSON of all that is known of a station, in the form of a frame; of one that is not known, that."""
+        station = self.stations.get(name) or StationView(name, -1, 1)
+        return f'{{"id":{self.frame_id},{station.state()}}}'
+
+    def health(self, now_s: float) -> list[dict[str, Any]]:
+        """Services with their last figures and how long ago they came. [s]."""
+        return [
+            {key: value for key, value in service.items() if key != "seen_s"}
+            | {"age_s": round(now_s - service["seen_s"], 1) if "seen_s" in service else None}
+            for _, service in sorted(self.services.items())
+        ]
+
+    def alarms(self) -> str:
+        """JSON array of all alarms that are not back to normal."""
+        return f"[{','.join(alarm.encode().decode() for station in self._order for alarm in station.alarms)}]"
+
+    def _overview(self, live: list[str], changed: dict[str, StationView]) -> str:
+        summaries = {station.index: station.summary() for station in changed.values()}
+        return f'{{"id":{self.frame_id},"live":[{",".join(live)}],"stations":{json.dumps(summaries)}}}'
+
+    def _decoded(self, kind: type[M], payload: bytes) -> M | None:
+        try:
+            return kind.decode(payload)
+        except MessageError as error:
+            self.counts["malformed"] += 1
+            log.warning("%s", error)
+            return None
+
+    def _news(self, name: str) -> StationView:
+        station = self._station(name)
+        self._with_news[name] = station
+        return station
+
+    def _change(self, name: str) -> StationView:
+        station = self._news(name)
+        self._changed[name] = station
+        return station
+
+    def _station(self, name: str) -> StationView:
+        station = self.stations.get(name)
+        if station is None:
+            rows = next((rows for stations, rows in ROWS if len(self._order) < stations), FEWEST_ROWS)
+            station = self.stations[name] = StationView(name, len(self._order), rows)
+            self._order.append(station)
+            self._changed[name] = station
+            if rows != self._order[0].kept_rows:
+                for other in self._order:
+                    other.kept_rows = rows
+        return station
+
+    def _service(self, station: str, service: str) -> dict[str, Any]:
+        return self.services.setdefault(f"{station}/{service}", {"station": station, "service": service})

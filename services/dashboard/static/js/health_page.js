@@ -1,0 +1,36 @@
+// Services of the site: who is there, and with which figures.
+
+import { html, say } from "./dom.js";
+import { ago, words } from "./format.js";
+
+const AGAIN_MS = 2000;
+
+export function healthPage(main, showLink) {
+  document.title = "Health – wetwell";
+  const bus = html("p", { class: "note" });
+  const body = html("tbody");
+  main.append(html("div", { class: "tools" }, html("h1", {}, "Health"), bus),
+    html("section", { class: "panel scroll", "aria-label": "Services" },
+      html("table", {}, html("thead", {}, html("tr", {}, ...["Station", "Service", "Is there", "Last figures", "Figures"].map((word) => html("th", { scope: "col" }, word)))), body)));
+
+  async function load() {
+    try {
+      const { connected, services } = await (await fetch("/api/health")).json();
+      showLink(true);
+      say(bus, connected ? "connected to the bus" : "no connection to the bus");
+      body.replaceChildren(...services.map(line));
+    } catch {
+      showLink(false);
+    }
+  }
+
+  function line({ station, service, is_alive: isAlive, status, age_s: age }) {
+    const figures = Object.entries(status?.figures ?? {}).map(([name, value]) => `${words(name)} ${Number(value.toPrecision(4))}`);
+    return html("tr", {}, html("td", {}, station === "_site" ? "all" : station), html("th", { scope: "row" }, words(service)),
+      html("td", { class: isAlive ? "" : "is-gone" }, isAlive ? "yes" : "gone"), html("td", {}, ago(age)), html("td", { class: "note" }, figures.join(", ")));
+  }
+
+  load();
+  const timer = setInterval(() => document.hidden || load(), AGAIN_MS);
+  return () => clearInterval(timer);
+}

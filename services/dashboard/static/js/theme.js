@@ -1,0 +1,29 @@
+// Light, dark, or as the system has it.
+
+import { query, remember } from "./address.js";
+
+const listeners = new Set();
+
+function show(theme) {
+  document.documentElement.dataset.theme = theme;
+  listeners.forEach((listener) => listener());
+}
+
+export function startTheme() {
+  const select = document.getElementById("theme");
+  select.value = query("theme") || localStorage.getItem("theme") || "auto";
+  select.addEventListener("change", () => {
+    localStorage.setItem("theme", select.value);
+    remember({ theme: select.value === "auto" ? "" : select.value });
+    show(select.value);
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(select.value));
+}
+
+/** Calls back when colours change; returns what ends that. */
+export function onTheme(listener) {
+  listeners.add(listener);
+  return () => listeners.delete(listener);
+}
+
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -1,0 +1,110 @@
+// The wet well and its pumps, drawn and moving.
+
+import { html, mark, panel, say, svg } from "./dom.js";
+import { figure } from "./format.js";
+import { icon, isFault, state } from "./states.js";
+
+const WIDTH = 560;
+const HEIGHT = 400;
+const WELL = { left: 70, right: 530, top: 120, bottom: 330 };
+
+export function wellPanel(station, chosen, choose) {
+  const drawing = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "well", role: "img", "aria-labelledby": "well-words" });
+  const words = html("p", { id: "well-words", class: "unseen" });
+  const element = panel("Wet well and pumps", drawing, words);
+  element.classList.add("is-well");
+  let pumps = [];
+  let made = "";
+  let water;
+  let levelText;
+  let inflowText;
+  let mainText;
+
+  function make() {
+    const { left, right, top, bottom } = WELL;
+    const width = right - left;
+    water = svg("rect", { class: "water", x: left, y: top, width, height: bottom - top });
+    levelText = svg("text", { class: "big", x: left - 7, "text-anchor": "end" });
+    inflowText = svg("text", { x: 4, y: top - 42 });
+    mainText = svg("text", { x: right, y: 22, "text-anchor": "end" });
+    pumps = Array.from({ length: station.pumps }, (_, place) => pumpDrawing(place + 1, left + (width * (place + 0.5)) / station.pumps, choose));
+    const lines = levels().map(({ value, word }) => {
+      const y = levelY(value);
+      return svg("g", { class: "limit" }, svg("line", { x1: right - 14, x2: right, y1: y, y2: y }), svg("text", { x: right + 5, y: y + 3.5 }, word));
+    });
+    drawing.replaceChildren(
+      svg("line", { class: "pipe", x1: left, x2: right, y1: 34, y2: 34 }),
+      svg("path", { class: "arrow", d: `M${right} 34l-12 -7v14z` }),
+      svg("path", { class: "pipe", d: `M4 ${top - 30}H${left - 22}V${top - 8}` }),
+      svg("path", { class: "arrow", d: `M${left - 22} ${top + 4}l-7 -13h14z` }),
+      water, svg("path", { class: "wall", d: `M${left} ${top - 8}V${bottom}H${right}V${top - 8}` }),
+      ...lines, ...pumps.map((each) => each.element), levelText, inflowText, mainText,
+    );
+  }
+
+  const starts = () => station.model?.start_levels_m ?? [];
+  const highest = () => Math.max(2, ...starts()) * 1.2;
+  const levelY = (level) => WELL.bottom - ((WELL.bottom - WELL.top) * level) / highest();
+
+  function levels() {
+    const stops = station.model?.stop_levels_m ?? [];
+    return [
+      ...starts().map((value, place) => ({ value, word: `S${place + 1}` })),
+      ...stops.map((value, place) => ({ value, word: `E${place + 1}` })),
+    ];
+  }
+
+  function update() {
+    const form = `${station.pumps} ${starts()}`;
+    if (form !== made) {
+      made = form;
+      make();
+    }
+    const level = station.level;
+    const share = Number.isFinite(level) ? Math.min(1, Math.max(0, level / highest())) : 0;
+    water.style.transform = `scaleY(${share})`;
+    say(levelText, `${figure(level, 2)} m`);
+    mark(levelText, "y", (levelY(share * highest()) + 6).toFixed(0));
+    say(inflowText, station.inflow == null ? "inflow" : `inflow ${figure(station.inflow, 0)} m³/h`);
+    say(mainText, `rising main ${figure(station.totalFlow(), 0)} m³/h`);
+    for (const each of pumps) each.update(station, chosen());
+    const told = pumps.map((_, place) => `pump ${place + 1} ${station.isRunning(place + 1) ? "runs" : "stands"}, ${state(station.pumpState(place + 1)).word}`);
+    say(words, `Level ${figure(level, 2)} m. ${told.join("; ")}.`);
+  }
+
+  return { element, update };
+}
+
+function pumpDrawing(number, x, choose) {
+  const y = 292;
+  const impeller = svg("g", { class: "impeller" },
+    ...[0, 120, 240].map((turn) => svg("path", { d: "M0 0C2-8 8-12 15-11", transform: `rotate(${turn})` })));
+  const body = svg("g", { transform: `translate(${x} ${y})` }, svg("circle", { r: 22 }), impeller);
+  const pipe = svg("path", { class: "pipe", d: `M${x} ${y - 22}V34` });
+  const badge = svg("g", { class: "badge", transform: `translate(${x + 14} ${y - 36})` });
+  const flow = svg("text", { x: x + 7, y: 66 });
+  const head = svg("text", { x: x + 7, y: 82 });
+  const title = svg("text", { class: "name", x, y: 350, "text-anchor": "middle" }, `Pump ${number}`);
+  const doing = svg("text", { x, y: 367, "text-anchor": "middle" });
+  const condition = svg("text", { class: "condition", x, y: 384, "text-anchor": "middle" });
+  const element = svg("g", { class: "pump", onclick: () => choose(number) }, pipe, body, badge, flow, head, title, doing, condition);
+  let shown = "";
+
+  function update(station, chosen) {
+    const { frequency, flow: flowM3h, head: headM, power } = station.pump(number);
+    const runs = station.isRunning(number);
+    const name = station.pumpState(number);
+    mark(element, "class", `pump is-${state(name).kind}${runs ? " runs" : ""}${chosen === number ? " chosen" : ""}`);
+    mark(element, "data-state", name);
+    impeller.style.animationDuration = runs && frequency > 1 ? `${(45 / frequency).toFixed(1)}s` : "";
+    say(flow, runs ? `${figure(flowM3h, 0)} m³/h` : "");
+    say(head, runs ? `${figure(headM, 1)} m` : "");
+    say(doing, runs ? `${figure(frequency, 0)} Hz, ${figure(power, 1)} kW` : "stands");
+    say(condition, state(name).word);
+    if (shown !== name) {
+      shown = name;
+      badge.replaceChildren(...(isFault(name) ? [icon(name, 20)] : []));
+    }
+  }
+  return { element, update };
+}

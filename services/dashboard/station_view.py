@@ -1,0 +1,211 @@
+"""What the page knows of one station, and what is new since it was last sent."""
+
+import json
+from collections import deque
+from typing import Any
+
+from wetwell.protocols.alarm_messages import Alarm
+from wetwell.protocols.messages import Sample, State, Status, Verdict
+from wetwell.protocols.model_messages import Model
+from wetwell.services.dashboard.rows import live_figures, sample_row, thinned
+
+ROWS_A_FRAME = 8
+"""Most samples that go into one frame: a station that runs faster than life is drawn in steps."""
+VERDICTS = 60
+"""Verdicts that are kept of each pump."""
+LATE_SAMPLES = 120
+"""So many samples in a row that are older than the last one are no stragglers: the source has begun anew."""
+
+RANKS: dict[str, int] = {
+    "pump_and_system_fault": 7,
+    "pump_fault": 6,
+    "system_fault": 6,
+    "sensor_fault": 5,
+    "no_data": 4,
+    "unknown": 3,
+    "learning": 2,
+    "normal": 1,
+}
+"""States by how much they ask for attention."""
+
+
+class StationView:
+    """State of one station for its page and for its line in the overview.
+
+    Parameters
+    ----------
+    name : str
+    index : int
+        Its place in the overview's messages.
+    rows : int
+        Samples that are kept for charts.
+    """
+
+    def __init__(self, name: str, index: int, rows: int) -> None:
+        self.name = name
+        self.index = index
+        self.sample: Sample | None = None
+        self.seen_s = 0.0
+        self.is_stale = True
+        self.lost = 0
+        self._rows: deque[str] = deque(maxlen=rows)
+        self._late = 0
+        self._begins = False
+        self._fresh_samples: list[Sample] = []
+        self._fresh: dict[str, Any] = {}
+        self._model: str | None = None
+        self._levels: tuple[float, ...] = ()
+        self._verdicts: dict[int, deque[str]] = {}
+        self._states: dict[int, State] = {}
+        self._alarms: dict[str, Alarm] = {}
+        self._statuses: dict[str, str] = {}
+        self._alive: set[str] = set()
+
+    @property
+    def kept_rows(self) -> int | None:
+        """How many samples are kept."""
+        return self._rows.maxlen
+
+    @kept_rows.setter
+    def kept_rows(self, rows: int) -> None:
+        self._rows = deque(self._rows, maxlen=rows)
+
+    def take_sample(self, sample: Sample, now_s: float) -> bool:
+        """Take a sample that is not older than the last; whether it was one."""
+        self.seen_s = now_s
+        if self.sample is not None and sample.time <= self.sample.time:
+            self._late += 1
+            if self._late < LATE_SAMPLES:
+                return False
+            self._rows.clear()
+            self._fresh_samples.clear()
+            self._begins = True
+        elif self.sample is not None and sample.seq > self.sample.seq + 1:
+            self.lost += sample.seq - self.sample.seq - 1
+        self._late = 0
+        self.sample = sample
+        self._fresh_samples.append(sample)
+        return True
+
+    def take_verdict(self, verdict: Verdict) -> None:
+        """Take a verdict; one that came before is left out."""
+        text = verdict.encode().decode()
+        kept = self._verdicts.setdefault(verdict.pump, deque(maxlen=VERDICTS))
+        if text in kept:
+            return
+        kept.append(text)
+        self._states[verdict.pump] = verdict.state
+        self._fresh.setdefault("verdicts", []).append(text)
+
+    def take_model(self, model: Model) -> None:
+        """Take the curves."""
+        self._model = model.encode().decode()
+        self._levels = model.start_levels_m
+        self._fresh["model"] = self._model
+
+    def take_alarm(self, alarm: Alarm) -> None:
+        """Take the last state of an alarm."""
+        self._alarms[alarm.id] = alarm
+        self._fresh.setdefault("alarms", {})[alarm.id] = alarm.encode().decode()
+
+    def take_status(self, status: Status) -> None:
+        """Take the health figures of a service."""
+        self._statuses[status.service] = status.encode().decode()
+        self._fresh.setdefault("statuses", {})[status.service] = self._statuses[status.service]
+
+    def take_presence(self, service: str, *, is_alive: bool) -> None:
+        """Take that a service has come or gone."""
+        (self._alive.add if is_alive else self._alive.discard)(service)
+        self._fresh["alive"] = True
+
+    def settle(self, now_s: float, stale_s: float) -> bool:
+        """Notice that samples have stopped or come again; whether either has happened."""
+        is_stale = self.sample is None or now_s - self.seen_s > stale_s
+        if is_stale == self.is_stale:
+            return False
+        self.is_stale = is_stale
+        self._fresh["stale"] = True
+        return True
+
+    def frame(self) -> str | None:
+        """JSON of what is new since the last frame, without the closing brace's `id`; None if nothing is."""
+        rows = [sample_row(sample) for sample in thinned(self._fresh_samples, ROWS_A_FRAME)]
+        fresh, self._fresh, self._fresh_samples = self._fresh, {}, []
+        self._rows.extend(rows)
+        begins, self._begins = self._begins, False
+        if not rows and not fresh:
+            return None
+        parts = self._live(rows)
+        if begins:
+            parts.append('"begins":true')
+        if "verdicts" in fresh:
+            parts.append(f'"verdicts":[{",".join(fresh["verdicts"])}]')
+        if "model" in fresh:
+            parts.append(f'"model":{fresh["model"]}')
+        for name in ("alarms", "statuses"):
+            if name in fresh:
+                parts.append(f'"{name}":[{",".join(fresh[name].values())}]')
+        if "alive" in fresh:
+            parts.append(f'"alive":{json.dumps(sorted(self._alive))}')
+        return ",".join(parts)
+
+    def state(self) -> str:
+        """JSON of all that is known, in the form of a frame."""
+        verdicts = [text for kept in self._verdicts.values() for text in kept]
+        alarms = [alarm.encode().decode() for alarm in self._alarms.values()]
+        parts = [
+            *self._live(list(self._rows)),
+            '"begins":true',
+            f'"verdicts":[{",".join(verdicts)}]',
+            f'"alarms":[{",".join(alarms)}]',
+            f'"statuses":[{",".join(self._statuses.values())}]',
+            f'"alive":{json.dumps(sorted(self._alive))}',
+        ]
+        if self._model is not None:
+            parts.append(f'"model":{self._model}')
+        return ",".join(parts)
+
+    def summary(self) -> dict[str, Any]:
+        """What the overview shows of the station beside its live figures."""
+        pumps = len(self.sample.pumps) if self.sample is not None else max(self._states, default=0)
+        active = [alarm for alarm in self._alarms.values() if alarm.state != "normal"]
+        return {
+            "name": self.name,
+            "state": self.worst_state,
+            "pumps": [self._states.get(pump, "unknown") for pump in range(1, pumps + 1)],
+            "levels": self._levels[-1:],
+            "alarms": len(active),
+            "unacknowledged": sum(alarm.state in {"unacknowledged", "returned"} for alarm in active),
+        }
+
+    @property
+    def alarms(self) -> list[Alarm]:
+        """Alarms that are not back to normal."""
+        return [alarm for alarm in self._alarms.values() if alarm.state != "normal"]
+
+    @property
+    def worst_state(self) -> str:
+        """State of its worst pump, or `no_data` while no samples come."""
+        states: list[str] = list(self._states.values())
+        if self.is_stale:
+            states.append("no_data")
+        return max(states, key=lambda state: RANKS[state], default="unknown")
+
+    def live(self) -> str:
+        """JSON array of place, time in ms, level, flow, power and running pumps."""
+        if self.sample is None:
+            return f"[{self.index},null,null,null,null,[]]"
+        return f"[{self.index},{self.sample.time // 1_000_000},{live_figures(self.sample)}]"
+
+    def _live(self, rows: list[str]) -> list[str]:
+        sample = self.sample
+        running = [] if sample is None else [pump.running for pump in sample.pumps]
+        quality = None if sample is None else sample.quality
+        return [
+            f'"rows":[{",".join(rows)}]',
+            f'"running":{json.dumps(running)}',
+            f'"quality":{json.dumps(quality)}',
+            f'"state":"{self.worst_state}"',
+            f'"stale":{json.dumps(self.is_stale)}',
+            f'"lost":{self.lost}',
+        ]

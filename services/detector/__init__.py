@@ -1,0 +1,1 @@
+"""The detector daemon: samples from the bus in, verdicts on the bus out."""

@@ -1,0 +1,96 @@
+"""The state of a station's judge on disk: written whole, read back at the start."""
+
+import contextlib
+import json
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from wetwell.detector.pipeline import Detector
+from wetwell.detector.snapshot import SnapshotError
+from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.messages import Verdict
+from wetwell.protocols.whole_file import whole_file
+
+log = logging.getLogger(__name__)
+
+SCHEMA = "wetwell.detector-checkpoint/1"
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was told: answers to the orders that were carried out, by their ids, and the last verdict of each pump."""
+
+    answers: Mapping[str, Verdict]
+    verdicts: Sequence[Verdict] = ()
+
+
+class Checkpoint:
+    """A file with what was told, in its first line, and the last snapshot of the detector.
+
+    Without a folder nothing is kept. A file that begins with the snapshot, as version 0.1 wrote it, is read too.
+    """
+
+    def __init__(self, folder: Path | None, station: str) -> None:
+        self._path = None if folder is None else folder / f"{station}.detector.json"
+
+    def restore(self, detector: Detector) -> Told | None:
+        """Let the detector go on from the file.
+
+        What was told before, or None where there is nothing to go on from: a file that is refused is told, put aside
+        as `.refused`, and learning starts again.
+
+        Raises
+        ------
+        ConfigError
+            If the folder cannot be used.
+        """
+        if self._path is None:
+            return None
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            data = self._path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise ConfigError(f"detector.state_dir: {self._path}: {error.strerror or error}") from error
+        try:
+            told, snapshot = _parted(data)
+            detector.restore(snapshot)
+        except SnapshotError as error:
+            aside = self._path.with_suffix(".refused")
+            with contextlib.suppress(OSError):
+                self._path.replace(aside)
+            log.warning("%s; kept as %s, learning starts again", error, aside.name)
+            return None
+        return told
+
+    def save(self, detector: Detector, told: Told) -> None:
+        """Write the state; a disk that refuses is told, and the last file stays."""
+        if self._path is None:
+            return
+        head = {
+            "schema": SCHEMA,
+            "answers": {name: answer.model_dump(mode="json") for name, answer in told.answers.items()},
+            "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
+        }
+        try:
+            with whole_file(self._path) as file:
+                file.write(json.dumps(head).encode() + b"\n")
+                file.write(detector.snapshot())
+        except RecordingError as error:
+            log.warning("%s", error)
+
+
+def _parted(data: bytes) -> tuple[Told, bytes]:
+    """What was told, and the snapshot, in a file."""
+    head, _, rest = data.partition(b"\n")
+    try:
+        header = json.loads(head)
+        if not isinstance(header, dict) or header.get("schema") != SCHEMA:
+            return Told({}), data
+        answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
+        return Told(answers, [Verdict.model_validate(verdict) for verdict in header["verdicts"]]), rest
+    except (ValueError, KeyError, AttributeError, TypeError) as error:
+        raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error

@@ -1,0 +1,161 @@
+"""From what a site shows to what is wrong with it. Pure."""
+
+from collections.abc import Iterator, Sequence
+
+from wetwell.protocols.keys import SITE
+from wetwell.protocols.messages import Sample, Status
+from wetwell.protocols.stamps import NS_PER_S, to_iso
+from wetwell.services.doctor.finding import Finding, Level
+from wetwell.services.doctor.survey import Survey
+from wetwell.services.health.board import figure_faults
+
+MAX_SKEW_S = 60.0
+MAX_VERDICT_AGE_S = 86_400.0
+LEAST_FREE_BYTES = 1_000_000_000
+SITE_SERVICES = {
+    "historian": "nothing is kept; start it: wetwell historian",
+    "alarms": "nobody is called; start it: wetwell alarms",
+    "dashboard": "there is no page; start it: wetwell dashboard",
+}
+
+
+def findings_of(survey: Survey, expected: Sequence[str], max_sample_age_s: float) -> Iterator[Finding]:
+    """All that a survey shows, station by station, then the services of the site.
+
+    Parameters
+    ----------
+    survey : Survey
+    expected : sequence of str
+        Stations that must be there.
+    max_sample_age_s : float
+        From `health.max_sample_age_s`, for the figures of the services. [s]
+    """
+    stations = sorted(survey.stations | set(expected))
+    if not stations:
+        yield Finding(
+            "samples", "error", "no station is on the bus", "start a source: wetwell gateway, simulator or replay"
+        )
+    for station in stations:
+        yield from _samples(survey, station)
+        yield from _detector(survey, station)
+        yield _history(survey, station)
+    yield from _services(survey)
+    yield from _alarms(survey)
+    for (station, service), status in sorted(survey.statuses.items()):
+        yield from _figures(survey, station, service, status, max_sample_age_s)
+
+
+def _samples(survey: Survey, station: str) -> Iterator[Finding]:
+    heard = survey.samples.get(station, [])
+    if not heard:
+        source = next((name for name in ("gateway", "simulator", "replay") if (station, name) in survey.alive), None)
+        advice = f"the {source} runs: look at its log" if source else "nothing publishes it: start its gateway"
+        text = f"station '{station}': no sample within {survey.seconds:g} s"
+        yield Finding("samples", "error", text, advice)
+        return
+    rate = len(heard) / survey.seconds
+    last_ns, last = heard[-1]
+    yield Finding("samples", "ok", f"station '{station}': {rate:.1f} samples a second, last {to_iso(last.time)}")
+    span_s = (last.time - heard[0][1].time) / NS_PER_S
+    if span_s > 2.0 * survey.seconds + 2.0:
+        text = f"station '{station}': its time runs {span_s / survey.seconds:.0f} times as fast as life"
+        yield Finding("clock", "ok", f"{text}, so its clock is not compared")
+    else:
+        skew_s = (last.time - last_ns) / NS_PER_S
+        level: Level = "ok" if abs(skew_s) <= MAX_SKEW_S else "warning"
+        advice = (
+            "" if level == "ok" else "set the clock of PLC or gateway (NTP), or let the gateway stamp the samples"
+        )
+        yield Finding("clock", level, f"station '{station}': samples are {skew_s:+.1f} s from this clock", advice)
+    yield from _quality(station, [sample for _, sample in heard])
+
+
+def _quality(station: str, samples: Sequence[Sample]) -> Iterator[Finding]:
+    bad = sum(sample.quality != "good" for sample in samples) / len(samples)
+    if bad > 0.0:
+        text = f"station '{station}': {bad:.0%} of the samples are not of good quality"
+        yield Finding("quality", "warning", text, "see the gateway's log: heartbeat, exceptions of the PLC")
+    missing = [name for name in ("level_m",) if all(getattr(sample, name) is None for sample in samples)]
+    for number in range(1, len(samples[-1].pumps) + 1):
+        readings = [sample.pumps[number - 1] for sample in samples if len(sample.pumps) >= number]
+        missing += [
+            f"pump{number}_{name}"
+            for name in ("frequency_hz", "flow_m3h", "head_m")
+            if all(getattr(reading, name) is None for reading in readings)
+        ]
+    if missing:
+        text = f"station '{station}': never a value of {', '.join(missing)}"
+        yield Finding("quality", "warning", text, "check register map and meter; without them faults stay unknown")
+    elif bad == 0.0:
+        yield Finding("quality", "ok", f"station '{station}': all needed values are there")
+
+
+def _detector(survey: Survey, station: str) -> Iterator[Finding]:
+    if (station, "detector") not in survey.alive:
+        advice = "nobody judges it; start one: wetwell detector --station FILE"
+        yield Finding("detector", "error", f"station '{station}': no detector is running", advice)
+    verdicts = [verdict for (name, _), verdict in sorted(survey.verdicts.items()) if name == station]
+    if not verdicts:
+        text = f"station '{station}': no verdict yet"
+        yield Finding("verdicts", "warning", text, "it comes with the end of the first run of a pump")
+    heard = survey.samples.get(station)
+    for verdict in verdicts:
+        age_s = 0.0 if not heard else (heard[-1][1].time - verdict.time) / NS_PER_S
+        text = f"station '{station}' pump {verdict.pump}: {verdict.state}, {max(age_s, 0.0) / 3600:.1f} h ago"
+        if age_s > MAX_VERDICT_AGE_S:
+            advice = "has the pump run? is the detector the one of this station?"
+            yield Finding("verdicts", "warning", text, advice)
+        else:
+            yield Finding("verdicts", "ok", text)
+
+
+def _history(survey: Survey, station: str) -> Finding:
+    history = survey.histories.get(station)
+    if history is None:
+        is_error = (SITE, "historian") in survey.alive
+        advice = "it runs but does not answer: look at its log" if is_error else "start it: wetwell historian"
+        level: Level = "error" if is_error else "warning"
+        return Finding("history", level, f"station '{station}': the historian does not answer", advice)
+    if history.error:
+        return Finding("history", "error", f"station '{station}': {history.error}", "look at the historian's log")
+    return Finding("history", "ok", f"station '{station}': the historian answers")
+
+
+def _services(survey: Survey) -> Iterator[Finding]:
+    for service, advice in SITE_SERVICES.items():
+        if (SITE, service) in survey.alive:
+            yield Finding("services", "ok", f"{service} is running")
+        else:
+            yield Finding("services", "warning", f"{service} is not running", advice)
+
+
+def _alarms(survey: Survey) -> Iterator[Finding]:
+    if survey.report is None:
+        if (SITE, "alarms") in survey.alive:
+            yield Finding("alarms", "error", "alarms runs but does not answer", "look at its log")
+        return
+    standing = ", ".join(f"{count} {state}" for state, count in survey.report.standing.items()) or "none yet"
+    yield Finding("alarms", "ok", f"alarms answers; alarms: {standing}")
+    if survey.report.rates.get("is_flood"):
+        yield Finding("alarms", "warning", "there is an alarm flood", "wetwell alarms report shows which they are")
+    for figure in survey.report.chattering:
+        text = f"station '{figure.station}': {figure.alarm} chatters, {figure.transitions} changes within the hour"
+        yield Finding("alarms", "warning", text, "give it a longer delay (alarms.rules), or shelve it")
+
+
+def _figures(
+    survey: Survey, station: str, service: str, status: Status, max_sample_age_s: float
+) -> Iterator[Finding]:
+    if (station, service) not in survey.alive:
+        return  # the last word of one that has gone
+    place = "" if station == SITE else f" of '{station}'"
+    faults = figure_faults(status.figures, max_sample_age_s)
+    if status.state == "waiting":
+        faults.append("waits: what it needs does not answer")
+    if status.figures.get("dropped", 0.0) > 0.0:
+        faults.append(f"{status.figures['dropped']:.0f} messages dropped since its start: it is too slow")
+    free = status.figures.get("disk_free_bytes")
+    if free is not None and free < LEAST_FREE_BYTES:
+        faults.append(f"only {free / 1e6:.0f} MB are free on its disk")
+    for fault in faults:
+        yield Finding("health", "error", f"{service}{place}: {fault}", "look at its log and at /healthz")

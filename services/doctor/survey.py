@@ -1,0 +1,108 @@
+"""What a site shows to a client that listens to it for a few seconds."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from wetwell.protocols.alarm_messages import AlarmReport
+from wetwell.protocols.history_messages import History, HistoryQuery
+from wetwell.protocols.keys import (
+    SITE,
+    alarm_report_key,
+    alive_key,
+    history_key,
+    sample_key,
+    status_key,
+    verdict_key,
+)
+from wetwell.protocols.link import Bus, Presence, Subscription
+from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.services.clock import now_ns
+
+T = TypeVar("T")
+M = TypeVar("M", bound=Message)
+
+ANSWER_S = 3.0
+HOUR_NS = 3600 * NS_PER_S
+
+
+@dataclass
+class Survey:
+    """What was heard, by station. `samples` are with the time of day at which each came."""
+
+    seconds: float
+    samples: dict[str, list[tuple[int, Sample]]] = field(default_factory=dict)
+    verdicts: dict[tuple[str, int], Verdict] = field(default_factory=dict)
+    statuses: dict[tuple[str, str], Status] = field(default_factory=dict)
+    alive: set[tuple[str, str]] = field(default_factory=set)
+    histories: dict[str, History] = field(default_factory=dict)
+    report: AlarmReport | None = None
+
+    @property
+    def stations(self) -> set[str]:
+        """Stations of which anything was heard."""
+        heard = {*self.samples, *(station for station, _ in [*self.alive, *self.statuses, *self.verdicts])}
+        return heard - {SITE}
+
+
+async def listen(bus: Bus, seconds: float) -> Survey:
+    """Listen to a site for so long, then ask historian and alarms."""
+    survey = Survey(seconds)
+
+    def take_sample(sample: Sample) -> None:
+        survey.samples.setdefault(sample.station, []).append((now_ns(), sample))
+
+    def take_verdict(verdict: Verdict) -> None:
+        last = survey.verdicts.get((verdict.station, verdict.pump))
+        if last is None or verdict.time >= last.time:
+            survey.verdicts[verdict.station, verdict.pump] = verdict
+
+    def take_status(status: Status) -> None:
+        survey.statuses[status.station, status.service] = status
+
+    def take_presence(presence: Presence) -> None:
+        _, station, _, service = presence.key.split("/", 3)
+        (survey.alive.add if presence.is_alive else survey.alive.discard)((station, service))
+
+    tasks = [
+        asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, take_sample))),
+        asyncio.create_task(_each(bus.subscribe(verdict_key("*"), history=1), _decoding(Verdict, take_verdict))),
+        asyncio.create_task(_each(bus.subscribe(status_key("*", "*"), history=1), _decoding(Status, take_status))),
+        asyncio.create_task(_each(bus.watch(alive_key("*", "*")), take_presence)),
+    ]
+    await asyncio.sleep(seconds)
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+    survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=ANSWER_S))
+    for station in sorted(survey.stations):
+        last_ns = survey.samples[station][-1][1].time if station in survey.samples else now_ns()
+        query = HistoryQuery(kind="samples", start=last_ns - HOUR_NS, end=last_ns, points=10)
+        history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S))
+        if history is not None:
+            survey.histories[station] = history
+    return survey
+
+
+async def _each(subscription: Subscription[T], take: Callable[[T], None]) -> None:
+    while True:
+        for message in await subscription.receive():
+            take(message)
+
+
+def _decoding(message: type[M], take: Callable[[M], None]) -> Callable[[bytes], None]:
+    def decode(payload: bytes) -> None:
+        with contextlib.suppress(MessageError):  # the daemons count what is no message
+            take(message.decode(payload))
+
+    return decode
+
+
+def _first(message: type[M], payloads: list[bytes]) -> M | None:
+    for payload in payloads:
+        with contextlib.suppress(MessageError):
+            return message.decode(payload)
+    return None

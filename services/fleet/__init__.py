@@ -1,0 +1,1 @@
+"""Many stations on many machines: shards of stations as long-lived tasks of Dask."""

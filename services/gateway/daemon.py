@@ -1,0 +1,73 @@
+"""The gateway daemon: any number of PLCs in, samples on the bus out."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable, Coroutine, Sequence
+from typing import Any
+
+from wetwell.protocols.device_map import Plc
+from wetwell.protocols.keys import SITE, sample_key
+from wetwell.protocols.link import Bus
+from wetwell.protocols.messages import Sample
+from wetwell.services.bus import connect
+from wetwell.services.daemon import report_health, stop_event, until
+from wetwell.services.gateway.poller import PlcPoller
+from wetwell.services.settings import Settings
+
+log = logging.getLogger(__name__)
+
+SERVICE = "gateway"
+HISTORY = 600
+"""Samples that the bus keeps for late joiners: ten minutes at one a second."""
+
+
+async def serve_gateway(settings: Settings, plcs: Sequence[Plc]) -> None:
+    """Poll PLCs until stopped. A router or a PLC that is away is waited for."""
+    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
+        running = asyncio.create_task(_run(settings, plcs, stack), name="gateway.run")
+        await until(stop, running)
+
+
+async def _run(settings: Settings, plcs: Sequence[Plc], stack: contextlib.AsyncExitStack) -> None:
+    bus = stack.enter_context(await connect(settings))
+    await poll_all(bus, plcs, settings.health.period_s, settings.gateway.longest_wait_s)
+
+
+async def poll_all(bus: Bus, plcs: Sequence[Plc], health_s: float, longest_wait_s: float) -> None:
+    """Poll PLCs for ever, one task each; they begin spread over a second, so that not all are asked at once."""
+    pollers = [PlcPoller(plc, _publisher(bus, plc.station), longest_wait_s) for plc in plcs]
+    log.info("polling %d PLCs", len(pollers))
+    async with asyncio.TaskGroup() as group:
+        for index, poller in enumerate(pollers):
+            delay_s = index / len(pollers) * min(poller.plc.device.period_s, 1.0)
+            name = poller.plc.station
+            group.create_task(_later(delay_s, poller.run), name=f"gateway.poll.{name}")
+            group.create_task(
+                _later(delay_s, _reporter(bus, poller, health_s)),
+                name=f"gateway.health.{name}",
+            )
+        group.create_task(
+            report_health(bus, SITE, SERVICE, health_s, lambda: _site_figures(pollers)), name="gateway.health"
+        )
+
+
+async def _later(delay_s: float, begin: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    await asyncio.sleep(delay_s)
+    await begin()
+
+
+def _reporter(bus: Bus, poller: PlcPoller, health_s: float) -> Callable[[], Coroutine[Any, Any, None]]:
+    return lambda: report_health(
+        bus, poller.plc.station, SERVICE, health_s, poller.figures, condition=poller.condition
+    )
+
+
+def _publisher(bus: Bus, station: str) -> Callable[[Sample], None]:
+    publisher = bus.publisher(sample_key(station), history=HISTORY)
+    return lambda sample: publisher.put(sample.encode())
+
+
+def _site_figures(pollers: Sequence[PlcPoller]) -> dict[str, float]:
+    states = [poller.condition()[0] for poller in pollers]
+    return {"plcs": float(len(states)), "plcs_waiting": float(states.count("waiting"))}

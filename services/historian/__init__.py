@@ -1,0 +1,1 @@
+"""The historian: keeps what the bus says, and answers what was."""

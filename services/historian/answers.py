@@ -1,0 +1,116 @@
+"""Answers to the questions of `HistoryQuery`, from any store."""
+
+import json
+from collections.abc import Mapping
+
+from wetwell.protocols.history_messages import History, HistoryQuery, Kind
+from wetwell.protocols.keys import SITE
+from wetwell.protocols.messages import MessageError
+from wetwell.protocols.stamps import to_iso
+from wetwell.services.historian.hours import HOUR_NS, Hours, joined_hours
+from wetwell.services.historian.samples import Floats, Integers, Samples, merged
+from wetwell.services.historian.store import DAY_NS, StationSpan, Store, StoreError, blocks, day_of
+from wetwell.services.historian.summary import Summary, joined
+
+
+def answer(store: Store, station: str, payload: bytes) -> History:
+    """Answer to a question about a station; what is wrong with it, or with the store, is said in it."""
+    try:
+        query = HistoryQuery.decode(payload)
+    except MessageError as error:
+        return History(station=station, kind="samples", error=str(error))
+    try:
+        return _answer(store, station, query)
+    except StoreError as error:
+        return History(station=station, kind=query.kind, error=str(error))
+
+
+def _answer(store: Store, station: str, query: HistoryQuery) -> History:
+    spans = {span.station: span for span in store.stations()}
+    if query.kind == "stations":
+        return History(station=SITE, kind="stations", messages=tuple(map(_of_station, spans.values())))
+    if station not in spans:
+        return History(station=station, kind=query.kind, error=f"station '{station}' is not known")
+    if query.kind in ("verdicts", "alarms"):
+        payloads = store.events(query.kind, station, query.start, query.end, query.points)
+        return History(station=station, kind=query.kind, messages=tuple(map(json.loads, payloads)))
+    span = spans[station]
+    start_ns, end_ns = max(query.start, span.first_ns), min(query.end, span.last_ns + 1)
+    if start_ns >= end_ns:
+        return History(station=station, kind=query.kind)
+    of_kind = _of_kpi if query.kind == "kpi" else _of_raw if query.raw else _of_samples
+    return of_kind(store, station, start_ns, end_ns, query.points)
+
+
+def _of_station(span: StationSpan) -> dict[str, str | None]:
+    has_samples = span.last_ns >= span.first_ns
+    return {
+        "station": span.station,
+        "first": to_iso(span.first_ns) if has_samples else None,
+        "last": to_iso(span.last_ns) if has_samples else None,
+    }
+
+
+def _of_samples(store: Store, station: str, start_ns: int, end_ns: int, points: int) -> History:
+    """The samples if they are few, else a summary, block by block."""
+    span_ns = -(-(end_ns - start_ns) // points)
+    few: list[Samples] = []
+    parts: list[Summary] = []
+    for block in blocks(store, station, start_ns, end_ns):
+        few.append(block)
+        if parts or sum(map(len, few)) > points:
+            parts += [Summary.of(each).over(start_ns, span_ns) for each in few]
+            few = []
+    # after the samples: these turn into minutes, and what is seen twice changes no mean, least or largest value
+    parts += [part.over(start_ns, span_ns) for part in store.summaries(station, start_ns, end_ns)]
+    if parts:
+        parts += [Summary.of(each).over(start_ns, span_ns) for each in few]
+    else:
+        samples = merged(few)
+        return _columns(station, "samples", samples.time_ns, _by_name(samples))
+    summary = joined(parts).over(start_ns, span_ns)
+    return _columns(station, "samples", summary.time_ns, summary.columns())
+
+
+def _of_raw(store: Store, station: str, start_ns: int, end_ns: int, points: int) -> History:
+    found: list[Samples] = []
+    for block in blocks(store, station, start_ns, end_ns):
+        found.append(block)
+        if sum(map(len, found)) > points:
+            break
+    every = merged(found)
+    samples = every.take(slice(0, points))
+    columns = {"seq": samples.seq.astype(float), "quality": samples.quality.astype(float)} | _by_name(samples)
+    history = _columns(station, "samples", samples.time_ns, columns)
+    return history.model_copy(update={"more": len(every) > points})
+
+
+def _of_kpi(store: Store, station: str, start_ns: int, end_ns: int, points: int) -> History:
+    """Hours that begin in the span, or if they are too many the days that they belong to."""
+    start_ns = -(-start_ns // HOUR_NS) * HOUR_NS if start_ns % HOUR_NS else start_ns
+    hours = hours_of(store, station, start_ns, end_ns)
+    if len(hours) > points:
+        hours = hours.over(DAY_NS)
+    columns = {name: column[-points:] for name, column in hours.columns().items()}
+    return _columns(station, "kpi", hours.hour_ns[-points:], columns)
+
+
+def hours_of(store: Store, station: str, start_ns: int, end_ns: int) -> Hours:
+    """Figures of the hours that begin in a span: those that are kept, and of the other days from the samples."""
+    hours = store.hours(station, start_ns, end_ns)
+    kept_ns = {day_of(hour_ns) for hour_ns in hours.hour_ns.tolist()}
+    for day_ns in store.days_ns(station, start_ns, end_ns):
+        if day_ns not in kept_ns:
+            around = store.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
+            first_ns, last_ns = max(day_ns, start_ns), min(day_ns + DAY_NS, end_ns)
+            hours = joined_hours(hours, Hours.of_samples(around, first_ns, last_ns))
+    return hours
+
+
+def _by_name(samples: Samples) -> dict[str, Floats]:
+    return dict(zip(samples.columns, samples.values.T, strict=True))
+
+
+def _columns(station: str, kind: Kind, time_ns: Integers, columns: Mapping[str, Floats]) -> History:
+    lists = {name: tuple(column.tolist()) for name, column in columns.items()}
+    return History.model_construct(station=station, kind=kind, time=tuple(time_ns.tolist()), columns=lists)

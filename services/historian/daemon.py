@@ -1,0 +1,90 @@
+"""The historian daemon: bus, clock and threads around `Historian`."""
+
+import asyncio
+import contextlib
+import logging
+
+from wetwell.protocols.keys import SITE, alarm_key, history_key, sample_key, verdict_key
+from wetwell.protocols.link import Bus, Request, Subscription
+from wetwell.services.bus import connect
+from wetwell.services.clock import now_ns
+from wetwell.services.daemon import report_health, stop_event, until
+from wetwell.services.historian.core import Historian, PayloadKind
+from wetwell.services.historian.opening import open_store
+from wetwell.services.settings import Settings
+
+log = logging.getLogger(__name__)
+
+SAMPLE_HISTORY = 600
+VERDICT_HISTORY = 100
+ALARM_HISTORY = 1
+CAPACITY = 100_000
+"""Messages of one kind that wait to be taken: 100 s of a thousand stations."""
+
+SLICE = 1_000
+"""Payloads that are taken before the other tasks have their turn."""
+
+
+async def serve_historian(settings: Settings) -> None:
+    """Keep history until stopped; what has come until then is kept. A router that is away is waited for."""
+    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
+        store = stack.enter_context(open_store(settings.historian))
+        historian = Historian(store, spool_rows=settings.historian.spool_rows)
+        stack.callback(lambda: historian.commit(now_ns()))
+        running = asyncio.create_task(_run(settings, historian, stack), name="historian.run")
+        await until(stop, running)
+
+
+async def _run(settings: Settings, historian: Historian, stack: contextlib.AsyncExitStack) -> None:
+    bus = stack.enter_context(await connect(settings))
+    await keep(bus, historian, settings.historian.commit_s, settings.historian.maintain_s, settings.health.period_s)
+
+
+async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: float, health_s: float) -> None:
+    """Take, commit, maintain, answer and report for ever."""
+    subscriptions: dict[PayloadKind, Subscription[bytes]] = {
+        "samples": bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
+        "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
+        "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
+    }
+    questions = bus.answer(history_key("*"))
+
+    def figures() -> dict[str, float]:
+        dropped = sum(subscription.dropped for subscription in subscriptions.values())
+        return historian.figures(now_ns()) | {"dropped": float(dropped)}
+
+    async with asyncio.TaskGroup() as group:
+        for kind, subscription in subscriptions.items():
+            group.create_task(_take(historian, kind, subscription), name=f"historian.{kind}")
+        group.create_task(_commit(historian, commit_s), name="historian.commit")
+        group.create_task(_maintain(historian, maintain_s), name="historian.maintain")
+        group.create_task(_answer(historian, questions), name="historian.answer")
+        group.create_task(report_health(bus, SITE, "historian", health_s, figures), name="historian.health")
+
+
+async def _take(historian: Historian, kind: PayloadKind, subscription: Subscription[bytes]) -> None:
+    while True:
+        for number, payload in enumerate(await subscription.receive(), start=1):
+            historian.take(kind, payload)
+            if number % SLICE == 0:
+                await asyncio.sleep(0)
+
+
+async def _commit(historian: Historian, period_s: float) -> None:
+    while True:
+        await asyncio.sleep(period_s)
+        await asyncio.to_thread(historian.commit, now_ns())
+
+
+async def _maintain(historian: Historian, period_s: float) -> None:
+    while True:
+        while await asyncio.to_thread(historian.maintain, now_ns()):
+            pass
+        await asyncio.sleep(period_s)
+
+
+async def _answer(historian: Historian, questions: Subscription[Request]) -> None:
+    while True:
+        for request in await questions.receive():
+            _, station, _ = request.key.split("/")
+            request.reply(await asyncio.to_thread(historian.answer, station, request.payload))

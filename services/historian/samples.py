@@ -1,0 +1,172 @@
+"""Samples as the historian holds them: packed rows on the way to a store, arrays on the way back."""
+
+import re
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.messages import Quality
+from wetwell.protocols.readings import Readings
+from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+QUALITIES: tuple[str, ...] = get_args(Quality)
+"""A sample's quality is kept as its place in here."""
+
+_NAN = float("nan")
+
+
+class SampleRow(NamedTuple):
+    """One sample, packed: `data` holds its values as little-endian float64 in the order of `columns_of`."""
+
+    station: str
+    time_ns: int
+    seq: int
+    quality: int
+    data: bytes
+
+
+@lru_cache
+def columns_of(pumps: int) -> tuple[str, ...]:
+    """Names of the values of a station with so many pumps, as in a recording.
+
+    Examples
+    --------
+    >>> columns_of(1)[:4]
+    ('level_m', 'inflow_m3h', 'pump1_frequency_hz', 'pump1_flow_m3h')
+    """
+    return (*STATION_COLUMNS, *(f"pump{pump}_{name}" for pump in range(1, pumps + 1) for name in PUMP_QUANTITIES))
+
+
+def pumps_of(columns: Sequence[str]) -> int:
+    """Number of pumps that some column names speak of."""
+    return max((int(match[1]) for match in map(re.compile(r"pump(\d+)_").match, columns) if match), default=0)
+
+
+def pack(station: str, sample: Readings) -> SampleRow:
+    """Row of a sample; what has no value is NaN."""
+    values: list[float | None] = [sample.level_m, sample.inflow_m3h]
+    for pump in sample.pumps:
+        values += (pump.frequency_hz, pump.flow_m3h, pump.head_m, pump.power_kw, pump.running)
+    data = _packer(len(values)).pack(*[_NAN if value is None else value for value in values])
+    return SampleRow(station, sample.time, sample.seq, QUALITIES.index(sample.quality), data)
+
+
+@lru_cache
+def _packer(values: int) -> struct.Struct:
+    return struct.Struct(f"<{values}d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Samples:
+    """Samples of one station in the order of time and `seq`, each once.
+
+    Attributes
+    ----------
+    time_ns, seq, quality : (n,) int64
+    values : (n, 2 + 5 pumps) float64
+        Columns as in `columns_of`; NaN is "no value".
+    """
+
+    time_ns: Integers
+    seq: Integers
+    quality: Integers
+    values: Floats
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    @property
+    def pumps(self) -> int:
+        """Number of pumps that the columns have room for."""
+        return (int(self.values.shape[1]) - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return columns_of(self.pumps)
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[tuple[int, int, int, bytes]]) -> "Samples":
+        """Samples of rows (time, seq, quality, data) in any order; of the same time and `seq` the first counts."""
+        width = max((len(row[3]) for row in rows), default=8 * len(STATION_COLUMNS)) // 8
+        if all(len(row[3]) == 8 * width for row in rows):
+            values = np.frombuffer(b"".join(row[3] for row in rows), dtype="<f8").reshape(len(rows), width)
+        else:
+            values = np.full((len(rows), width), np.nan)
+            for number, row in enumerate(rows):
+                values[number, : len(row[3]) // 8] = np.frombuffer(row[3], dtype="<f8")
+        keys = np.array([row[:3] for row in rows], dtype=np.int64).reshape(len(rows), 3)
+        return cls(time_ns=keys[:, 0], seq=keys[:, 1], quality=keys[:, 2], values=values).in_order()
+
+    @classmethod
+    def of_recording(cls, recording: Recording) -> "Samples":
+        """Samples of a recording; of the same time the first counts. It has no `seq`: all are 0."""
+        columns = [recording.column(name) for name in columns_of(recording.pumps)]
+        zeros = np.zeros(len(recording), dtype=np.int64)
+        values = np.stack(columns, axis=1) if columns else np.empty((0, 0))
+        return cls(time_ns=recording.time_ns, seq=zeros, quality=zeros, values=values).in_order()
+
+    def in_order(self) -> "Samples":
+        """The same in order, each once."""
+        if np.all(_follows(self.time_ns, self.seq)):
+            return self
+        order = np.lexsort((np.arange(len(self)), self.seq, self.time_ns))
+        is_new = np.r_[True, _follows(self.time_ns[order], self.seq[order])] if len(self) else order > 0
+        return self.take(order[is_new])
+
+    def take(self, rows: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice) -> "Samples":
+        """Some of the rows."""
+        return Samples(
+            time_ns=self.time_ns[rows], seq=self.seq[rows], quality=self.quality[rows], values=self.values[rows]
+        )
+
+    def between(self, start_ns: int, end_ns: int) -> "Samples":
+        """Those from `start_ns` until before `end_ns`."""
+        first, last = np.searchsorted(self.time_ns, [start_ns, end_ns])
+        return self.take(slice(first, last))
+
+    def padded(self, pumps: int) -> Floats:
+        """(n, 2 + 5 pumps) values with room for more pumps."""
+        missing = len(columns_of(pumps)) - self.values.shape[1]
+        return np.pad(self.values, ((0, 0), (0, missing)), constant_values=np.nan) if missing > 0 else self.values
+
+    def recording(self, pumps: int | None = None) -> Recording:
+        """As a recording, with at least so many pumps."""
+        pumps = max(pumps or 1, self.pumps)
+        values = self.padded(pumps)
+        return Recording(time_ns=self.time_ns, columns=dict(zip(columns_of(pumps), values.T, strict=True)))
+
+    def rows(self, station: str) -> list[SampleRow]:
+        """As packed rows."""
+        data = np.ascontiguousarray(self.values, dtype="<f8")
+        keys = zip(self.time_ns.tolist(), self.seq.tolist(), self.quality.tolist(), data, strict=True)
+        return [SampleRow(station, time_ns, seq, quality, values.tobytes()) for time_ns, seq, quality, values in keys]
+
+
+def merged(parts: Sequence[Samples]) -> Samples:
+    """Samples of several origins together; of the same time and `seq` that of the earlier part counts."""
+    if len(parts) == 1:
+        return parts[0]
+    pumps = max((part.pumps for part in parts), default=0)
+    none = np.empty(0, dtype=np.int64)
+    return Samples(
+        time_ns=np.concatenate([none, *(part.time_ns for part in parts)]),
+        seq=np.concatenate([none, *(part.seq for part in parts)]),
+        quality=np.concatenate([none, *(part.quality for part in parts)]),
+        values=np.concatenate([np.empty((0, len(columns_of(pumps)))), *(part.padded(pumps) for part in parts)]),
+    ).in_order()
+
+
+def _follows(time_ns: Integers, seq: Integers) -> npt.NDArray[np.bool_]:
+    """(n - 1,) whether each row but the first comes after the one before."""
+    is_same = time_ns[1:] == time_ns[:-1]
+    follows: npt.NDArray[np.bool_] = (time_ns[1:] > time_ns[:-1]) | (is_same & (seq[1:] > seq[:-1]))
+    return follows

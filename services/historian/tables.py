@@ -1,0 +1,31 @@
+"""Answers of the historian for people."""
+
+from typing import Any
+
+from wetwell.protocols.history_messages import History
+from wetwell.protocols.stamps import to_iso
+
+_SHOWN = {
+    "verdicts": ("time", "pump", "state"),
+    "alarms": ("time", "id", "priority", "state", "by", "text"),
+    "stations": ("station", "first", "last"),
+}
+
+
+def history_table(history: History) -> dict[str, Any]:
+    """Rows of an answer; of samples without least and largest values, of figures those of the whole station."""
+    if history.kind in _SHOWN:
+        names = _SHOWN[history.kind]
+        return {history.kind: [{name: message.get(name) for name in names} for message in history.messages]}
+    names = tuple(name for name in history.columns if not name.endswith(("_min", "_max")))
+    if history.kind == "kpi":
+        names = tuple(name for name in names if not name.startswith("pump"))
+    rows = [
+        {"time": to_iso(time_ns)} | {name: _short(history.columns[name][row]) for name in names}
+        for row, time_ns in enumerate(history.time)
+    ]
+    return {"station": history.station, history.kind: rows} | ({"more": True} if history.more else {})
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.5g}"

@@ -1,0 +1,1 @@
+"""What systemd needs: the unit files beside this one, and the word that a daemon lives."""

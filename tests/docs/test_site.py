@@ -1,0 +1,42 @@
+"""The documentation site: builds without a network, with every page reachable, every link leading somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+def test_every_page_of_docs_is_on_the_site(site):
+    pages = {path.relative_to(ROOT / "docs").with_suffix(".html") for path in (ROOT / "docs").rglob("*.md")}
+    assert pages <= {path.relative_to(site) for path in site.rglob("*.html")}
+
+
+def test_the_reference_knows_every_command_and_setting(site):
+    commands = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    settings = (site / "reference" / "settings.html").read_text(encoding="utf-8")
+    assert all(
+        f"wetwell {name}" in commands for name in ("up", "detector rebaseline", "gap diagnose", "station check")
+    )
+    assert all(name in settings for name in ("state_dir", "endpoint", "word_order", "costs.pull_pump"))
+
+
+def test_nothing_is_loaded_from_elsewhere(site):
+    loaded = [
+        url
+        for path in site.rglob("*.html")
+        for url in re.findall(r"<(?:script|img|iframe|link)[^>]+(?:src|href)=\"?(https?:[^\" >]+)", path.read_text())
+    ]
+    assert loaded == []

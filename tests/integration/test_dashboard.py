@@ -1,0 +1,279 @@
+"""The web application over a bus, by an HTTP client: files, states, questions to others, and who is refused."""
+
+import asyncio
+import contextlib
+import json
+
+import httpx
+import pytest
+
+from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
+from wetwell.protocols.history_messages import History, HistoryQuery
+from wetwell.protocols.keys import alarm_act_key, history_key, sample_key
+from wetwell.protocols.memory_link import MemoryBus
+from wetwell.protocols.messages import PumpReading, Sample
+from wetwell.protocols.recording import read_recording
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.services.dashboard.app import Desk, dashboard_app
+from wetwell.services.dashboard.feed import Feed
+from wetwell.services.dashboard.hub import Hub
+from wetwell.services.dashboard.questions import ROWS_A_QUESTION
+from wetwell.services.dashboard.site_view import SiteView
+from wetwell.services.dashboard.web import open_socket, web_server
+
+PAGE = "http://127.0.0.1:8080"
+
+
+def client_of(desk):
+    return httpx.AsyncClient(transport=httpx.ASGITransport(dashboard_app(desk)), base_url=PAGE)
+
+
+def desk_with(bus=None, reports=None):
+    return Desk(SiteView(10.0), Hub(), reports, bus)
+
+
+def get(path, desk=None, **headers):
+    async def run():
+        async with client_of(desk or desk_with()) as client:
+            return await client.get(path, headers=headers)
+
+    return asyncio.run(run())
+
+
+def a_sample(second, station="alpha"):
+    pump = PumpReading(frequency_hz=50.0, flow_m3h=200.5, head_m=26.0, power_kw=None, running=True)
+    return Sample(station=station, seq=second, time=second * NS_PER_S, level_m=1.25, pumps=(pump,))
+
+
+@pytest.mark.parametrize("path", ["/", "/station/alpha", "/alarms", "/reports", "/health"])
+def test_every_page_is_the_shell_without_inline_script_and_under_a_strict_policy(path) -> None:
+    answer = get(path)
+    assert answer.status_code == 200
+    policy = answer.headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "script-src 'self'" in policy
+    assert "unsafe" not in policy
+    assert "<script>" not in answer.text
+    assert "style=" not in answer.text
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_all_files_that_the_shell_names_are_there_and_kept_for_ever() -> None:
+    async def run():
+        async with client_of(desk_with()) as client:
+            shell = (await client.get("/")).text
+            names = {part.split('"')[0] for part in shell.split('="') if part.startswith("/static/")}
+            assert len(names) > 20
+            for name in names:
+                answer = await client.get(name)
+                assert answer.status_code == 200, name
+                assert "immutable" in answer.headers["cache-control"]
+                assert answer.headers["content-encoding"] == "gzip"
+                again = await client.get(name, headers={"if-none-match": answer.headers["etag"]})
+                assert (again.status_code, again.content) == (304, b"")
+            plain = await client.get(name, headers={"accept-encoding": "identity"})
+            assert "content-encoding" not in plain.headers
+            old = await client.get("/static/0123456789ab/theme.js")
+            assert old.status_code == 404
+
+    asyncio.run(run())
+
+
+def test_the_favicon_is_served() -> None:
+    assert get("/favicon.ico").headers["content-type"] == "image/svg+xml"
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", ""])
+def test_a_name_that_was_made_to_point_here_is_refused(host) -> None:
+    answer = get("/api/stations", host=host)
+    assert answer.status_code == 421
+    assert "content-security-policy" in answer.headers
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "[::1]:8080", "localhost"])
+def test_names_of_this_machine_are_heard(host) -> None:
+    assert get("/api/stations", host=host).status_code == 200
+
+
+def acting(desk, body, **headers):
+    async def run():
+        async with client_of(desk) as client:
+            kind = {"content-type": "application/json"}
+            return await client.post("/api/stations/alpha/alarm-act", content=body, headers=kind | headers)
+
+    return asyncio.run(run())
+
+
+ACT = AlarmAct(id="1", station="alpha", alarm="pump1.pump_fault", act="acknowledge", by="Ada")
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"content-type": "text/plain"}, 415),
+        ({"content-type": "application/x-www-form-urlencoded"}, 415),
+        ({"origin": "http://evil.example"}, 403),
+        ({"origin": "http://127.0.0.1:9999"}, 403),
+        ({"origin": "null"}, 403),
+    ],
+)
+def test_an_act_that_a_foreign_page_sends_is_refused(headers, status) -> None:
+    assert acting(desk_with(MemoryBus()), ACT.encode(), **headers).status_code == status
+
+
+@pytest.mark.parametrize(
+    ("body", "rule"),
+    [
+        (b"", "json"),
+        (b"{}", "id"),
+        (ACT.model_copy(update={"by": ""}).encode(), "by"),
+        (ACT.model_copy(update={"station": "beta"}).encode(), "station: got 'beta'"),
+        (ACT.model_copy(update={"act": "shelve"}).encode(), "minutes"),
+    ],
+)
+def test_what_is_no_act_is_told(body, rule) -> None:
+    answer = acting(desk_with(MemoryBus()), body)
+    assert answer.status_code == 400
+    assert rule.lower() in answer.json()["error"].lower()
+
+
+def test_without_a_bus_or_an_answer_that_is_told(monkeypatch) -> None:
+    assert acting(desk_with(), ACT.encode()).status_code == 503
+    monkeypatch.setattr("wetwell.services.dashboard.questions.ANSWER_S", 0.01)
+    silent = acting(desk_with(MemoryBus()), ACT.encode())
+    assert (silent.status_code, silent.json()["error"]) == (504, "the alarm service does not answer")
+    span = "kind=samples&start=2025-01-01&end=2025-01-02"
+    past = get(f"/api/stations/alpha/history?{span}", desk_with(MemoryBus()))
+    assert past.json()["error"] == "the historian does not answer"
+
+
+@contextlib.asynccontextmanager
+async def answering(bus, key, answer):
+    """A service that answers each question with `answer(payload)`."""
+    questions = bus.answer(key)
+
+    async def run():
+        while True:
+            for request in await questions.receive():
+                request.reply(answer(request.payload))
+
+    task = asyncio.create_task(run())
+    try:
+        yield
+    finally:
+        task.cancel()
+
+
+def test_an_act_goes_to_the_alarm_service_and_its_answer_comes_back() -> None:
+    alarm = Alarm(
+        id=ACT.alarm,
+        time=0,
+        station="alpha",
+        priority="high",
+        state="acknowledged",
+        is_active=True,
+        text="x",
+        by="Ada",
+    )
+
+    def answer(payload):
+        act = AlarmAct.decode(payload)
+        assert act == ACT
+        return AlarmAnswer(id=act.id, is_done=True, alarm=alarm).encode()
+
+    async def run():
+        bus = MemoryBus()
+        async with answering(bus, alarm_act_key("alpha"), answer), client_of(desk_with(bus)) as client:
+            kind = {"content-type": "application/json", "origin": PAGE}
+            return await client.post("/api/stations/alpha/alarm-act", content=ACT.encode(), headers=kind)
+
+    told = asyncio.run(run()).json()
+    assert told["is_done"]
+    assert told["alarm"]["by"] == "Ada"
+
+
+@pytest.mark.parametrize(
+    "query", ["", "kind=samples", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
+)
+def test_what_is_no_question_to_the_historian_is_told(query) -> None:
+    answer = get(f"/api/stations/alpha/history?{query}", desk_with(MemoryBus()))
+    assert answer.status_code == 400
+    assert answer.json()["error"]
+
+
+def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path) -> None:
+    rows = ROWS_A_QUESTION + 500
+
+    def answer(payload):
+        query = HistoryQuery.decode(payload)
+        assert query.raw
+        found = [second for second in range(rows) if query.start <= second * NS_PER_S < query.end]
+        messages = tuple(json.loads(a_sample(second).encode()) for second in found[: query.points])
+        return History(station="alpha", kind="samples", messages=messages, more=len(found) > query.points).encode()
+
+    async def run():
+        bus = MemoryBus()
+        async with answering(bus, history_key("*"), answer), client_of(desk_with(bus)) as client:
+            span = {"start": "1970-01-01T00:00:00Z", "end": "1970-01-02T00:00:00Z"}
+            whole = await client.get("/api/stations/alpha/recording.csv", params=span)
+            late = {"start": "1980-01-01T00:00:00Z", "end": "1980-01-02T00:00:00Z"}
+            return whole, await client.get("/api/stations/alpha/recording.csv", params=late)
+
+    whole, nothing = asyncio.run(run())
+    assert nothing.status_code == 404
+    assert 'filename="alpha.csv"' in whole.headers["content-disposition"]
+    path = tmp_path / "alpha.csv"
+    path.write_bytes(whole.content)
+    recording = read_recording(path)
+    assert len(recording.time_ns) == rows
+    assert recording.time_ns.tolist() == [second * NS_PER_S for second in range(rows)]
+    assert recording.column("pump1_flow_m3h")[-1] == 200.5
+    assert recording.column("pump1_running")[-1] == 1.0
+
+
+def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_path) -> None:
+    folder = tmp_path / "reports"
+    (folder / "gap").mkdir(parents=True)
+    (folder / "gap" / "report.html").write_text("<p>gap</p>")
+    (tmp_path / "secret.html").write_text("secret")
+    (folder / "link.html").symlink_to(tmp_path / "secret.html")
+    desk = desk_with(reports=folder)
+    assert [report["name"] for report in get("/api/reports", desk).json()["reports"]] == ["gap/report.html"]
+    page = get("/reports/gap/report.html", desk)
+    assert page.text == "<p>gap</p>"
+    assert "script-src" not in page.headers["content-security-policy"]
+    assert "sandbox" in page.headers["content-security-policy"]
+    for name in ("../secret.html", "%2e%2e/secret.html", "link.html", "gap", "none.html"):
+        assert get(f"/reports/{name}", desk).status_code == 404, name
+    assert get("/api/reports").json()["reason"] == "dashboard.reports names no folder"
+
+
+def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_server() -> None:
+    async def run():
+        bus = MemoryBus()
+        desk = desk_with(bus)
+        listener = open_socket("127.0.0.1", 0)
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        events = []
+        async with (
+            httpx.AsyncClient(base_url=address, timeout=10) as client,
+            web_server(dashboard_app(desk), listener, desk.hub),
+        ):
+            feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+            publisher = bus.publisher(sample_key("alpha"))
+            async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
+                assert stream.headers["content-type"].startswith("text/event-stream")
+                lines = stream.aiter_lines()
+                assert await anext(lines) == "event: resync"
+                publisher.put(a_sample(1).encode())
+                async for line in lines:
+                    if line.startswith('data: {"id"'):
+                        events.append(json.loads(line.removeprefix("data: ")))
+                        desk.hub.close()
+            state = (await client.get("/api/stations/alpha")).json()
+            feeding.cancel()
+        return events, state
+
+    events, state = asyncio.run(run())
+    assert [row[0] for event in events for row in event["rows"]] == [1000]
+    assert state["rows"] == events[0]["rows"]

@@ -1,0 +1,99 @@
+"""A detector that is killed at any moment: its verdicts are those of one that was not."""
+
+import asyncio
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wetwell.detector.nominal import nominal_of
+from wetwell.detector.pipeline import Detector
+from wetwell.protocols.history_messages import History, HistoryQuery
+from wetwell.protocols.keys import history_key, sample_key, verdict_key
+from wetwell.protocols.link import Request, Subscription
+from wetwell.protocols.memory_link import MemoryBus
+from wetwell.protocols.messages import Sample, Verdict
+from wetwell.services.detector.catch_up import missed_samples
+from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.judge import StationJudge
+from wetwell.services.presets import find_scenario
+from wetwell.simulator.simulation import Simulation
+
+HOURS = 9
+KEPT = 600
+
+
+@pytest.fixture(scope="module")
+def samples(alpha) -> list[Sample]:
+    return list(Simulation(alpha, find_scenario("demo"), 5).advance(HOURS * 3600).samples("alpha"))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(alpha, samples) -> list[Verdict]:
+    detector = Detector("alpha", nominal_of(alpha))
+    return [verdict for sample in samples for verdict in detector.update(sample)]
+
+
+async def answer(requests: Subscription[Request], known: Sequence[Sample]) -> None:
+    """A historian that has every sample and gives a few a page."""
+    while True:
+        for request in await requests.receive():
+            query = HistoryQuery.decode(request.payload)
+            rows = [sample for sample in known if query.start <= sample.time < query.end]
+            page = [sample.model_dump(mode="json") for sample in rows[: query.points]]
+            more = len(rows) > query.points
+            history = History(station="alpha", kind="samples", messages=tuple(page), more=more)
+            request.reply(history.encode())
+
+
+async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: list[int], away: int) -> list[Verdict]:
+    """Verdicts in order of their first arrival; the judge dies at each cut and comes back `away` samples later."""
+    got: dict[bytes, Verdict] = {}
+    with MemoryBus() as bus:
+        publisher = bus.publisher(sample_key("alpha"), history=KEPT)
+        verdicts = bus.subscribe(verdict_key("alpha"))
+        known: list[Sample] = []
+        historian = asyncio.create_task(answer(bus.answer(history_key("*")), known))
+        position = 0
+        for cut in [*cuts, len(samples)]:
+            judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
+            if judge.is_restored:
+                async for page in missed_samples(bus, "alpha", judge.detector.seen_until_ns):
+                    await judge.take(page)
+            running = asyncio.create_task(judge.run())
+            checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
+            for number in range(position, cut):
+                known.append(samples[number])
+                publisher.put(samples[number].encode())
+                if number % 200 == 0 or number + 1 == checkpoint_at:
+                    await asyncio.sleep(0.0)
+                    await asyncio.sleep(0.0)
+                if number + 1 == checkpoint_at:
+                    judge.keep()
+            for _ in range(5):
+                await asyncio.sleep(0.0)
+            running.cancel()
+            position = min(cut + away, len(samples))
+            for sample in samples[cut:position]:
+                known.append(sample)
+                publisher.put(sample.encode())
+        historian.cancel()
+        for payload in await verdicts.receive():
+            got.setdefault(payload, Verdict.decode(payload))
+    return list(got.values())
+
+
+@pytest.mark.parametrize(("seed", "away"), [(2, 300), (3, 3_000)])
+def test_verdicts_after_kills_are_those_without(alpha, samples, undisturbed, tmp_path, seed, away):
+    quarter = len(samples) // 4
+    cuts = [
+        int(cut) + quarter * k for k, cut in enumerate(np.random.default_rng(seed).integers(1_000, quarter - away, 4))
+    ]
+    told = asyncio.run(verdicts_of_killed(alpha, samples, tmp_path, cuts, away))
+    assert {verdict.state for verdict in undisturbed} >= {"learning", "normal", "pump_fault"}
+    assert sorted(told, key=key) == sorted(undisturbed, key=key)
+
+
+def key(verdict: Verdict) -> tuple[int, int, str]:
+    return verdict.time, verdict.pump, verdict.state

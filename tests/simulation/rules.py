@@ -1,0 +1,69 @@
+"""What must hold of a site after all accidents."""
+
+import hashlib
+from collections.abc import Iterator
+from itertools import pairwise
+
+from simulated_site import Site
+
+from wetwell.detector.nominal import nominal_of
+from wetwell.detector.pipeline import Detector
+from wetwell.protocols.stamps import MAX_STAMP_NS
+
+
+def broken_rules(site: Site) -> list[str]:
+    """In words; empty if all is well."""
+    return [*_verdicts(site), *_history(site), *_alarms(site)]
+
+
+def fingerprint(site: Site) -> str:
+    """The same for the same seed."""
+    digest = hashlib.sha256(repr(site.accidents).encode())
+    for told in (site.told, site.alarms):
+        digest.update(repr(sorted((str(key), repr(list(value))) for key, value in told.items())).encode())
+    return digest.hexdigest()
+
+
+def _verdicts(site: Site) -> Iterator[str]:
+    """The stream of verdicts is that of a detector that gets each published sample once, in order."""
+    for station in site.stations:
+        detector = Detector(station.name, nominal_of(station))
+        samples = site.published.get(station.name, [])
+        wanted = {verdict.encode() for sample in samples for verdict in detector.update(sample)}
+        heard = site.told.get(station.name, {}).keys()
+        if missing := wanted - heard:
+            yield f"{station.name}: {len(missing)} of {len(wanted)} verdicts were not told, such as {min(missing)!r}"
+        if more := heard - wanted:
+            yield f"{station.name}: {len(more)} verdicts should not have been told, such as {min(more)!r}"
+
+
+def _history(site: Site) -> Iterator[str]:
+    """What was published was kept, once."""
+    store = site.kept()
+    for station in site.stations:
+        samples = site.published.get(station.name, [])
+        kept = store.samples(station.name, 0, MAX_STAMP_NS).time_ns.tolist()
+        if kept != sorted(sample.time for sample in samples):
+            yield f"{station.name}: {len(kept)} samples were kept of {len(samples)}"
+        verdicts = store.events("verdicts", station.name, 0, MAX_STAMP_NS, 1_000_000)
+        if len(verdicts) != len(set(verdicts)) or set(verdicts) != site.told.get(station.name, {}).keys():
+            yield f"{station.name}: {len(verdicts)} verdicts were kept of {len(site.told.get(station.name, {}))}"
+    store.close()
+
+
+def _alarms(site: Site) -> Iterator[str]:
+    """An alarm is raised once each time that its condition comes; every pump fault that is told raises one."""
+    for (station, name), changes in site.alarms.items():
+        raised = [change.raised for change in changes if change.raised is not None]
+        if raised != sorted(raised):
+            yield f"{station}: alarm {name} goes back in time"
+        for before, after in pairwise(changes):
+            if before.is_active and after.is_active and after.raised != before.raised:
+                yield f"{station}: alarm {name} is raised twice"
+    for station in site.stations:
+        faulty = {
+            verdict.pump for verdict in site.told.get(station.name, {}).values() if verdict.state == "pump_fault"
+        }
+        alarmed = {pump for pump in faulty if (station.name, f"pump{pump}.pump_fault") in site.alarms}
+        if faulty - alarmed:
+            yield f"{station.name}: pump faults {sorted(faulty - alarmed)} raised no alarm"

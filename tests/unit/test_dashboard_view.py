@@ -1,0 +1,191 @@
+"""State of the page: what frames and states hold, what is dropped, what is new."""
+
+import json
+
+import pytest
+
+from wetwell.protocols.alarm_messages import Alarm
+from wetwell.protocols.link import Presence
+from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.stamps import NS_PER_S
+from wetwell.services.dashboard.rows import sample_row, thinned
+from wetwell.services.dashboard.site_view import ROWS, SiteView
+from wetwell.services.dashboard.station_view import LATE_SAMPLES, ROWS_A_FRAME
+
+
+def sample(second, station="alpha", *, level_m=1.0, running=True):
+    pump = PumpReading(frequency_hz=50.0, flow_m3h=200.0, head_m=26.0, power_kw=18.0, running=running)
+    rest = PumpReading(frequency_hz=0.0, flow_m3h=0.0, head_m=None, power_kw=0.5, running=False)
+    return Sample(station=station, seq=second, time=second * NS_PER_S, level_m=level_m, pumps=(pump, rest))
+
+
+def verdict(second, state="normal", pump=1, station="alpha"):
+    return Verdict(
+        time=second * NS_PER_S,
+        station=station,
+        pump=pump,
+        state=state,
+        probability={state: 1.0},
+        evidence={},
+        window=(0, second * NS_PER_S),
+    )
+
+
+def alarm(state="unacknowledged"):
+    return Alarm(
+        id="pump1.pump_fault",
+        time=0,
+        station="alpha",
+        pump=1,
+        priority="high",
+        state=state,
+        is_active=True,
+        text="pump 1: pump fault",
+    )
+
+
+@pytest.fixture
+def view():
+    site = SiteView(stale_s=10.0)
+    site.advance(0.0)
+    return site
+
+
+def frame_of(view, now_s, station="alpha"):
+    return json.loads(view.advance(now_s)[station])
+
+
+def test_a_frame_holds_the_new_samples_and_then_no_more(view) -> None:
+    view.take_sample(sample(1, level_m=1.25).encode())
+    frame = frame_of(view, 0.25)
+    assert frame["rows"] == [[1000, 1.25, None, 50, 200, 26, 18, 0, 0, None, 0.5]]
+    assert frame["running"] == [True, False]
+    assert frame["quality"] == "good"
+    assert not frame["stale"]
+    assert view.advance(0.5) == {}
+
+
+def test_many_samples_are_thinned_and_the_last_one_stays(view) -> None:
+    for second in range(100):
+        view.take_sample(sample(second).encode())
+    times_ms = [row[0] for row in frame_of(view, 0.25)["rows"]]
+    assert len(times_ms) == ROWS_A_FRAME
+    assert times_ms[-1] == 99_000
+    assert times_ms == sorted(times_ms)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 1000])
+def test_thinned_keeps_order_and_last(count) -> None:
+    samples = [sample(second) for second in range(count)]
+    kept = thinned(samples, 8)
+    assert len(kept) == min(count, 8)
+    assert kept[-1:] == samples[-1:]
+    assert [each.seq for each in kept] == sorted({each.seq for each in kept})
+
+
+def test_a_state_is_the_sum_of_the_frames(view) -> None:
+    for second in range(1, 4):
+        view.take_sample(sample(second).encode())
+        view.take_verdict(verdict(second).encode())
+        view.advance(float(second))
+    state = json.loads(view.station_state("alpha"))
+    assert [row[0] for row in state["rows"]] == [1000, 2000, 3000]
+    assert [told["time"] for told in state["verdicts"]] == [f"1970-01-01T00:00:0{second}Z" for second in (1, 2, 3)]
+    assert state["id"] == view.frame_id
+
+
+def test_samples_that_come_again_are_dropped_and_a_source_that_begins_anew_is_followed(view) -> None:
+    for second in (500, 501, 500, 501):
+        view.take_sample(sample(second).encode())
+    assert len(frame_of(view, 0.25)["rows"]) == 2
+    for second in range(LATE_SAMPLES):
+        view.take_sample(sample(second).encode())
+    frame = frame_of(view, 0.5)
+    assert frame["begins"]
+    assert [row[0] for row in frame["rows"]] == [117_000, 118_000, 119_000]
+
+
+def test_a_verdict_that_comes_again_counts_once(view) -> None:
+    for _ in range(2):
+        view.take_verdict(verdict(1).encode())
+    assert len(frame_of(view, 0.25)["verdicts"]) == 1
+
+
+def test_lost_samples_are_counted_by_their_numbers(view) -> None:
+    for second in (1, 2, 6):
+        view.take_sample(sample(second).encode())
+    assert frame_of(view, 0.25)["lost"] == 3
+
+
+def test_silence_becomes_no_data_and_ends_with_the_next_sample(view) -> None:
+    view.take_sample(sample(1).encode())
+    view.take_verdict(verdict(1).encode())
+    assert frame_of(view, 0.25)["state"] == "normal"
+    silent = frame_of(view, 20.0)
+    assert (silent["state"], silent["stale"]) == ("no_data", True)
+    view.take_sample(sample(2).encode())
+    assert frame_of(view, 20.25)["state"] == "normal"
+
+
+def test_a_fault_ranks_above_silence_and_the_worst_pump_counts(view) -> None:
+    view.take_verdict(verdict(1, "pump_fault", pump=2).encode())
+    view.take_verdict(verdict(1, "normal", pump=1).encode())
+    assert frame_of(view, 20.0)["state"] == "pump_fault"
+
+
+def test_the_overview_sends_what_has_changed_only(view) -> None:
+    view.take_sample(sample(1).encode())
+    view.take_sample(sample(1, "beta").encode())
+    view.advance(0.25)
+    first = json.loads(view.site_frame())
+    assert [station["name"] for station in first["stations"].values()] == ["alpha", "beta"]
+    assert view.site_frame() is None
+    view.take_sample(sample(2, "beta").encode())
+    view.advance(0.5)
+    second = json.loads(view.site_frame())
+    assert second == {"id": view.frame_id, "live": [[1, 2000, 1, 200, 18.5, [1]]], "stations": {}}
+
+
+def test_alarms_count_until_they_are_normal(view) -> None:
+    view.take_alarm(alarm().encode())
+    view.advance(0.25)
+    summary = json.loads(view.site_state())["stations"]["0"]
+    assert (summary["alarms"], summary["unacknowledged"]) == (1, 1)
+    assert [each["id"] for each in json.loads(view.alarms())] == ["pump1.pump_fault"]
+    view.take_alarm(alarm("normal").encode())
+    assert json.loads(view.alarms()) == []
+
+
+def test_services_are_there_until_they_are_gone(view) -> None:
+    view.take_presence(Presence("wetwell/alpha/alive/detector", is_alive=True))
+    view.take_status(
+        Status(time=0, station="alpha", service="detector", state="running", figures={"samples": 3.0}).encode()
+    )
+    view.take_presence(Presence("wetwell/_site/alive/historian", is_alive=True))
+    assert frame_of(view, 0.25)["alive"] == ["detector"]
+    view.take_presence(Presence("wetwell/alpha/alive/detector", is_alive=False))
+    assert frame_of(view, 0.5)["alive"] == []
+    health = {service["service"]: service for service in view.health(3.0)}
+    assert not health["detector"]["is_alive"]
+    assert health["detector"]["age_s"] == 3.0
+    assert health["historian"] == {"station": "_site", "service": "historian", "is_alive": True, "age_s": None}
+    assert list(view.stations) == ["alpha"]
+
+
+def test_what_is_no_message_is_counted_and_harms_nothing(view) -> None:
+    for take in (view.take_sample, view.take_verdict, view.take_model, view.take_alarm, view.take_status):
+        take(b"{}")
+        take(b"\xff")
+    assert view.counts["malformed"] == 10
+    assert view.stations == {}
+
+
+def test_values_that_are_none_stay_none() -> None:
+    lost = Sample(station="a", seq=0, time=0, level_m=float("nan"), pumps=(PumpReading(flow_m3h=float("inf")),))
+    assert json.loads(sample_row(lost)) == [0, None, None, None, None, None, None]
+
+
+def test_many_stations_share_the_rows_that_are_kept(view) -> None:
+    for number in range(ROWS[0][0] + 1):
+        view.take_sample(sample(1, f"station-{number}").encode())
+    assert {station.kept_rows for station in view.stations.values()} == {ROWS[1][1]}
