@@ -345,15 +345,16 @@ class RunTracker:
         return steady_rows(self.pumps) + len(self.pumps) > len(self.rows)
 
     def make_room(self) -> None:
-        """Double the room for steady samples."""
-        self.rows = np.concatenate((self.rows, np.zeros_like(self.rows)))
+        """Make room for some more steady samples."""
+        self.rows = np.concatenate((self.rows, np.zeros((LEAST_ROOM, COLUMNS))))
 
     def take_ended(self, time_ns: int) -> list[Run]:
         """Runs that end with the frame of this stamp; what was kept of them is dropped."""
         ended = [self._as_run(pump) for pump in np.flatnonzero(self.pumps["is_ending"]).tolist()]
         drop_ended(self.pumps, self.rows, time_ns)
-        if steady_rows(self.pumps) == 0 and len(self.rows) > LEAST_ROOM:
-            self.rows = np.zeros((LEAST_ROOM, COLUMNS))
+        needed = LEAST_ROOM * (1 + steady_rows(self.pumps) // LEAST_ROOM)
+        if needed < len(self.rows):
+            self.rows = self.rows[:needed].copy()
         return ended
 
     def finish(self) -> list[Run]:
