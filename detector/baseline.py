@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.detector.robust import NORMAL_MEDIAN
-from wetwell.detector.runs import Segments
+from wetwell.detector.runs import SEGMENT_SAMPLES, Segments
 
 Floats = npt.NDArray[np.float64]
 Curve = tuple[float, float, float]
@@ -70,6 +70,8 @@ class Baseline:
         Covariance of segment means within a run, times `correlation_factor`. [m²]
     correlation_factor : float
         Growth of the variance of a run's mean by correlation between its segments.
+    segment_samples : int
+        In each of the learnt segments.
     run_covariance : (2, 2) array
         Covariance of run means that the scatter within runs does not explain, floor included. [m²]
     """
@@ -83,6 +85,7 @@ class Baseline:
     segment_covariance: Floats
     correlation_factor: float
     run_covariance: Floats
+    segment_samples: int = SEGMENT_SAMPLES
 
     @property
     def offset_m(self) -> Floats:
@@ -140,9 +143,14 @@ class Baseline:
             ]
         )
 
+    def noise(self, segments: Segments) -> Floats:
+        """(2, 2) covariance of such segments in health; more where they hold fewer samples than the learnt ones."""
+        covariance: Floats = self.segment_covariance * max(1.0, self.segment_samples / segments.samples)
+        return covariance
+
     def with_noise_of(self, segments: Segments, weight: float, shutoff_head_m: float) -> "Baseline":
         """The baseline with its scatter moved towards that of a normal run; what it expects never moves."""
-        if len(segments) < 3:
+        if len(segments) < 3 or segments.samples != self.segment_samples:
             return self
         recent = np.cov(segments.residual_m, rowvar=False) * self.correlation_factor
         recent += np.eye(2) * (LEAST_NOISE_SHARE * shutoff_head_m) ** 2
@@ -201,6 +209,7 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
         segment_covariance=within,
         correlation_factor=factor,
         run_covariance=run_covariance,
+        segment_samples=round(float(np.median([run.samples for run in runs]))),
     )
 
 

@@ -31,7 +31,7 @@ from wetwell.detector.posterior import (
     weigh,
 )
 from wetwell.detector.pump_record import Knowledge, PumpRecord
-from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, SEGMENT_SAMPLES, Run, RunTracker
+from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, Run, RunTracker
 from wetwell.detector.severity import severity
 from wetwell.detector.snapshot import decode_snapshot, encode_snapshot
 from wetwell.protocols.messages import State, Verdict
@@ -218,7 +218,7 @@ class Detector:
         evidence["reason"] = (
             f"without {', '.join(lacking)} pump and system cannot be told apart"
             if lacking
-            else f"fewer than {SEGMENT_SAMPLES} steady samples"
+            else f"fewer than {run.segments.samples} steady samples"
         )
         if lacking or pump.known is not None:
             pump.take_state("unknown", run.window_ns, None)
@@ -258,7 +258,7 @@ class Detector:
             return []
         baseline = pump.known.baseline
         last = self._runs.last_segments(index, 1)
-        deviation_m = np.sqrt(np.diag(baseline.segment_covariance + baseline.run_covariance))
+        deviation_m = np.sqrt(np.diag(baseline.noise(last.segments) + baseline.run_covariance))
         since = pump.cusum.update(baseline.shifts(last.segments)[0], deviation_m)
         if since < EARLY_SEGMENTS or pump.stuck:
             pump.early = None

@@ -14,6 +14,8 @@ from wetwell.protocols.stamps import NS_PER_S
 Floats = npt.NDArray[np.float64]
 
 SEGMENT_SAMPLES = 25
+SEGMENT_S = 25.0
+"""A feed slower than one sample a second has fewer samples in a segment, but one at least."""
 WARM_UP_S = 30.0
 SETTLING_S = 10.0
 SPEED_STEP = 0.02
@@ -22,6 +24,8 @@ MIN_SPEED_RATIO = 0.4
 MAX_SPEED_RATIO = 1.25
 MAX_RUN_S = 1800.0
 BREAK_S = 60.0
+USUAL_GAPS = 2.5
+"""A feed that is slow by itself breaks only where it lacks more than so many of its usual steps."""
 RUNNING_SHARE = 0.05
 """Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
 NO_FLOW_SHARE = 0.01
@@ -37,7 +41,7 @@ BLIND_S = 60.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segments:
-    """Means over 25 steady samples each, m of them.
+    """Means over steady samples, m of them: 25 samples each, or what a slow feed has in `SEGMENT_S`.
 
     Attributes
     ----------
@@ -50,6 +54,8 @@ class Segments:
     level_m : (m,) array
         NaN where the level is not known. [m]
     speed_ratio : (m,) array
+    samples : int
+        In each segment.
     """
 
     residual_m: Floats
@@ -59,6 +65,7 @@ class Segments:
     duty_total_m3h: Floats
     level_m: Floats
     speed_ratio: Floats
+    samples: int = SEGMENT_SAMPLES
 
     def __len__(self) -> int:
         return len(self.flow_m3h)
@@ -113,7 +120,7 @@ class RunTracker:
 
     A sample is steady `WARM_UP_S` after its pump has started and after any other pump has started or stopped, and
     `SETTLING_S` after the last change of its speed. A run ends when the pump stops, when the stream breaks for more
-    than `BREAK_S`, or in parts of `MAX_RUN_S`, so that a pump that never stops is judged too.
+    than `BREAK_S` and its own pace explain, or in parts of `MAX_RUN_S`, so that a pump that never stops is judged too.
 
     Memory: at most `MAX_RUN_S` samples a pump.
     """
@@ -122,6 +129,8 @@ class RunTracker:
         self._nominal = nominal
         self._open: list[OpenRun | None] = [None] * nominal.pumps
         self._running: tuple[bool, ...] = (False,) * nominal.pumps
+        self._segment_samples = SEGMENT_SAMPLES
+        self._last_gaps_s = (0.0, 0.0)
         self._duty_speeds: tuple[float, ...] = ()
         self._duty_m3h: list[float] = []
 
@@ -132,7 +141,9 @@ class RunTracker:
 
     def update(self, frame: Frame) -> list[Run]:
         """Runs that this frame ends."""
-        ended = self.finish() if frame.gap_s > BREAK_S else []
+        is_break = frame.gap_s > BREAK_S and frame.gap_s > USUAL_GAPS * min(self._last_gaps_s)
+        self._last_gaps_s = (self._last_gaps_s[1], frame.gap_s)
+        ended = self.finish() if is_break else []
         running = tuple(
             [
                 self._is_running(reading, pump) if reading.running is None else reading.running
@@ -173,16 +184,16 @@ class RunTracker:
     def full_segments(self, pump: int) -> int:
         """Number of segments of an open run, when it has just filled one; else 0."""
         run = self._open[pump]
-        if run is None or not run.is_steady or len(run.rows) % SEGMENT_SAMPLES:
+        if run is None or not run.is_steady or len(run.rows) % self._segment_samples:
             return 0
-        return len(run.rows) // SEGMENT_SAMPLES
+        return len(run.rows) // self._segment_samples
 
     def last_segments(self, pump: int, segments: int) -> Run:
         """The last segments of an open run, of which the window begins with them."""
         run = self._open[pump]
         if run is None:
             raise ValueError(f"pump {pump} has no open run")
-        return self._as_run(pump, run, len(run.rows) - segments * SEGMENT_SAMPLES)
+        return self._as_run(pump, run, len(run.rows) - segments * self._segment_samples)
 
     def _is_running(self, reading: PumpFrame, pump: int) -> bool:
         """Whether a pump runs that does not say so."""
@@ -201,7 +212,7 @@ class RunTracker:
             _settle(run, frame.time_ns, WARM_UP_S)
         finished = None
         if frame.time_ns - run.part_ns >= MAX_RUN_S * NS_PER_S:
-            finished = self._as_run(pump, run)
+            finished = self._finished(pump, run)
             run.part_ns = frame.time_ns
             run.rows.clear()
             run.seen.clear()
@@ -252,7 +263,14 @@ class RunTracker:
     def _close(self, pump: int) -> Run | None:
         run = self._open[pump]
         self._open[pump] = None
-        return None if run is None else self._as_run(pump, run)
+        return None if run is None else self._finished(pump, run)
+
+    def _finished(self, pump: int, run: OpenRun) -> Run:
+        """The whole run; its pace says how many samples a segment has from now on."""
+        if len(run.rows) > 1:
+            period_s = float(np.median(np.diff([row[0] for row in run.rows])))
+            self._segment_samples = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
+        return self._as_run(pump, run)
 
     def _as_run(self, pump: int, run: OpenRun, first_row: int = 0) -> Run:
         """The run from a row on; where that is not the first, its window begins there."""
@@ -280,8 +298,8 @@ class RunTracker:
                 speed_ratio,
             ]
         )
-        whole = len(rows) // SEGMENT_SAMPLES * SEGMENT_SAMPLES
-        means = columns[:whole].reshape(-1, SEGMENT_SAMPLES, columns.shape[1]).mean(axis=1)
+        whole = len(rows) // self._segment_samples * self._segment_samples
+        means = columns[:whole].reshape(-1, self._segment_samples, columns.shape[1]).mean(axis=1)
         by_column = np.ascontiguousarray(means.T)
         return Run(
             pump=pump,
@@ -301,6 +319,7 @@ class RunTracker:
                 duty_total_m3h=by_column[5],
                 level_m=by_column[6],
                 speed_ratio=by_column[7],
+                samples=self._segment_samples,
             ),
             missing=frozenset(SIGNALS) - run.seen,
         )
