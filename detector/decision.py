@@ -1,6 +1,7 @@
 """From probabilities to the state that is told."""
 
 import numpy as np
+from scipy.special import ndtr
 
 from wetwell.detector.observation import PUMP, SYSTEM
 from wetwell.detector.posterior import (
@@ -20,14 +21,15 @@ SEPARATED_SHARE = 0.7
 """Share of the faults' probability that the likeliest must have, or the crew cannot be chosen."""
 METER_PROBABILITY = 0.9
 METER_TOLERANCE = 0.03
-"""Relative error of a meter that is told but not taken for a fault."""
+"""Relative error of a meter that is told but not taken for a fault: in health it may wander by as much."""
 
 
 def decide(weighed: Weighed, head_m: float) -> tuple[State, str | None]:
     """State to tell, and a remark.
 
-    A fault above `ALARM_PROBABILITY`, if one of them stands out; a wrong meter above `METER_PROBABILITY` if its error
-    is worth a visit; normal above one half; else unknown.
+    A fault above `ALARM_PROBABILITY`, if one of them stands out; a wrong meter if it reads wrong by more than
+    `METER_TOLERANCE` with more than `METER_PROBABILITY`; normal, perhaps with a meter that is a little off, above one
+    half; else unknown.
 
     Parameters
     ----------
@@ -39,7 +41,10 @@ def decide(weighed: Weighed, head_m: float) -> tuple[State, str | None]:
     fault = float(p[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum())
     meter = float(p[[FLOW_METER, HEAD_SENSOR]].sum())
     is_flow = p[FLOW_METER] >= p[HEAD_SENSOR]
-    error = weighed.flow_error if is_flow else weighed.head_error_m / max(abs(head_m), 1e-9)
+    scale = 1.0 if is_flow else max(abs(head_m), 1e-9)
+    error = (weighed.flow_error if is_flow else weighed.head_error_m) / scale
+    deviation = max((weighed.flow_deviation if is_flow else weighed.head_deviation_m) / scale, 1e-9)
+    beyond = float(ndtr((-METER_TOLERANCE - error) / deviation) + ndtr((error - METER_TOLERANCE) / deviation))
     name = "flow meter" if is_flow else "head sensor"
     if fault > ALARM_PROBABILITY:
         best = PUMP_FAULT + int(np.argmax(p[[PUMP_FAULT, SYSTEM_FAULT, BOTH]]))
@@ -49,9 +54,7 @@ def decide(weighed: Weighed, head_m: float) -> tuple[State, str | None]:
             return "unknown", "the pump gives more head than when it was learnt: re-baseline if it was repaired"
         is_burst = best == SYSTEM_FAULT and weighed.shift_m[SYSTEM] < 0.0
         return STATES[best], "the main takes less head: look for a burst or an open drain" if is_burst else None
-    if abs(error) >= METER_TOLERANCE:
-        if meter > METER_PROBABILITY:
-            return "sensor_fault", f"the {name} reads {error:+.1%}"
-        return ("normal", None) if p[NORMAL] > 0.5 else ("unknown", None)
+    if meter * beyond > METER_PROBABILITY:
+        return "sensor_fault", f"the {name} reads {error:+.1%}"
     remark = f"the {name} may read {error:+.1%}" if meter > 0.5 else None
-    return ("normal", remark) if p[NORMAL] + meter > 0.5 else ("unknown", None)
+    return ("normal", remark) if p[NORMAL] + meter * (1.0 - beyond) > 0.5 else ("unknown", remark)

@@ -59,6 +59,8 @@ class Weighed:
         Estimates of the shifts of (r_p, r_s) if both may have moved, and their standard deviations. [m]
     flow_error, head_error_m : float
         Estimates under the hypothesis that this meter is wrong. [1, m]
+    flow_deviation, head_deviation_m : float
+        Their standard deviations. [1, m]
     """
 
     probability: Floats
@@ -66,6 +68,8 @@ class Weighed:
     deviation_m: Floats
     flow_error: float
     head_error_m: float
+    flow_deviation: float
+    head_deviation_m: float
 
 
 def _ways(
@@ -155,10 +159,25 @@ def weigh(observation: Observation, scales: Scales, prior: Floats) -> Weighed:
     log_weight[[PUMP_FAULT, BOTH]] += np.log(usual_pump)
     log_weight[[SYSTEM_FAULT, BOTH]] += np.log(usual_system)
     weight = np.exp(log_weight - log_weight.max())
+    flow_error, flow_deviation = _meter_error(
+        observation.flow_meter[known], FLOW_METER_ERROR**2, inverse[FLOW_METER], mean
+    )
+    head_error_m, head_deviation_m = _meter_error(
+        observation.head_sensor[known], scales.head_m**2, inverse[HEAD_SENSOR], mean
+    )
     return Weighed(
         probability=weight / weight.sum(),
         shift_m=estimates,
         deviation_m=deviations,
-        flow_error=float(FLOW_METER_ERROR**2 * observation.flow_meter[known] @ inverse[FLOW_METER] @ mean),
-        head_error_m=float(scales.head_m**2 * observation.head_sensor[known] @ inverse[HEAD_SENSOR] @ mean),
+        flow_error=flow_error,
+        head_error_m=head_error_m,
+        flow_deviation=flow_deviation,
+        head_deviation_m=head_deviation_m,
     )
+
+
+def _meter_error(direction: Floats, prior_variance: float, inverse: Floats, mean: Floats) -> tuple[float, float]:
+    """Error of a meter that is wrong, and its standard deviation."""
+    error = prior_variance * float(direction @ inverse @ mean)
+    variance = prior_variance - prior_variance**2 * float(direction @ inverse @ direction)
+    return error, max(variance, 0.0) ** 0.5

@@ -16,6 +16,8 @@ def weighed(probability, *, shift_m=(-2.0, 2.0), flow_error=0.0, head_error_m=0.
         deviation_m=np.full(2, 0.1),
         flow_error=flow_error,
         head_error_m=head_error_m,
+        flow_deviation=0.005,
+        head_deviation_m=0.1,
     )
 
 
@@ -63,7 +65,7 @@ def test_a_main_that_takes_less_head_may_have_burst():
     ("meters", "errors", "remark"),
     [
         ([0.95, 0.01], {"flow_error": 0.15}, "the flow meter reads +15.0%"),
-        ([0.95, 0.01], {"flow_error": -0.031}, "the flow meter reads -3.1%"),
+        ([0.95, 0.01], {"flow_error": -0.041}, "the flow meter reads -4.1%"),
         ([0.01, 0.95], {"head_error_m": -2.5}, "the head sensor reads -10.0%"),
     ],
 )
@@ -75,6 +77,11 @@ def test_a_meter_that_is_a_little_off_is_told_beside_a_normal_state():
     state, remark = told([0.04, 0, 0, 0, 0.95, 0.01], flow_error=0.02)
     assert (state, remark) == ("normal", "the flow meter may read +2.0%")
     assert told([0.95, 0, 0, 0, 0.05, 0.0], flow_error=0.02) == ("normal", None)
+
+
+def test_a_meter_is_not_told_wrong_while_its_error_may_be_within_its_tolerance():
+    state, remark = told([0.01, 0, 0, 0, 0.99, 0], flow_error=-0.032)
+    assert (state, remark) == ("unknown", "the flow meter may read -3.2%"), "65 % beyond, of a deviation of .5 %"
 
 
 @pytest.mark.parametrize(("normal", "state"), [(0.55, "normal"), (0.2, "unknown")])

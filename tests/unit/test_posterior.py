@@ -55,6 +55,7 @@ def test_a_flow_meter_with_the_drawdown_against_it_is_the_one_that_is_wrong(erro
     weighed = weigh(seen(error * FLOW_DIRECTION, drawdown=error, power=0.0), SCALES, PRIOR)
     assert weighed.probability[FLOW_METER] > 0.99
     assert weighed.flow_error == pytest.approx(error, abs=0.01)
+    assert abs(weighed.flow_error - error) < 2.5 * weighed.flow_deviation < 0.025
 
 
 @pytest.mark.parametrize("error_m", [-3.0, -1.0, 1.0, 3.0])
@@ -62,6 +63,7 @@ def test_a_head_sensor_with_drawdown_and_power_in_order_is_the_one_that_is_wrong
     weighed = weigh(seen((error_m, error_m), drawdown=0.0, power=0.0), SCALES, PRIOR)
     assert weighed.probability[HEAD_SENSOR] > 0.9
     assert weighed.head_error_m == pytest.approx(error_m, abs=0.1)
+    assert abs(weighed.head_error_m - error_m) < 2.5 * weighed.head_deviation_m < 0.5
 
 
 def test_the_drawdown_tells_a_fault_of_both_curves_from_a_flow_meter():
