@@ -4,11 +4,13 @@ import math
 from dataclasses import dataclass, field
 
 from wetwell.detector.gate import Frame
+from wetwell.detector.runs import USUAL_GAPS
 from wetwell.protocols.stamps import NS_PER_S
 
 SETTLED_S = 15.0
-MIN_SAMPLES = 45
-MAX_SAMPLES = 600
+MIN_S = 60.0
+MIN_SAMPLES = 4
+MAX_S = 600.0
 """A longer phase begins anew, so that the inflow before a run is that just before it."""
 MAX_AGE_S = 600.0
 MAX_GAP_S = 10.0
@@ -71,6 +73,7 @@ class Drawdown:
     """
 
     area_m2: float
+    _gap_s: float = 0.0
     _phase: Phase | None = None
     _idle: Phase | None = None
     _log_ratio: dict[int, float] = field(default_factory=dict)
@@ -78,10 +81,12 @@ class Drawdown:
     def update(self, frame: Frame, running: tuple[bool, ...]) -> None:
         """Take a frame into account, in which these pumps ran."""
         phase = self._phase
-        if phase is None or phase.running != running or not frame.gap_s <= MAX_GAP_S:
+        is_next = frame.gap_s <= MAX_GAP_S or frame.gap_s <= USUAL_GAPS * self._gap_s
+        self._gap_s = frame.gap_s
+        if phase is None or phase.running != running or not is_next:
             self._end()
             phase = self._phase = Phase(running, frame.time_ns)
-        elif phase.samples >= MAX_SAMPLES and not any(running):
+        elif frame.time_ns - phase.begin_ns >= MAX_S * NS_PER_S and not any(running):
             self._end()
             phase = self._phase = Phase(running, frame.time_ns - int(SETTLED_S * NS_PER_S))
         if frame.time_ns - phase.begin_ns < SETTLED_S * NS_PER_S or math.isnan(frame.level_m):
@@ -100,7 +105,7 @@ class Drawdown:
     def _end(self) -> None:
         """Keep what the phase that ends has told."""
         phase = self._phase
-        if phase is None or phase.samples < MIN_SAMPLES:
+        if phase is None or phase.samples < MIN_SAMPLES or phase.end_ns - phase.begin_ns < MIN_S * NS_PER_S:
             return
         if not any(phase.running):
             self._idle = phase

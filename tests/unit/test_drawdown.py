@@ -120,6 +120,13 @@ def test_the_inflow_just_before_the_run_counts_and_not_that_of_hours_ago():
     assert ratio == pytest.approx(0.0, abs=0.02)
 
 
+@pytest.mark.parametrize("period_s", [5, 20, 60])
+def test_a_slow_feed_tells_too(period_s):
+    frames = list(trace((600, IDLE), (600, ONE), (120, IDLE), ratio=0.9))[::period_s]
+    slow = ((frame._replace(gap_s=float(period_s)), running) for frame, running in frames)
+    assert told(slow) == pytest.approx(math.log(0.9), abs=0.03)
+
+
 def test_no_level_no_figure():
     frames = ((frame._replace(level_m=NAN), running) for frame, running in trace((300, IDLE), (200, ONE), (5, IDLE)))
     assert math.isnan(told(frames))

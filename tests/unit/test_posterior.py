@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.belief import PumpBelief, SystemBelief, joint_prior
 from wetwell.detector.meter_faults import flow_meter_direction, head_sensor_direction
-from wetwell.detector.observation import Observation
+from wetwell.detector.observation import DRAWDOWN, Observation
 from wetwell.detector.posterior import (
     BOTH,
     FLOW_METER,
@@ -114,3 +114,12 @@ def test_slopes_that_may_be_wrong_explain_a_small_shift_of_the_other_curve():
 def test_a_pump_that_loses_is_believed_sooner_than_one_that_gains():
     assert probability((-0.3, 0.0))[PUMP_FAULT] > 2.0 * probability((0.3, 0.0))[PUMP_FAULT]
     assert probability((0.0, 0.3))[SYSTEM_FAULT] > probability((0.0, -0.3))[SYSTEM_FAULT]
+
+
+def test_a_flow_meter_is_believed_to_one_percent_unless_the_drawdown_watches_it():
+    observation = seen((0.0, 1.5))
+    for deviation in (NAN, 0.02):
+        observation.covariance[DRAWDOWN, DRAWDOWN] = deviation**2
+        np.testing.assert_allclose(weigh(observation, SCALES, PRIOR).tolerance_m, np.abs(0.01 * FLOW_DIRECTION))
+    observation.covariance[DRAWDOWN, DRAWDOWN] = 0.005**2
+    assert weigh(observation, SCALES, PRIOR).tolerance_m.tolist() == [0.0, 0.0], "learnt, not seen in this run"
