@@ -35,7 +35,9 @@ def readings(path: Path) -> np.ndarray:
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("pumps", [1, 2, 3, 4, 5])
-def test_a_healthy_rig_is_not_blamed(real_data, pumps):
+@pytest.mark.parametrize("learns_from", ["every other run", "the first half"])
+def test_a_healthy_rig_is_not_blamed(real_data, pumps, learns_from):
+    """With five pumps the flow falls by 1 % in ten minutes; from the first half alone nobody can foresee that."""
     (path,) = (real_data / "whut-pipeline").glob(f"{pumps}beng*.csv.gz")
     flow_m3h, head_m = readings(path).T
     rig = Station.model_validate(
@@ -47,10 +49,9 @@ def test_a_healthy_rig_is_not_blamed(real_data, pumps):
         }
     )
     runs = [slice(begin, begin + RUN_S) for begin in range(0, len(flow_m3h) - RUN_S + 1, RUN_S)]
-    learnt, unseen = (
-        runs[::2],
-        runs[1::2],
-    )
+    half = len(runs) // 2
+    is_alternate = learns_from == "every other run"
+    learnt, unseen = (runs[::2], runs[1::2]) if is_alternate else (runs[:half], runs[half:])
     detector = Detector(rig.name, nominal_of(rig))
     second, verdicts = itertools.count(), []
     for run in [*itertools.islice(itertools.cycle(learnt), LEARNING_RUNS), *unseen]:
