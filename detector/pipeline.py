@@ -106,7 +106,7 @@ class Detector:
         for run in ended + self._runs.newly_blind_runs() if is_any_running else ended:
             told_ns = max(frame.time_ns, run.window_ns[1])  # the clock may have been set back
             verdicts.append(self._judge(run, told_ns))
-        self._watch(frame, running)
+        verdicts += self._watch(frame, running)
         if not is_any_running:
             return tuple(verdicts)
         for index, steady in self._runs.steady_samples():
@@ -157,7 +157,9 @@ class Detector:
             evidence["baseline"] = pump.known.version
         return self._verdict(index, time_ns, window_ns, {pump.state: 1.0}, evidence)
 
-    def _watch(self, frame: Frame, running: tuple[bool, ...]) -> None:
+    def _watch(self, frame: Frame, running: tuple[bool, ...]) -> list[Verdict]:
+        """Look at the readings by themselves; verdicts where that changes what is said of a pump without head."""
+        verdicts = []
         self._repeats.update(frame, running, [pump.known is None for pump in self._pumps])
         for index, is_running in enumerate(running):
             if is_running:
@@ -166,6 +168,17 @@ class Detector:
                 if self._repeats.stuck:
                     prefixes = ("level_m", f"pump{index + 1}_")
                     pump.stuck.update(name for name in self._repeats.stuck if name.startswith(prefixes))
+                if pump.known is None and pump.blind.update(frame, index, running):
+                    verdicts.append(self._tell_blind(index, frame))
+        return verdicts
+
+    def _tell_blind(self, index: int, frame: Frame) -> Verdict:
+        """Verdict on a pump that cannot be judged, when it begins or ceases to run as it used to."""
+        pump, now = self._pumps[index], (frame.time_ns, frame.time_ns)
+        lacking = sorted(name for name in NEEDED if math.isnan(getattr(frame.pumps[index], name)))
+        pump.take_state("unknown", now, None)
+        evidence = {"early": True, "missing": lacking, "reason": _blind(lacking)} | pump.blind.evidence()
+        return self._verdict(index, frame.time_ns, now, {"unknown": 1.0}, evidence)
 
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         """Verdict on a run that has ended."""
@@ -215,13 +228,11 @@ class Detector:
         lacking = sorted(run.missing & NEEDED)
         if lacking and pump.known is not None:
             return self._blame_meter(run, time_ns, evidence | {"lost": lacking})
-        evidence["reason"] = (
-            f"without {', '.join(lacking)} pump and system cannot be told apart"
-            if lacking
-            else f"fewer than {run.segments.samples} steady samples"
-        )
+        evidence["reason"] = _blind(lacking) if lacking else f"fewer than {run.segments.samples} steady samples"
         if lacking or pump.known is not None:
             pump.take_state("unknown", run.window_ns, None)
+        if lacking:
+            evidence |= pump.blind.evidence()
         return self._verdict(run.pump, time_ns, run.window_ns, {pump.state: 1.0}, evidence)
 
     def _wrong_meters(self, index: int, stuck: list[str], log_ratio: float) -> dict[str, list[str]]:
@@ -354,6 +365,10 @@ class Detector:
             onset=pump.onset_ns if pump.state in FAULTS else None,
             window=window_ns,
         )
+
+
+def _blind(lacking: list[str]) -> str:
+    return f"without {', '.join(lacking)} pump and system cannot be told apart"
 
 
 def _with_noise(baseline: Baseline, run: Run, nominal: Nominal) -> Baseline:

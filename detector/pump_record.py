@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline, Curve
 from wetwell.detector.belief import PumpBelief
+from wetwell.detector.blind_watch import BlindWatch
 from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.cusum import Cusum
 from wetwell.detector.index_limits import IndexLimits
@@ -65,6 +66,8 @@ class PumpRecord:
         What was told last.
     onset_ns : int
         Estimate of when the fault began that is told.
+    blind : BlindWatch
+        What is watched while head or frequency is not measured.
     early : State
         Fault that the last look at an open run was sure of.
     """
@@ -80,6 +83,7 @@ class PumpRecord:
     early: State | None = None
     run_s: float = 0.0
     stuck: set[str] = field(default_factory=set)
+    blind: BlindWatch = field(default_factory=BlindWatch)
     cusum: Cusum = field(default_factory=Cusum)
     rolling: RollingFTest = field(default_factory=lambda: RollingFTest(ROLLING_SAMPLES))
     limits: IndexLimits = field(default_factory=IndexLimits)
@@ -145,6 +149,7 @@ class PumpRecord:
         self.limits = IndexLimits()
         self.recent.clear()
         self.stuck.clear()
+        self.blind = BlindWatch()
         self.cusum.reset()
 
     def _forget(self) -> None:

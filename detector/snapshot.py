@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline, Model
 from wetwell.detector.belief import PumpBelief, SystemBelief
+from wetwell.detector.blind_watch import BlindWatch
 from wetwell.detector.curve_drift import RollingFTest
 from wetwell.detector.cusum import Cusum
 from wetwell.detector.drawdown import Drawdown, Phase
@@ -27,12 +28,13 @@ from wetwell.detector.pump_record import Knowledge, PumpRecord
 from wetwell.detector.runs import OpenRun, RunTracker, Segments
 from wetwell.protocols.errors import WetwellError
 
-SCHEMA = "wetwell.detector-snapshot/1"
+SCHEMA = "wetwell.detector-snapshot/2"
 
 _CLASSES: Mapping[str, type] = {
     cls.__name__: cls
     for cls in (
         Baseline,
+        BlindWatch,
         Check,
         Cusum,
         Drawdown,
