@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.detector.robust import NORMAL_MEDIAN, median
-from wetwell.detector.runs import Segments
+from wetwell.detector.runs import SEGMENT_SAMPLES, Segments
 from wetwell.protocols.jit import compiled
 
 Floats = npt.NDArray[np.float64]
@@ -72,6 +72,8 @@ class Baseline:
         Covariance of segment means within a run, times `correlation_factor`. [m²]
     correlation_factor : float
         Growth of the variance of a run's mean by correlation between its segments.
+    segment_samples : int
+        In each of the learnt segments.
     run_covariance : (2, 2) array
         Covariance of run means that the scatter within runs does not explain, floor included. [m²]
     """
@@ -85,6 +87,7 @@ class Baseline:
     segment_covariance: Floats
     correlation_factor: float
     run_covariance: Floats
+    segment_samples: int = SEGMENT_SAMPLES
 
     @property
     def offset_m(self) -> Floats:
@@ -143,9 +146,14 @@ class Baseline:
             ]
         )
 
+    def noise(self, segments: Segments) -> Floats:
+        """(2, 2) covariance of such segments in health; more where they hold fewer samples than the learnt ones."""
+        covariance: Floats = self.segment_covariance * max(1.0, self.segment_samples / segments.samples)
+        return covariance
+
     def with_noise_of(self, segments: Segments, weight: float, shutoff_head_m: float) -> "Baseline":
         """The baseline with its scatter moved towards that of a normal run; what it expects never moves."""
-        if len(segments) < 3:
+        if len(segments) < 3 or segments.samples != self.segment_samples:
             return self
         deviation_m = segments.residual_m - segments.residual_m.mean(axis=0)
         recent = deviation_m.T @ deviation_m / (len(segments) - 1) * self.correlation_factor
@@ -205,6 +213,7 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
         segment_covariance=within,
         correlation_factor=factor,
         run_covariance=run_covariance,
+        segment_samples=round(float(np.median([run.samples for run in runs]))),
     )
 
 
