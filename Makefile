@@ -4,8 +4,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 UV := VIRTUAL_ENV=$(VENV) $(BIN)/uv
 SCENARIO ?= demo
+IMAGE ?= wetwell:latest
+BUILDER ?= docker
+BASE ?= python:3.11-slim-bookworm
 
-.PHONY: help up test lint types imports format docs requirements clean
+.PHONY: help up test lint types imports format docs requirements clean sbom audit image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -13,8 +16,8 @@ help:  ## Show the targets
 up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C stops
 	@exec $(BIN)/wetwell up --scenario $(SCENARIO)
 
-test: lint types imports  ## Lint, types, import contract, all tests
-	@find simulator detector -name '*.nb[ci]' -delete  # kernels know changes of their own file only
+test: lint types imports sbom  ## Lint, types, import contract, SBOM, all tests
+	@find simulator detector protocols -name '*.nb[ci]' -delete  # kernels know changes of their own file only
 	$(BIN)/pytest -q --durations=5
 
 lint: $(VENV)/.dev  ## ruff
@@ -35,7 +38,21 @@ docs: $(VENV)/.dev  ## Build the documentation site in build/site, with its link
 	@mkdir -p build/mermaid
 	@test -d build/mermaid/package || (cd build/mermaid && npm pack --silent mermaid@11 > /dev/null && tar xzf mermaid-*.tgz) || \
 	  echo "diagrams will be shown as text: npm or its registry is not there"
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+sbom: build/sbom.json  ## Bill of materials of what runs, CycloneDX, in build/sbom.json
+
+build/sbom.json: requirements/runtime.txt pyproject.toml $(VENV)/.dev
+	@mkdir -p build
+	$(BIN)/python -W ignore $(BIN)/cyclonedx-py requirements requirements/runtime.txt --index-url index \
+	  --pyproject pyproject.toml --output-reproducible --output-format JSON --output-file $@
+
+audit: $(VENV)/.dev  ## Known holes in the pinned packages; says so if the service that knows them is away
+	$(UV) pip check
+	$(BIN)/python .ci/audit.py requirements/runtime.txt
+
+image:  ## Image of the containers; make image BUILDER="buildah --storage-driver vfs" where there is no Docker
+	$(BUILDER) build --build-arg BASE=$(BASE) --file docker/Dockerfile --tag $(IMAGE) .
 
 requirements: $(VENV)/.uv  ## Pin the newest versions anew
 	cd requirements && for name in runtime build dev; do \

@@ -14,7 +14,7 @@ from wetwell.protocols.keys import ROOT
 from wetwell.protocols.station import NAME_PATTERN, Table, load_toml
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-Key = Annotated[str, Field(pattern=r"^[^/\s#?$]+(/[^/\s#?$]+)*$")]
+Key = Annotated[str, Field(pattern=r"^[^/\s#?]+(/[^/\s#?]+)*$")]
 
 PUBLISH = ("put", "delete", "declare_queryable", "reply", "liveliness_token")
 READ = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")

@@ -191,7 +191,7 @@ def _tls_context(tls: Tls, folder: Path) -> ssl.SSLContext:
     try:
         context = ssl.create_default_context(cafile=folder / tls.ca)
         if tls.certificate is not None and tls.key is not None:
-            context.load_cert_chain(folder / tls.certificate, folder / tls.key)
+            context.load_cert_chain(folder / tls.certificate, folder / tls.key, password="")  # never ask for one
     except ssl.SSLError as error:
         raise ValueError(f"tls: the files hold no certificate or key that fits: {error.reason or error}") from error
     return context

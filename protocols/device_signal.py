@@ -92,8 +92,8 @@ class Signal(Table):
         if self.type == "bit":
             return float(words[0] >> (self.bit or 0) & 1)
         packed = struct.pack(f">{len(words)}H", *words)
-        if self.count == 2:
-            order = self.word_order or word_order
+        order = self.word_order or word_order
+        if self.count == 2 and order != "ABCD":
             packed = bytes(packed[order.index(letter)] for letter in "ABCD")
         number: float = struct.unpack(_FORMATS[self.type], packed)[0]
         return float(number) if math.isfinite(number) and number not in self.no_value else None

@@ -1,6 +1,7 @@
 """Units in which instruments tell level, flow, head, frequency and power, and their size in house units."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 _HEAD_OF_KPA_M = 1000.0 / (1000.0 * 9.81)  # p / (rho g) of water with 1000 kg/m³
@@ -48,6 +49,7 @@ FACTORS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 _HOUSE_UNITS = {"_m3h": "m³/h", "_m": "m", "_hz": "Hz", "_kw": "kW", "_s": "s"}
 
 
+@lru_cache(maxsize=1024)
 def house_unit(name: str) -> str:
     """Unit of a value by the suffix of its name; empty for a plain number.
 

@@ -12,7 +12,9 @@ from wetwell.protocols.whole_file import whole_file
 from wetwell.services.field_data import prepared, write_station
 from wetwell.services.gap_page import gap_page
 from wetwell.sim2real.diagnosis import diagnose
-from wetwell.sim2real.gap_report import ClosedLoop, ClosedLoopComparison, GapReport, report_of
+from wetwell.sim2real.false_verdicts import false_verdicts
+from wetwell.sim2real.gap_report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport, report_of
+from wetwell.sim2real.preparation import PreparationReport
 from wetwell.sim2real.replay import Replay
 from wetwell.sim2real.traces import PUMP_SIGNALS, traces_of
 from wetwell.sim2real.validation import Validation, validate
@@ -40,13 +42,13 @@ def diagnose_file(
     for name in [*(only or ()), *without]:
         if name not in EFFECTS:
             raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
-    rows, _ = prepared(recording, None)
+    rows, preparation = prepared(recording, None)
     try:
         diagnosis = diagnose(rows, station, only=only, without=without, progress=progress)
         closed_loop = _closed_loop(rows, station, diagnosis.station)
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error
-    report = report_of(diagnosis, closed_loop)
+    report = report_of(diagnosis, closed_loop, _detector(rows, station, diagnosis.station), _notes(preparation))
     page = gap_page(report, diagnosis)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -96,6 +98,28 @@ def _teacher_forced(rows: Recording, station: Station) -> Recording:
                 columns[f"pump{i + 1}_{name}"] = prediction.signals[name][i, second]
         columns[f"pump{i + 1}_running"] = (traces.frequency_hz[i, second] > 0.0).astype(np.float64)
     return Recording(time_ns=rows.time_ns, columns=columns)
+
+
+def _notes(preparation: PreparationReport) -> tuple[str, ...]:
+    """What was found out of order."""
+    longest_s = max((gap.length_s for gap in preparation.gaps), default=0.0)
+    said = (
+        (preparation.out_of_order, "rows stood before an earlier one and were put in order"),
+        (preparation.doubled, "rows with a time that was there already were dropped"),
+        (len(preparation.gaps), f"gaps, the longest of {longest_s:.0f} s: what is in them is not judged"),
+    )
+    return tuple(f"{count} {text}" for count, text in said if count)
+
+
+def _detector(rows: Recording, before: Station, after: Station) -> DetectorVerdicts:
+    counted = false_verdicts(rows, before, after)
+    return DetectorVerdicts(
+        days=round(counted.days, 3),
+        verdicts=counted.verdicts,
+        false_per_day_before=round(counted.before / counted.days, 2),
+        false_per_day_after=round(counted.after / counted.days, 2),
+        has_new_curves=counted.has_new_curves,
+    )
 
 
 def _closed_loop(rows: Recording, before: Station, after: Station) -> ClosedLoopComparison | None:

@@ -8,7 +8,7 @@ from wetwell.services.charts import Section, Series, bar_chart, heat_map, line_c
 from wetwell.sim2real.bins import SIGNALS
 from wetwell.sim2real.covariates import best_covariate
 from wetwell.sim2real.diagnosis import Diagnosis
-from wetwell.sim2real.gap_report import GapReport
+from wetwell.sim2real.gap_report import DetectorVerdicts, GapReport
 from wetwell.sim2real.regimes import REGIMES
 from wetwell.simulator.effects import effects_of
 
@@ -33,6 +33,7 @@ def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
             [["all signals", gap.before, gap.after, gap.floor, gap.shrinkage, _interval(gap.shrinkage_ci)]],
         ),
         table(["signal", "before", "after"], [[name, one.before, one.after] for name, one in gap.by_signal.items()]),
+        *(paragraph(f"Note: {note}.") for note in report.notes),
         paragraph(f"Next: {report.next_experiment}"),
     ]
     sections = [Section("Verdict", "".join(verdict))]
@@ -46,6 +47,8 @@ def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
     sections.append(Section("Ranking of single effects", _ranking(report)))
     if report.closed_loop is not None:
         sections.append(Section("Closed loop", _closed_loop(report)))
+    if report.detector is not None:
+        sections.append(Section("Detector", _detector(report.detector)))
     return page(f"Gap between simulation and reality: station {report.station}", sections)
 
 
@@ -86,7 +89,7 @@ def _traces(diagnosis: Diagnosis) -> str:
     by_cycle = np.bincount(bins.cycle[found.held], found.plain[found.held] ** 2)
     begin = max(int(np.argmax(diagnosis.regimes.cycle == int(np.argmax(by_cycle)))) - SHOWN_S // 6, 0)
     window = slice(begin, begin + SHOWN_S)
-    time_ns = traces.start_ns + NS_PER_S * np.arange(traces.seconds)[window]
+    time_ns = traces.start_ns + NS_PER_S * traces.time_s[window].astype(np.int64)
     added = effects_of(diagnosis.station)[len(replay.own) :]
     lines: dict[str, list[Series]] = {}
     running = int(np.argmax((traces.frequency_hz[:, window] > 0.0).sum(axis=1)))
@@ -141,6 +144,18 @@ def _closed_loop(report: GapReport) -> str:
         ],
     ]
     return table(["", "level NMAE", "starts a day", "run time a day in h"], rows)
+
+
+def _detector(told: DetectorVerdicts) -> str:
+    same = "The detector learns its baseline in the first six hours, so that constant effects make little difference."
+    if not told.has_new_curves:
+        same = "No effect changes a curve that the detector uses: its verdicts stay the same."
+    rows = [["as configured", told.false_per_day_before], ["as diagnosed", told.false_per_day_after]]
+    return (
+        paragraph(f"Verdicts that call a fault on this recording of {told.days:.3g} days, taken to be healthy:")
+        + table(["station", "faults called a day"], rows)
+        + paragraph(same)
+    )
 
 
 def _interval(pair: tuple[float, float]) -> str:

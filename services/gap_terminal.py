@@ -52,5 +52,11 @@ def gap_lines(report: GapReport, out: Path) -> str:
             f"starts a day {loop.measured_starts_per_day:.1f} measured, {loop.before.starts_per_day:.1f} before, "
             f"{loop.after.starts_per_day:.1f} after"
         )
+    if (told := report.detector) is not None:
+        lines.append(
+            f"detector: {told.false_per_day_before:g} verdicts a day call a fault with the station as configured, "
+            f"{told.false_per_day_after:g} as diagnosed" + ("" if told.has_new_curves else " (same curves)")
+        )
+    lines += [f"note: {note}" for note in report.notes]
     lines += [f"next: {report.next_experiment}", f"{out}: report.json, report.html, station.toml"]
     return "\n".join(lines)

@@ -206,14 +206,14 @@ class DashboardSettings(Table):
     Attributes
     ----------
     host, port
-        Where it listens.
+        Where it listens; beyond this machine only with `security.tokens_file`.
     reports : Path
         Folder whose `*.html`, three levels down, the page lists.
     stale_s : float
         Without a sample for so long, a station has no data. [s]
     """
 
-    host: Literal["127.0.0.1", "::1"] = "127.0.0.1"
+    host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     reports: Path | None = None
     stale_s: Positive = 10.0

@@ -85,13 +85,29 @@ def swmm_passage_of(case: TruthCase) -> Passage:
         path = Path(room) / "station.inp"
         path.write_text(swmm_input(made.spec, case.initial_level_m), encoding="ascii")
         with pyswmm.Simulation(str(path)) as simulation:
-            _drive(simulation, pyswmm.Nodes(simulation), pyswmm.Links(simulation), made, station_record, pump_record)
+            _drive(
+                simulation,
+                pyswmm.Nodes(simulation),
+                pyswmm.Links(simulation),
+                made,
+                case.initial_level_m,
+                station_record,
+                pump_record,
+            )
     return Passage(
         case=case, made=made, sensor_rng=sensor_rng, station_record=station_record, pump_record=pump_record
     )
 
 
-def _drive(simulation: Any, nodes: Any, links: Any, made: Truth, station_record: Floats, pump_record: Floats) -> None:
+def _drive(
+    simulation: Any,
+    nodes: Any,
+    links: Any,
+    made: Truth,
+    initial_level_m: float,
+    station_record: Floats,
+    pump_record: Floats,
+) -> None:
     """Drive SWMM step by step, as PLC, drives and weather, and note each whole second."""
     spec, around = made.spec, made.around
     pumps, seconds = spec.shutoff_m.size, around.loss_factor.size
@@ -101,11 +117,10 @@ def _drive(simulation: Any, nodes: Any, links: Any, made: Truth, station_record:
     outlets = [nodes["OUT"]] if spec.shared_loss > 0 else [nodes[f"OUT{i}"] for i in range(1, pumps + 1)]
     plc = _Plc(spec)
     command, speeds, damped = np.zeros(pumps), np.zeros(pumps), np.zeros(pumps)
-    seen_m, lift_m = float(well.depth), spec.lift_m
+    level_m, seen_m, lift_m = initial_level_m, initial_level_m, spec.lift_m  # SWMM's own is 0 until its first step
     level_share, flow_share = (_followed(lag_s) for lag_s in (spec.level_lag_s, spec.flow_lag_s))
     simulation.start()
     for second in range(seconds):
-        level_m = well.depth
         flows = np.array([machine.flow for machine in machines])
         dead_end_m = spec.head_factor * spec.shutoff_m * speeds**2  # behind a check valve that is shut
         lifted_m = np.array([joint.head for joint in joints]) - level_m

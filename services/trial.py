@@ -8,6 +8,7 @@ Whatever is whole is kept by the next run with the same plan.
 import contextlib
 import json
 import secrets
+import shlex
 import shutil
 import subprocess
 import sys
@@ -44,6 +45,8 @@ DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
 REPLAY = (sys.executable, "-m", "wetwell.services", "gap", "replay")
 RECALIBRATION = ("friction_bias", "static_head_bias", "head_sensor_offset", "flow_meter_gain")
 """What anybody would calibrate: the library of the lower bound."""
+REPORTS, RECALIBRATED, WHOLE_LIBRARY = "reports", "recalibrated", "whole_library"
+"""Folders of diagnoses: as asked, by recalibration only, and of a case with a name left out with nothing left out."""
 STATION_FILE, RECORDING_FILE, SEAL_FILE, REPORT_FILE = (
     "station.toml",
     "recording.parquet",
@@ -86,7 +89,7 @@ class TrialPlan:
 
     @property
     def header(self) -> dict[str, Any]:
-        """What decides which case k is."""
+        """What decides which case k is, and who diagnoses it."""
         return {
             "schema": SCHEMA,
             "version": version("wetwell"),
@@ -94,6 +97,7 @@ class TrialPlan:
             "kinds": list(self.kinds),
             "plants": list(self.plants),
             "length_s": self.seconds,
+            "diagnoser": "wetwell gap diagnose" if self.command == DIAGNOSE else shlex.join(self.command),
         }
 
     def case(self, number: int) -> TrialCase:
@@ -139,13 +143,18 @@ def run_trial(plan: TrialPlan, folder: Path, workers: int) -> dict[str, Any]:
     with _progress() as progress:
         cases = [plan.case(number) for number in range(plan.count)]
         _each(progress, "cases", workers, [partial(publish, case, folder) for case in cases])
-        jobs = [(case, False) for case in cases]
+        jobs = [(case, REPORTS) for case in cases]
         if plan.has_recalibration:
-            jobs += [(case, True) for case in cases if case.kind in {"single", "pair"}]
-        _each(progress, "diagnoses", workers, [partial(_diagnose, plan, case, again, folder) for case, again in jobs])
+            jobs += [(case, RECALIBRATED) for case in cases if case.kind in {"single", "pair"}]
+        _each(progress, "diagnoses", workers, [partial(_diagnose, plan, case, which, folder) for case, which in jobs])
+        named = [case for case in cases if case.without and _told_effect(folder / REPORTS / case.name)]
+        jobs = [(case, WHOLE_LIBRARY) for case in named]
+        _each(
+            progress, "equivalents", workers, [partial(_diagnose, plan, case, which, folder) for case, which in jobs]
+        )
         if plan.replay:
             unseen = [
-                partial(hold_out, case, folder / "published" / case.name, folder / "reports" / case.name, plan.replay)
+                partial(hold_out, case, folder / "published" / case.name, folder / REPORTS / case.name, plan.replay)
                 for case in cases
                 if case.kind in {"single", "pair"}
             ]
@@ -215,15 +224,15 @@ def open_case(name: str, folder: Path) -> Label:
 def score_trial(plan: TrialPlan, folder: Path) -> dict[str, Any]:
     """Open all seals, score the reports, write `trial.json` and `trial.html`."""
     names = [f"case-{number:04}" for number in range(plan.count)]
-    pairs = [(open_case(name, folder), _answer(folder / "reports" / name)) for name in names]
-    scores = [score_case(label, answer) for label, answer in pairs]
+    pairs = [(open_case(name, folder), _answer(folder / REPORTS / name)) for name in names]
+    scores = [score_case(label, answer, _answer(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
     rows, columns, counts = confusion(scores)
     controls: dict[str, Any] = {
         "permuted_labels": chance_level(pairs, np.random.default_rng(plan.seed)),
     }
     if plan.has_recalibration:
         again = [
-            score_case(label, _answer(folder / "recalibrated" / label.case))
+            score_case(label, _answer(folder / RECALIBRATED / label.case))
             for label, _ in pairs
             if label.kind in {"single", "pair"}
         ]
@@ -237,7 +246,7 @@ def score_trial(plan: TrialPlan, folder: Path) -> dict[str, Any]:
         "effects_scored": _grouped(
             [score for score in scores if score.label.kind == "single"], lambda score: score.label.names[0]
         ),
-        "unseen": held_out_summary([folder / "reports" / name for name in names]),
+        "unseen": held_out_summary([folder / REPORTS / name for name in names]),
         "controls": controls,
         "confusion": {"rows": rows, "columns": columns, "counts": counts.tolist()},
     }
@@ -264,14 +273,19 @@ def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> di
     return {group: summary([score for score in scores if key(score) == group]) for group in groups}
 
 
-def _diagnose(plan: TrialPlan, case: TrialCase, is_recalibration: bool, folder: Path) -> None:
+def _told_effect(reports: Path) -> bool:
+    answer = _answer(reports)
+    return answer is not None and answer.verdict == "effect"
+
+
+def _diagnose(plan: TrialPlan, case: TrialCase, which: str, folder: Path) -> None:
     """Diagnose a case in a process that is given copies of its two published files and nothing else."""
-    reports = folder / ("recalibrated" if is_recalibration else "reports") / case.name
+    reports = folder / which / case.name
     if (reports / REPORT_FILE).is_file():
         return
     published = folder / "published" / case.name
-    options = [part for name in case.without for part in ("--without", name)]
-    if is_recalibration:
+    options = [part for name in case.without for part in ("--without", name) if which == REPORTS]
+    if which == RECALIBRATED:
         options += [part for name in RECALIBRATION for part in ("--only", name)]
     with tempfile.TemporaryDirectory(prefix="trial-") as room:
         given, out = Path(room), Path(room) / "out"

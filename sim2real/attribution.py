@@ -7,9 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.sim2real.bins import SIGNALS, Bins
-from wetwell.sim2real.candidates import Candidate
+from wetwell.sim2real.candidates import TRIALS, Candidate
 from wetwell.sim2real.fitting import Fit, Fitter
 from wetwell.sim2real.hints import hints_of
+from wetwell.sim2real.intervals import intervals_of
 from wetwell.sim2real.misfit import Misfit, soft
 from wetwell.sim2real.regimes import MULTI_PUMP, REGIMES
 from wetwell.sim2real.replay import Replay
@@ -27,10 +28,18 @@ LEAST_GAIN = 200.0
 PRICE = 0.006
 """Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""
 MOST_EFFECTS = 3
+PROBES = (0.02,)
+"""Strengths, as shares of the range, by which a further effect is judged before it is fitted."""
+LIKELY = 8
+"""Further effects that are fitted, the most promising first."""
 JOIN_SHARE = 0.06
 """Least gain of a further effect, as a share of what the first explains."""
 CLASS_SHARE = 0.02
-"""Candidates within this share of the best gain are equivalent."""
+"""Explanations within this share of the best gain are equivalent."""
+NOISY_SHARE = 0.06
+"""The same where the cycles do not agree which is better."""
+MOST_EQUIVALENT = 2
+"""Effects beside the one found: a larger class tells nobody anything."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -54,12 +63,14 @@ class Ranked:
 class Attribution:
     """Outcome: the plain residuals, the accepted fit (None: no effect), single candidates by score, held-out rows.
 
-    `spread` is the standard deviation of each place of the accepted fit, in the order of its candidates.
+    In the order of the accepted candidates: `equivalent` are the effects that explain as much in the place of each,
+    `ends` those of the 95 % interval of each of their places.
     """
 
     plain: Floats
     accepted: Fit | None
-    spread: Floats
+    equivalent: tuple[tuple[str, ...], ...]
+    ends: Floats
     singles: tuple[Ranked, ...]
     fitted: Flags
     held: Flags
@@ -101,6 +112,7 @@ class Attributor:
         self.plain = soft(misfit.residuals(replay.run()))
         self.fitted, self.held = halves(misfit.bins, replay.traces.pumps)
         self._fitter = Fitter(replay, misfit, self.fitted)
+        self._rivals: dict[frozenset[str], list[Ranked]] = {}
         self._hints = {candidate: hints_of(candidate, replay, misfit, self.plain) for candidate in candidates}
 
     def search(self) -> Attribution:
@@ -108,13 +120,16 @@ class Attributor:
         singles = self._singles()
         best = singles[0] if singles else None
         accepted: Fit | None = None
+        equivalent: tuple[tuple[str, ...], ...] = ()
         if best is not None and self._is_real(self.plain, best):
-            accepted = self._reduced(self._extend(best, singles)).fit
+            final = self._ordered(self._reduced(self._extend(best, singles)))
+            accepted, equivalent = final.fit, self._equivalent(final, singles)
         self._progress(1.0)
         return Attribution(
             plain=self.plain,
             accepted=accepted,
-            spread=np.zeros(0) if accepted is None else self._fitter.spread(accepted, self._misfit.bins.cycle),
+            equivalent=equivalent,
+            ends=np.zeros((0, 2)) if accepted is None else intervals_of(self._fitter, accepted, self._misfit.bins),
             singles=tuple(singles),
             fitted=self.fitted,
             held=self.held,
@@ -124,7 +139,7 @@ class Attributor:
         before = self._fitter.cost(self.plain)
         firsts = []
         for k, candidate in enumerate(self._candidates):
-            fit = self._fitter.first(candidate, candidate.starts(self._hints[candidate]))
+            fit = self._fitter.first(candidate, self._ladders(candidate))
             if fit is not None:
                 firsts.append(fit)
             self._progress(0.3 * (k + 1) / len(self._candidates))
@@ -137,15 +152,19 @@ class Attributor:
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
         return _priced(ranked, _plainest)
 
+    def _ladders(self, candidate: Candidate, trials: Sequence[float] = TRIALS) -> list[list[Floats]]:
+        return [ladder for hints in self._hints[candidate] for ladder in candidate.ladders(hints, trials)]
+
     def _extend(self, best: Ranked, singles: Sequence[Ranked]) -> Ranked:
         current, first_gain = best, best.gain
         for _ in range(MOST_EFFECTS - 1):
             left = current.fit.residuals**2 - self._misfit.bins.floor
             if float(left[self.held].sum()) < JOIN_SHARE * first_gain:
                 break  # no further effect could gain enough
-            tried = self._joined(current, [s.fit.candidates[0] for s in singles])
-            if tried is None:
+            others = self._joined(current, _names(singles))
+            if not others:
                 break
+            tried = others[0]
             extra = self._rank(current.fit.residuals, tried.fit)
             if extra.gain < JOIN_SHARE * first_gain or not self._is_real(current.fit.residuals, extra, CLEAR):
                 break
@@ -171,20 +190,63 @@ class Attributor:
                 return self._reduced(fewer)
         return current
 
-    def _joined(self, current: Ranked, candidates: Sequence[Candidate]) -> Ranked | None:
-        """Best fit of the current effects with one more."""
+    def _joined(self, current: Ranked, candidates: Sequence[Candidate]) -> list[Ranked]:
+        """Fits of the current effects with one more, best first."""
+        others = {c.component for c in current.fit.candidates} if len(current.fit.names) > 1 else set()
+        free = [c for c in candidates if c.name not in current.fit.names and c.component not in others]
+        free.sort(key=lambda candidate: -self._promise(candidate, current.fit))
         firsts = []
-        for candidate in candidates:
-            if candidate.name in current.fit.names:
-                continue
-            if len(current.fit.names) > 1 and candidate.component in {c.component for c in current.fit.candidates}:
-                continue
-            fit = self._fitter.first(candidate, candidate.starts(self._hints[candidate]), others=current.fit)
+        for candidate in free[:LIKELY]:
+            fit = self._fitter.first(candidate, self._ladders(candidate), others=current.fit)
             if fit is not None:
                 firsts.append(fit)
         firsts.sort(key=lambda fit: self._fitter.cost(fit.residuals))
-        refined = [self._rank(self.plain, self._fitter.refine(fit)) for fit in firsts[:6]]
-        return max(_priced(refined, _plainest), key=lambda r: r.score, default=None)
+        refined = [self._rank(self.plain, self._fitter.refine(fit)) for fit in firsts[:4]]
+        return _priced(refined, _plainest)
+
+    def _ordered(self, final: Ranked) -> Ranked:
+        """The same with the effect first without which most is lost."""
+        fit = final.fit
+        left = {name: self._gain_of(fit, [other for other in fit.names if other != name]) for name in fit.names}
+        order = sorted(range(len(fit.names)), key=lambda k: left[fit.names[k]])
+        ordered = Fit(
+            candidates=tuple(fit.candidates[k] for k in order),
+            places=tuple(fit.places[k] for k in order),
+            residuals=fit.residuals,
+        )
+        return Ranked(fit=ordered, gain=final.gain, score=final.score, by_cycle=final.by_cycle)
+
+    def _equivalent(self, final: Ranked, singles: Sequence[Ranked]) -> tuple[tuple[str, ...], ...]:
+        """For each effect of the final fit those that explain about as much in its place."""
+        names = final.fit.names
+        found = []
+        for place, name in enumerate(names):
+            kept = names[:place] + names[place + 1 :]
+            rivals = self._rivals.get(frozenset(kept), ()) if kept else singles
+            least = final.gain - self._gain_of(final.fit, kept)
+            own = [rival.fit.names[-1] for rival in rivals if _is_equal(final, rival, least)]
+            found.append(tuple(one for one in own if one != name)[:MOST_EQUIVALENT])
+        return tuple(found)
+
+    def _gain_of(self, fit: Fit, kept: Sequence[str]) -> float:
+        """Gain of some effects of a fit without the others, where they stand."""
+        pairs = [pair for pair in zip(fit.candidates, fit.places, strict=True) if pair[0].name in kept]
+        residuals = self._fitter.residuals([pair[0] for pair in pairs], [pair[1] for pair in pairs])
+        if residuals is None:
+            return 0.0
+        return max(float(np.sum((self.plain**2 - residuals**2)[self.held])), 0.0)
+
+    def _promise(self, candidate: Candidate, current: Fit) -> float:
+        """Drop of the sum of squares that one trial of each strength promises, as if all were linear in it."""
+        before = current.residuals[self.fitted]
+        most = 0.0
+        for (start,) in self._ladders(candidate, PROBES):
+            residuals = self._fitter.residuals((*current.candidates, candidate), (*current.places, start))
+            if residuals is not None:
+                change = residuals[self.fitted] - before
+                along = max(-float(change @ before), 0.0)
+                most = max(most, along**2 / max(float(change @ change), 1e-12))
+        return most
 
     def _swapped(self, current: Ranked, singles: Sequence[Ranked]) -> Ranked:
         """Each member in turn against every other candidate, the rest kept: greedy choices are taken back."""
@@ -195,9 +257,10 @@ class Attributor:
                 places=tuple(current.fit.places[k] for k in kept),
                 residuals=current.fit.residuals,
             )
-            other = self._joined(Ranked(fit=base, gain=0.0, score=0.0, by_cycle=np.zeros(1)), _names(singles))
-            if other is not None and other.score > current.score * (1.0 + 0.01):
-                current = other
+            others = self._joined(Ranked(fit=base, gain=0.0, score=0.0, by_cycle=np.zeros(1)), _names(singles))
+            self._rivals[frozenset(base.names)] = others
+            if others and others[0].score > current.score * (1.0 + 0.01):
+                current = others[0]
         return current
 
     def _rank(self, before: Floats, fit: Fit) -> Ranked:
@@ -216,6 +279,13 @@ class Attributor:
         counts = np.bincount(group, minlength=len(SIGNALS) * len(REGIMES))
         means = np.bincount(group, gains, counts.size) / np.maximum(counts, 1)
         return bool(np.max(means[counts >= 10], initial=0.0) > visible)
+
+
+def _is_equal(best: Ranked, rival: Ranked, share_of: float) -> bool:
+    """Whether a rival explains as much but for a small share, or for a larger one that may be chance."""
+    behind = best.by_cycle - rival.by_cycle
+    lost = float(behind.sum())
+    return lost <= CLASS_SHARE * share_of or (lost <= NOISY_SHARE * share_of and not is_sure(behind))
 
 
 def _names(singles: Sequence[Ranked]) -> list[Candidate]:

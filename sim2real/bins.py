@@ -27,6 +27,8 @@ class Bins:
         Standard deviation of the bin's mean, in the unit of its signal: noise and what a right model may be off.
     floor : array
         Mean square that noise alone makes of the residual, at most 1.
+    tolerance : array
+        Error of a right model that does not average out, such as of a curve or of a scan, in units of `deviation`.
     """
 
     signal: Integers
@@ -36,6 +38,7 @@ class Bins:
     second: Integers
     deviation: Floats
     floor: Floats
+    tolerance: Floats
 
     @property
     def size(self) -> int:

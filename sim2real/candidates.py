@@ -1,7 +1,7 @@
 """Candidates of the diagnosis: each effect of the library, with what its class says can be varied."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -68,24 +68,25 @@ class Candidate:
         values = {free.name: free.value(float(share)) for free, share in zip(self.free, shares, strict=True)}
         return EFFECTS[self.name].model_validate(dict(self.fixed) | values)
 
-    def starts(self, hints: Mapping[str, float]) -> list[Floats]:
-        """Places to begin at: the hints, and each strength tried alone on both sides of neutral."""
+    def ladders(self, hints: Mapping[str, float], trials: Sequence[float] = TRIALS) -> list[list[Floats]]:
+        """Places to begin at: the hints, and ladders of rising strength, each strength on both sides of neutral."""
         base = np.array(
             [free.share(min(max(hints.get(free.name, free.start), free.low), free.high)) for free in self.free]
         )
         if not any(free.neutral is not None for free in self.free):
-            return [base, *([np.full(base.size, 0.5)] if base.size else [])]
-        places = [base] if any(free.name in hints for free in self.free) else []
+            return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
+        ladders = [[base]] if any(free.name in hints for free in self.free) else []
         for k, free in enumerate(self.free):
             if free.neutral is None:
                 continue
             neutral = free.share(free.neutral)
-            for end, trial in product((0.0, 1.0), TRIALS):
+            for end in (0.0, 1.0):
                 if abs(end - neutral) > 1e-9:
-                    place = base.copy()
-                    place[k] = neutral + trial * (end - neutral)
-                    places.append(place)
-        return places
+                    ladder = [base.copy() for _ in trials]
+                    for place, trial in zip(ladder, trials, strict=True):
+                        place[k] = neutral + trial * (end - neutral)
+                    ladders.append(ladder)
+        return ladders
 
 
 def candidates_of(

@@ -43,7 +43,7 @@ def best_covariate(diagnosis: Diagnosis, signal: int) -> Covariate:
         "level in m": level_m[second],
         "seconds since the last switch": (second - began[second]).astype(np.float64),
         "frequency in Hz": running[second],
-        "hour of the day": ((traces.start_ns // 1_000_000_000 + second) % 86_400) / 3600.0,
+        "hour of the day": ((traces.start_ns / 1e9 + traces.time_s[second]) % 86_400.0) / 3600.0,
         "slope of the level in mm/s": 1000.0 * np.gradient(_smooth(level_m))[second],
     }
     before = found.plain[rows]

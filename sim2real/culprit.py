@@ -10,6 +10,13 @@ from wetwell.simulator.plant import PlantParameters
 
 Floats = npt.NDArray[np.float64]
 
+BLOCKS = 12
+STRAIGHT = 0.8
+"""Share of the scatter of blocks that a straight line explains; 0.6 for a sine of one period."""
+GROWN = 3.0
+"""Gap in the last third of a recording over that in the first."""
+NEAR_S = 60
+SWINGING = 0.4
 ALONE = 0.7
 """Share of the gap from which it is in one kind of signal alone."""
 
@@ -32,10 +39,12 @@ def culprit(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameter
     by_signal = np.maximum(np.bincount(bins.signal, excess, len(SIGNALS)), 0.0)
     total = max(by_signal.sum(), 1e-12)
     hydraulic = by_signal[FLOW] + by_signal[HEAD]
+    if _runs_late(excess, residuals, bins):
+        return "telemetry"
     if hydraulic > (1.0 - ALONE) * total:
         return _hydraulic(excess, residuals, bins, plant)
     if by_signal[POWER] > 0.5 * total:
-        return "drive"
+        return "power_meter" if _drifts(residuals, bins) else "drive"
     if by_signal[TELEMETRY] > 0.5 * total:
         return "telemetry"
     if by_signal[START_LEVEL] + by_signal[STOP_LEVEL] > by_signal[LEVEL]:
@@ -47,6 +56,52 @@ def culprit(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameter
     return "level_sensor" if in_ramps > 3.0 * in_calm else "sump"
 
 
+def _drifts(residuals: Floats, bins: Bins) -> bool:
+    """Whether the power runs away in a straight line: a meter does, a supply swings."""
+    rows = (bins.signal == POWER) & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
+    if rows.sum() < BLOCKS:
+        return False
+    order = np.argsort(bins.second[rows], kind="stable")
+    means = np.array([part.mean() for part in np.array_split(residuals[rows][order], BLOCKS)])
+    return bool(np.corrcoef(means, np.arange(BLOCKS))[0, 1] ** 2 > STRAIGHT)
+
+
+def _runs_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
+    """Whether one channel departs where it moves, and ever more: its clock runs away.
+
+    A level that is late is too low at starts and too high at stops.
+    """
+    by_signal = np.maximum(np.bincount(bins.signal, excess, len(SIGNALS)), 0.0)
+    level = by_signal[LEVEL] + by_signal[START_LEVEL] + by_signal[STOP_LEVEL]
+    third = bins.second * 3 // (int(bins.second.max(initial=0)) + 1)
+    is_ramp = (bins.regime == START_RAMP) | (bins.regime == STOP_RAMP)
+    for signal, own in ((FLOW, by_signal[FLOW]), (HEAD, by_signal[HEAD]), (LEVEL, level)):
+        if own < ALONE * by_signal.sum():
+            continue
+        rows = bins.signal == signal
+        if signal == LEVEL:
+            late = [residuals[(bins.signal == one) & (third == 2)] for one in (START_LEVEL, STOP_LEVEL)]
+            if min(part.size for part in late) == 0 or late[0].mean() > 0.0 or late[1].mean() < 0.0:
+                return False
+        elif _mean(excess, rows & is_ramp) < 3.0 * _mean(excess, rows & ~is_ramp):
+            return False
+        return _mean(excess, rows & (third == 2)) > GROWN * max(_mean(excess, rows & (third == 0)), 0.0)
+    return False
+
+
+def _mean(values: Floats, rows: npt.NDArray[np.bool_]) -> float:
+    return float(values[rows].mean()) if rows.any() else 0.0
+
+
+def _hunts(residuals: Floats, bins: Bins, rows: npt.NDArray[np.int64]) -> bool:
+    """Whether neighbouring bins of a run differ about as much as bins of that run that are far from one another."""
+    order = rows[np.lexsort((bins.second[rows], bins.pump[rows]))]
+    near = (np.diff(bins.pump[order]) == 0) & (np.diff(bins.second[order]) <= NEAR_S)
+    noise = float(bins.floor[order].mean())
+    steps = float(np.mean(np.diff(residuals[order])[near] ** 2)) / 2.0 - noise if near.any() else 0.0
+    return steps > SWINGING * max(float(np.mean(residuals[order] ** 2)) - noise, 1e-12)
+
+
 def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters) -> Component:
     stamp = (bins.second * 64 + bins.pump + 1) * 8 + bins.regime
     flow, head = np.flatnonzero(bins.signal == FLOW), np.flatnonzero(bins.signal == HEAD)
@@ -56,7 +111,9 @@ def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParame
     flow, head = flow[of_flow], head[of_head]
     calm = (bins.regime[flow] == STEADY) | (bins.regime[flow] == MULTI_PUMP)
     weight = np.maximum(excess[flow] + excess[head], 0.0)
-    is_steady = bool(weight[calm].mean() > 0.3 * weight[~calm].mean()) if calm.any() and not calm.all() else True
+    is_steady = (
+        bool(weight[calm].mean() > 0.3 * weight[~calm].mean()) if calm.any() and not calm.all() else bool(calm.any())
+    )
     if is_steady:
         flow, head = flow[calm], head[calm]
     pump = bins.pump[flow]
@@ -76,4 +133,5 @@ def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParame
         for name, (x, y) in directions.items()
     }
     best = max(found, key=lambda name: found[name])
-    return "drive" if best == "pump" and not is_steady else best
+    is_drive = best == "pump" and (not is_steady or _hunts(residuals, bins, flow))
+    return "drive" if is_drive else best

@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.station import EffectTable, Station
-from wetwell.sim2real.attribution import CLASS_SHARE, Attribution, Attributor, Ranked
+from wetwell.sim2real.attribution import Attribution, Attributor
 from wetwell.sim2real.bins import LEVEL, SIGNALS, Bins
-from wetwell.sim2real.candidates import Candidate, Freedom, candidates_of
+from wetwell.sim2real.candidates import Freedom, candidates_of
 from wetwell.sim2real.culprit import culprit
-from wetwell.sim2real.fitting import Fit
+from wetwell.sim2real.excerpt import excerpt
 from wetwell.sim2real.misfit import Misfit
-from wetwell.sim2real.regimes import REGIMES, Regimes, regimes_of
+from wetwell.sim2real.plausibility import check_plausible
+from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, REGIMES, STEADY, Regimes, regimes_of
 from wetwell.sim2real.replay import Replay
 from wetwell.sim2real.shrinkage import Interval, Shrinkage, bootstrap, shrinkage_of
 from wetwell.sim2real.structure import explained, repeating
@@ -35,12 +36,14 @@ HARDLY = 0.3
 """Share of the whole gap that is left when the effects found so far hardly matter."""
 SEEN = 0.6
 """Repeating mean square of a signal in one regime, in units of noise, from which it is a gap."""
+KEPT_OF_CALM = 0.02
+"""The same while nothing is switched, where the strongest effect has one form then: ramps have many."""
 CLEAR = 1.0
 """The same where another form of an effect is no excuse."""
 LARGE = 4.0
 """Mean square of half of the cycles, in units of noise, that no noise has."""
+CALM = {IDLE, STEADY, MULTI_PUMP}
 MIN_BINS = 12
-TWO_SIDED = 1.96
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,13 +123,15 @@ def diagnose(
     Raises
     ------
     ValueError
-        If recording and station do not fit, the recording is too short, or a name is not in the library.
+        If recording and station do not fit, the recording is too short or in other units, or a name is not in the
+        library.
     """
     candidates = candidates_of(len(station.pump), only=only, without=without)
-    traces = traces_of(recording, station)
+    traces = excerpt(traces_of(recording, station))
     regimes = regimes_of(traces, station)
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
+    check_plausible(traces, station, regimes, plain)
     misfit = Misfit(traces, station, regimes, plain)
     found = Attributor(replay, misfit, candidates, progress).search()
     bins, pumps = misfit.bins, traces.pumps
@@ -176,10 +181,12 @@ def _is_unexplained(
 ) -> bool:
     """Whether one of the `told` signals keeps a gap that is sure, or large, and more than a third of what it was.
 
-    A tenth, in one regime, where each accepted effect has but one form.
+    A tenth, in one regime, where each accepted effect has but one form; a fiftieth, while nothing is switched, where
+    the strongest one has one form then.
     """
     swinging = _swinging(bins, found)
     has_one_form = found.accepted is not None and all(effect.has_one_form for effect in found.accepted.effects)
+    is_rigid = found.accepted is not None and not found.accepted.effects[0].is_shaped
     excess, plain_excess = residuals**2 - bins.floor, found.plain**2 - bins.floor
     for signal in sorted(told):
         rows = found.held & (bins.signal == signal)
@@ -202,9 +209,12 @@ def _is_unexplained(
                 left = max(left, float(excess[rows].sum()))
             is_left |= is_repeating or is_large
             in_cell = excess if is_large else after
-            if has_one_form and (is_repeating or is_large) and float(in_cell[cell].mean()) > CLEAR:
+            if (is_repeating or is_large) and float(in_cell[cell].mean()) > CLEAR:
                 cell_was = max(float(before[cell].sum()), float(plain_excess[cell].sum()))
-                if float(in_cell[cell].sum()) > KEPT_OF_ONE_FORM * cell_was:
+                share = float(in_cell[cell].sum()) / max(cell_was, 1e-12)
+                if has_one_form and share > KEPT_OF_ONE_FORM:
+                    return True
+                if is_rigid and regime in CALM and share > KEPT_OF_CALM:
                     return True
         if is_left and left > KEPT * was:
             return True
@@ -253,36 +263,27 @@ def _places(
 def _causes(found: Attribution) -> tuple[Cause, ...]:
     if found.accepted is None:
         return ()
-    spreads = np.split(found.spread, np.cumsum([place.size for place in found.accepted.places])[:-1])
+    ends = np.split(found.ends, np.cumsum([place.size for place in found.accepted.places])[:-1])
     return tuple(
         Cause(
             name=candidate.name,
             component=candidate.component,
-            equivalent=_equivalent(candidate, found.accepted, found.singles),
+            equivalent=equivalent,
             parameters=tuple(
-                _parameter(free, float(share), float(sd))
-                for free, share, sd in zip(candidate.free, place, spread, strict=True)
+                _parameter(free, float(share), both)
+                for free, share, both in zip(candidate.free, place, interval, strict=True)
             ),
             fixed=dict(candidate.fixed),
         )
-        for candidate, place, spread in zip(found.accepted.candidates, found.accepted.places, spreads, strict=True)
+        for candidate, place, interval, equivalent in zip(
+            found.accepted.candidates, found.accepted.places, ends, found.equivalent, strict=True
+        )
     )
 
 
-def _parameter(free: Freedom, share: float, spread: float) -> Parameter:
-    ends = sorted(free.value(share + side * TWO_SIDED * spread) for side in (-1.0, 1.0))
-    return Parameter(name=free.name, value=free.value(share), ci=(ends[0], ends[1]), unit=free.unit)
-
-
-def _equivalent(candidate: Candidate, accepted: Fit, singles: tuple[Ranked, ...]) -> tuple[str, ...]:
-    if len(accepted.candidates) > 1:
-        return ()
-    best = singles[0].gain
-    return tuple(
-        single.fit.names[0]
-        for single in singles
-        if single.fit.names[0] != candidate.name and single.gain > (1.0 - CLASS_SHARE) * best
-    )
+def _parameter(free: Freedom, share: float, ends: Floats) -> Parameter:
+    low, high = (free.value(float(end)) for end in ends)
+    return Parameter(name=free.name, value=free.value(share), ci=(low, high), unit=free.unit)
 
 
 def _ranking(

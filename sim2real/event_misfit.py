@@ -74,6 +74,7 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
     slope_m_s = np.array([slope for _, _, slope in rows])
     early_m = noise_m * np.array([_earliness(abs(slope) / noise_m) for slope in slope_m_s])
     second = np.array([event.second for event, _, _ in rows], dtype=np.int64)
+    deviation = np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2)
     return EventMisfit(
         bins=Bins(
             signal=np.where(sign > 0, START_LEVEL, STOP_LEVEL),
@@ -81,8 +82,9 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
             cycle=regimes.cycle[second],
             pump=np.full(second.size, NO_PUMP),
             second=second,
-            deviation=np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2),
+            deviation=deviation,
             floor=np.full(second.size, EVENT_FLOOR),
+            tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
         ),
         number=np.array([event.number - 1 for event, _, _ in rows], dtype=np.int64),
         level_m=np.array([level for _, level, _ in rows]) + sign * (0.7 * early_m - 0.5 * np.abs(slope_m_s)),

@@ -17,6 +17,8 @@ STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
 ROUNDS = 12
 SETTLED = 1e-3
+MOST_AWAY = 2
+"""Steps up a ladder, each worse than the best before, after which it is left."""
 STAYED = 0.01
 """Share of its range by which a strength may move and still count as neutral."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
@@ -72,15 +74,24 @@ class Fitter:
         """Sum of squares over the bins that are fitted."""
         return float("inf") if residuals is None else float(np.sum(residuals[self.rows] ** 2))
 
-    def first(self, candidate: Candidate, starts: Sequence[Floats], others: Fit | None = None) -> Fit | None:
-        """Best of several starts, without refinement."""
+    def first(
+        self, candidate: Candidate, ladders: Sequence[Sequence[Floats]], others: Fit | None = None
+    ) -> Fit | None:
+        """Best of several starts, without refinement; a ladder is left when it has led away from the recording."""
         best: Fit | None = None
         before = () if others is None else others.candidates
         places = () if others is None else others.places
-        for start in starts:
-            residuals = self.residuals((*before, candidate), (*places, start))
-            if residuals is not None and (best is None or self.cost(residuals) < self.cost(best.residuals)):
-                best = Fit(candidates=(*before, candidate), places=(*places, start), residuals=residuals)
+        for ladder in ladders:
+            lowest, away = float("inf"), 0
+            for start in ladder:
+                residuals = self.residuals((*before, candidate), (*places, start))
+                cost = self.cost(residuals)
+                away = away + 1 if cost > lowest else 0
+                lowest = min(lowest, cost)
+                if residuals is not None and (best is None or cost < self.cost(best.residuals)):
+                    best = Fit(candidates=(*before, candidate), places=(*places, start), residuals=residuals)
+                if away == MOST_AWAY:
+                    break
         return best
 
     def refine(self, fit: Fit, rounds: int = ROUNDS) -> Fit:
@@ -139,18 +150,11 @@ class Fitter:
                         best = Fit(candidates=fit.candidates, places=(*fit.places[:-1], place), residuals=residuals)
         return best
 
-    def spread(self, fit: Fit, cycle: npt.NDArray[np.int64]) -> Floats:
-        """(parameters,) standard deviations of the places, from the scatter of the pull of whole cycles."""
-        x = np.concatenate([*fit.places]) if fit.places else np.zeros(0)
-        if x.size == 0:
-            return x
-        slopes = self._slopes(fit.candidates, x, [place.size for place in fit.places], fit.residuals)
-        pulls = slopes * fit.residuals[self.rows, None]
-        _, inverse = np.unique(cycle[self.rows], return_inverse=True)
-        by_cycle = np.array([np.bincount(inverse, pulls[:, k]) for k in range(x.size)])
-        inverse_squares = np.linalg.pinv(slopes.T @ slopes)
-        covariance = inverse_squares @ by_cycle @ by_cycle.T @ inverse_squares
-        return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)), dtype=np.float64)
+    def slopes(self, fit: Fit) -> Floats:
+        """(fitted bins, parameters) change of the residuals with each place."""
+        return self._slopes(
+            fit.candidates, np.concatenate([*fit.places]), [place.size for place in fit.places], fit.residuals
+        )
 
     def _slopes(self, candidates: Sequence[Candidate], x: Floats, sizes: list[int], residuals: Floats) -> Floats:
         slopes = np.zeros((int(self.rows.sum()), x.size))

@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from wetwell.sim2real.diagnosis import Diagnosis
@@ -10,6 +11,15 @@ from wetwell.sim2real.shrinkage import FLOOR
 from wetwell.simulator.effects.effect import Component
 
 DIGITS = 6
+WITHOUT = {
+    "inflow_m3h": "no inflow: what the level alone shows is never called unknown, errors of the balance are unseen",
+    "level_m": "no level: nothing can be said of sump, controller and level sensor",
+    "flow_m3h": "no flow: pump, rising main and head sensor are hard to tell apart",
+    "head_m": "no head: pump, rising main and flow meter are hard to tell apart",
+    "power_kw": "no power: nothing can be said of the power",
+}
+"""What a diagnosis cannot tell without a quantity."""
+PARTS = "the recording is long: parts of four hours, spread over all of it, were diagnosed"
 
 
 class _Part(BaseModel):
@@ -89,6 +99,20 @@ class ClosedLoopComparison(_Part):
     after: ClosedLoop
 
 
+class DetectorVerdicts(_Part):
+    """Verdicts a day that call a fault on the recording, taken to be healthy, with both stations.
+
+    `has_new_curves` says whether the effects change a curve that the detector takes its residuals from; if not, both
+    are the same run. It learns its baseline: constant effects make little difference to it.
+    """
+
+    days: float
+    verdicts: int
+    false_per_day_before: float
+    false_per_day_after: float
+    has_new_curves: bool
+
+
 class GapReport(_Part):
     """What `wetwell gap diagnose` writes."""
 
@@ -100,13 +124,20 @@ class GapReport(_Part):
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
     closed_loop: ClosedLoopComparison | None
+    detector: DetectorVerdicts | None = None
     signals: tuple[str, ...]
     cycles: int
+    notes: tuple[str, ...] = ()
     next_experiment: str
 
 
-def report_of(diagnosis: Diagnosis, closed_loop: ClosedLoopComparison | None = None) -> GapReport:
-    """Report of a diagnosis, numbers with few digits."""
+def report_of(
+    diagnosis: Diagnosis,
+    closed_loop: ClosedLoopComparison | None = None,
+    detector: DetectorVerdicts | None = None,
+    notes: tuple[str, ...] = (),
+) -> GapReport:
+    """Report of a diagnosis, numbers with few digits; `notes` come before those on what is not measured."""
     names = [cause.name for cause in diagnosis.causes]
     equivalent = [name for cause in diagnosis.causes for name in cause.equivalent]
     blamed = diagnosis.where[0].component if diagnosis.where else None
@@ -157,10 +188,20 @@ def report_of(diagnosis: Diagnosis, closed_loop: ClosedLoopComparison | None = N
             },
         ),
         closed_loop=closed_loop,
+        detector=detector,
         signals=tuple(diagnosis.gap.by_signal),
         cycles=int(diagnosis.regimes.cycle.max()),
+        notes=(*notes, *_missing(diagnosis)),
         next_experiment=next_experiment(diagnosis.verdict, names, equivalent, blamed),
     )
+
+
+def _missing(diagnosis: Diagnosis) -> tuple[str, ...]:
+    traces = diagnosis.traces
+    measured = {*traces.signals, *(("inflow_m3h",) if traces.inflow_m3h is not None else ())}
+    measured |= {"level_m"} if np.isfinite(traces.level_m).any() else set()
+    parts = float(traces.time_s[-1]) + 1.0 > traces.seconds
+    return tuple(text for name, text in WITHOUT.items() if name not in measured) + ((PARTS,) if parts else ())
 
 
 def _short(value: float) -> float:

@@ -18,12 +18,14 @@ LONGEST_S = 14_400.0
 SHORTEST_S = 45.0
 GRID_S = 20.0
 FULL = 0.98
+REFERENCES = (0.0, 1.0, 3.0, 8.0)
+"""Levels at which a lift may be right, in middles between the first start and stop."""
 FINER = 4
 """Frequencies between two that the length of the recording tells apart."""
 
 
-def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Floats) -> dict[str, float]:
-    """Start values by parameter: what of deadbands, quanta, limits and swings the recording shows."""
+def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Floats) -> list[dict[str, float]]:
+    """Sets of start values by parameter: what of deadbands, quanta, limits and swings the recording shows."""
     fixed = dict(candidate.fixed)
     hints: dict[str, float] = {}
     names = {free.name for free in candidate.free}
@@ -41,8 +43,10 @@ def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Fl
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
         hints["rated_factor"] = _rated_factor(replay)
     if "fast_period_s" in names:
-        hints |= _swing(misfit.bins, residuals)
-    return hints
+        hints |= _swing(misfit.bins, replay.traces.time_s, residuals)
+    if "reference_level_m" in names:
+        return [hints | {"reference_level_m": far * middle_m} for far in REFERENCES]
+    return [hints]
 
 
 def _rated_factor(replay: Replay) -> float:
@@ -55,12 +59,12 @@ def _rated_factor(replay: Replay) -> float:
     return float(np.nanmedian(seen_kw)) / loaded_kw if np.isfinite(seen_kw).any() else 1.0
 
 
-def _swing(bins: Bins, residuals: Floats) -> dict[str, float]:
+def _swing(bins: Bins, second_s: Floats, residuals: Floats) -> dict[str, float]:
     """Period and phase of the strongest sine in the steady residuals of the power; its amplitude is small."""
     rows = (bins.signal == POWER) & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
     if rows.sum() < 50:
         return {}
-    time_s = bins.second[rows].astype(float) + 10.0
+    time_s = second_s[bins.second[rows]] + 10.0
     values = residuals[rows] * bins.deviation[rows]
     day = 2.0 * np.pi * time_s / DAY_S
     slow = np.column_stack([np.ones(time_s.size), np.cos(day), np.sin(day)])

@@ -19,6 +19,8 @@ Floats = npt.NDArray[np.float64]
 
 LEVEL_TIME_S = 150.0
 """Time constant with which the observer follows the recorded level."""
+FIRST = 5
+"""Values of the level from which the observer begins."""
 UNKNOWN_INFLOW_TIME_S = 300.0
 """The same where the inflow has to be followed too."""
 
@@ -52,14 +54,14 @@ class Replay:
         self.traces = traces
         self.station = station
         self.own = tuple(own)
-        self._time_s = np.arange(traces.seconds, dtype=np.float64)
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
         self._forcing = healthy_forcing(inflow_m3h, traces.pumps)
         self._level_m = np.empty(traces.seconds)
         self._reading = np.empty((len(PUMP_SIGNALS), traces.pumps, traces.seconds))
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
-        self._first_level_m = float(traces.level_m[known[0]]) if known.size else _middle_level_m(station)
+        first = traces.level_m[known[:FIRST]]  # a single value may be wrong
+        self._first_level_m = float(np.median(first)) if known.size else _middle_level_m(station)
 
     def run(self, effects: Sequence[Effect] = ()) -> Prediction:
         """Predict under effects.
@@ -118,7 +120,7 @@ class Replay:
             return self._forcing
         forcing = healthy_forcing(later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps)
         for effect in writing:
-            effect.force(forcing, self._time_s)
+            effect.force(forcing, self.traces.time_s)
         return forcing
 
     @staticmethod

@@ -127,11 +127,8 @@ def _pump_misfit(
     slope = np.gradient(expected)
     size = np.abs(np.where(counted, recorded, 0.0))
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
-    deviation = np.sqrt(
-        noise_alone**2
-        + (FLOOR * rated) ** 2 / np.maximum(seconds.counts, 4.0)
-        + (TIMING_S * seconds.means(slope)) ** 2
-    )
+    late = TIMING_S * seconds.means(slope)
+    deviation = np.sqrt(noise_alone**2 + (FLOOR * rated) ** 2 / np.maximum(seconds.counts, 4.0) + late**2)
     return SignalMisfit(
         bins=Bins(
             signal=np.full(seconds.counts.size, SIGNAL_OF[name]),
@@ -141,6 +138,7 @@ def _pump_misfit(
             second=seconds.first(np.arange(regime.size)),
             deviation=deviation,
             floor=(noise_alone / deviation) ** 2,
+            tolerance=np.hypot(TOLERANCE * seconds.means(size), late) / deviation,
         ),
         name=name,  # type: ignore[arg-type]
         pump=pump,
@@ -176,6 +174,7 @@ def level_misfit(
             second=seconds.first(np.arange(regime.size)),
             deviation=np.sqrt(noise_m2 + balance_m**2),
             floor=noise_m2 / (noise_m2 + balance_m**2),
+            tolerance=balance_m / np.sqrt(noise_m2 + balance_m**2),
         ),
         name="level_m",
         pump=NO_PUMP,

@@ -19,6 +19,8 @@ HELD_SHARE = 0.15
 """Share of repeated values from which a channel counts as held; noise repeats nothing."""
 DEAD_ZONE = 0.35
 """Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
+EDGE = 1.5
+"""Ratio of the sizes that one move in five and one in ten (or ten and twenty) do not reach; 2 for noise."""
 LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
 STRENGTH = 12.0
@@ -68,6 +70,7 @@ def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> Tele
             second=np.tile(first, count),
             deviation=np.ones(cycle.size * count),
             floor=np.zeros(cycle.size * count),
+            tolerance=np.zeros(cycle.size * count),
         ),
         patterns=patterns,
         cycles=cycle.size,
@@ -102,9 +105,9 @@ def _patterns(traces: Traces, sensors: Sensors) -> list[Pattern]:
         if quantity == "level_m" and quantum >= MIN_QUANTUM_M:
             found.append(Pattern(quantity=quantity, quantum=quantum))
             continue
-        smallest = float(np.quantile(jumps, 0.1))
-        is_apart = smallest > DEAD_ZONE * float(np.median(jumps)) and smallest > 2.5 * quantum
-        if 1.0 - jumps.size / moves.size > HELD_SHARE and is_apart:
+        few, smallest, more, middle = (float(q) for q in np.quantile(jumps, [0.05, 0.1, 0.2, 0.5]))
+        has_edge = smallest > DEAD_ZONE * middle or smallest < EDGE * few or more < EDGE * smallest
+        if 1.0 - jumps.size / moves.size > HELD_SHARE and has_edge and smallest > 2.5 * quantum:
             found.append(Pattern(quantity=quantity, deadband=smallest))
     return found
 

@@ -30,16 +30,19 @@ class Traces:
     ----------
     start_ns : int
         Time of the first second.
+    time_s : (n,) array
+        Seconds since then.
     frequency_hz : (pumps, n) array
         Without NaN.
     level_m : (n,) array
     inflow_m3h : (n,) array or None
         Without NaN.
     signals : dict of (pumps, n) arrays
-        Of `PUMP_SIGNALS` those that are measured.
+        Of `PUMP_SIGNALS` those that are measured, and move.
     """
 
     start_ns: int
+    time_s: Floats
     frequency_hz: Floats
     level_m: Floats
     inflow_m3h: Floats | None
@@ -90,7 +93,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         return np.array([on_seconds(f"pump{i}_{quantity}") for i in range(1, pumps + 1)])
 
     signals = {name: of_pumps(name) for name in PUMP_SIGNALS}
-    signals = {name: values for name, values in signals.items() if np.isfinite(values).any()}
+    signals = {name: values for name, values in signals.items() if _moves(values)}
     nominal_hz = np.array([[pump.nominal_frequency_hz] for pump in station.pump])
     frequency_hz = of_pumps("frequency_hz")
     frequency_hz = np.where(np.isnan(frequency_hz), of_pumps("running") * nominal_hz, frequency_hz)
@@ -101,14 +104,16 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     starts = int(np.sum((frequency_hz[:, 1:] > 0.0) & (frequency_hz[:, :-1] == 0.0)))
     if starts < MIN_STARTS:
         raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {MIN_STARTS}")
-    if not {"flow_m3h", "head_m"} & signals.keys() and not np.isfinite(recording.column("level_m")).any():
-        raise ValueError("flow, head and level have no values: nothing to hold the simulator against")
+    level_m = on_seconds("level_m")
+    if not {"flow_m3h", "head_m"} & signals.keys() and not _moves(level_m):
+        raise ValueError("flow, head and level have no values or never move: nothing to hold the simulator against")
     inflow_m3h = on_seconds("inflow_m3h")
     is_known = np.isfinite(inflow_m3h).mean() > 0.5 * (np.unique(second).size / seconds)
     return Traces(
         start_ns=int(recording.time_ns[0]),
+        time_s=np.arange(seconds, dtype=np.float64),
         frequency_hz=frequency_hz,
-        level_m=on_seconds("level_m"),
+        level_m=level_m if _moves(level_m) else np.full(seconds, np.nan),
         inflow_m3h=filled(inflow_m3h, seconds, 0.0) if is_known else None,
         signals=signals,
     )
@@ -133,6 +138,12 @@ def repeated(values: Floats) -> npt.NDArray[np.bool_]:
     same = np.zeros(values.shape, dtype=bool)
     same[..., 1:] = (values[..., 1:] == values[..., :-1]) & (values[..., 1:] != 0.0)
     return same
+
+
+def _moves(values: Floats) -> bool:
+    """Whether a channel has values that differ; one that never moves tells nothing."""
+    known = values[np.isfinite(values)]
+    return bool(known.size) and bool(np.ptp(known) > 0.0)
 
 
 def _length_s(second: npt.NDArray[np.int64]) -> int:

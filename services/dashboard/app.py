@@ -17,6 +17,7 @@ from wetwell.protocols.link import Bus
 from wetwell.services.dashboard.assets import Asset, Assets
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.hub import Hub
+from wetwell.services.dashboard.login import Login, holder_in
 from wetwell.services.dashboard.questions import RefusalError, act_on_alarm, history, recording_pieces
 from wetwell.services.dashboard.reports import find_report, report_names
 from wetwell.services.dashboard.site_view import SiteView
@@ -47,9 +48,9 @@ class Desk:
         return self.bus
 
 
-def dashboard_app(desk: Desk) -> Starlette:
-    """Web application over a desk."""
-    pages, answers = _Pages(), _Answers(desk)
+def dashboard_app(desk: Desk, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
+    """Web application over a desk, behind a `Guard`."""
+    pages, answers, login = _Pages(), _Answers(desk), Login(tokens_file)
     shells = ("/", "/station/{station}", "/alarms", "/reports", "/health")
     return Starlette(
         routes=[
@@ -62,12 +63,14 @@ def dashboard_app(desk: Desk) -> Starlette:
             Route("/api/stations/{station}/history", answers.history),
             Route("/api/stations/{station}/recording.csv", answers.recording),
             Route("/api/stations/{station}/alarm-act", answers.act, methods=["POST"]),
+            Route("/api/who", login.who),
+            Route("/api/login", login.enter, methods=["POST"]),
             Route("/api/alarms", answers.alarms),
             Route("/api/health", answers.health),
             Route("/api/reports", answers.reports),
             Route("/reports/{name:path}", answers.report),
         ],
-        middleware=[Middleware(Guard)],
+        middleware=[Middleware(Guard, tokens_file=tokens_file, is_local=is_local)],
         exception_handlers={RefusalError: _refuse},
     )
 
@@ -119,7 +122,9 @@ class _Answers:
         return _json(request, json.dumps({"connected": bus is not None and bus.is_connected, "services": services}))
 
     async def act(self, request: Request) -> Response:
-        answer = await act_on_alarm(self._desk.asked(), request.path_params["station"], await request.body())
+        holder = holder_in(request)
+        by = None if holder is None else holder.name
+        answer = await act_on_alarm(self._desk.asked(), request.path_params["station"], await request.body(), by)
         return JSONResponse(answer)
 
     async def history(self, request: Request) -> Response:

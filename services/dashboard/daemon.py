@@ -12,6 +12,7 @@ from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.hub import Hub
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
+from wetwell.services.exposure import check_exposure, is_loopback
 from wetwell.services.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -22,17 +23,29 @@ async def serve_dashboard(settings: Settings) -> None:
 
     Raises
     ------
+    ConfigError
+        If others would reach the page and no tokens are asked for.
     LinkError
         If the address cannot be listened on.
     """
+    check_exposure(
+        "dashboard.host",
+        settings.dashboard.host,
+        is_protected=settings.security.tokens_file is not None,
+        remedy="security.tokens_file (wetwell token new)",
+        insecure=settings.security.insecure,
+    )
     listener = open_socket(settings.dashboard.host, settings.dashboard.port)
     async with stop_event() as stop:
         await until(stop, asyncio.create_task(_run(settings, listener), name="dashboard.run"))
 
 
 async def _run(settings: Settings, listener: socket.socket) -> None:
+    tokens_file = settings.security.tokens_file
     desk = Desk(SiteView(settings.dashboard.stale_s), Hub(), settings.dashboard.reports)
-    async with web_server(dashboard_app(desk), listener, desk.hub):
+    is_local = tokens_file is None and is_loopback(settings.dashboard.host)
+    app = dashboard_app(desk, tokens_file, is_local=is_local)
+    async with web_server(app, listener, desk.hub):
         log.info("page on http://%s:%d", *listener.getsockname()[:2])
         with await connect(settings) as bus:
             feed, desk.bus = Feed(bus, desk.view, desk.hub), bus

@@ -1,14 +1,19 @@
 """What stands before every answer: whose requests are heard, and what a browser may do with the page."""
 
 from collections.abc import Mapping
+from http.cookies import SimpleCookie
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+from wetwell.protocols.errors import ConfigError
+from wetwell.services.exposure import is_loopback
+from wetwell.services.tokens import Holder, holder_of
 
+COOKIE = "wetwell_token"
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -26,57 +31,117 @@ _HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), geolocation=(), microphone=()",
 }
+_GUARDED = ("/events", "/api/", "/reports/")
+_OPEN = ("/api/login", "/api/who")
 
 
 class Guard:
-    """Refuses requests that a foreign web page makes the browser send, and sets the headers that keep the page safe.
+    """Refuses who may not ask, and requests that a foreign web page makes the browser send; sets the safe headers.
 
-    The page listens on loopback: a request for any other host name comes by a name that was made to point here. An
-    act (anything but GET and HEAD) must be JSON and come from this page itself.
+    Without tokens the page is for this machine: a request by any other host name comes by one that was made to point
+    here. With tokens every request for data must bring one, as `Authorization: Bearer` or as the cookie that the
+    login sets. An act (anything but GET and HEAD) must be JSON, come from this page itself, and needs an operator.
+
+    Parameters
+    ----------
+    app : ASGIApp
+    tokens_file : Path, optional
+        File of tokens.
+    is_local : bool
+        Whether only names of this machine are heard.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, tokens_file: Path | None, *, is_local: bool) -> None:
         self._app = app
+        self._tokens_file = tokens_file
+        self._is_local = is_local
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        policy = REPORT_POLICY if scope["path"].startswith("/reports/") else PAGE_POLICY
+        path, headers = scope["path"], Headers(scope=scope)
+        policy = REPORT_POLICY if path.startswith("/reports/") else PAGE_POLICY
 
         async def send_safe(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                headers["content-security-policy"] = policy
+                safe = MutableHeaders(scope=message)
+                safe["content-security-policy"] = policy
                 for name, value in _HEADERS.items():
-                    headers[name] = value
+                    safe[name] = value
             await send(message)
 
-        refusal = refused(scope["method"], Headers(scope=scope))
+        refusal = (foreign_name(headers) if self._is_local else None) or foreign_act(scope["method"], headers)
+        if refusal is None and self._tokens_file is not None:
+            holder, refusal = self._admitted(scope["method"], path, token_in(headers))
+            scope.setdefault("state", {})["holder"] = holder
         if refusal:
             status, reason = refusal
             await JSONResponse({"error": reason}, status)(scope, receive, send_safe)
             return
         await self._app(scope, receive, send_safe)
 
+    def _admitted(self, method: str, path: str, token: str) -> tuple[Holder | None, tuple[int, str] | None]:
+        """Who asks, and why that is refused, if it is."""
+        if not path.startswith(_GUARDED):
+            return None, None
+        try:
+            holder = holder_of(self._tokens_file, token) if self._tokens_file is not None and token else None
+        except ConfigError:
+            return None, (503, "the tokens cannot be read: nobody is let in")
+        if path in _OPEN:
+            return holder, None
+        if holder is None:
+            return None, (401, "a token is needed")
+        if method not in {"GET", "HEAD"} and not holder.may("operator"):
+            return holder, (403, f"'{holder.name}' may look, not act")
+        return holder, None
 
-def refused(method: str, headers: Mapping[str, str]) -> tuple[int, str] | None:
-    """Status and reason of a request that is not heard; None if it is.
+
+def token_in(headers: Mapping[str, str]) -> str:
+    """Token that a request brings; empty without one.
 
     Examples
     --------
-    >>> refused("GET", {"host": "127.0.0.1:8080"}), refused("GET", {"host": "evil.example"})
-    (None, (421, "host: got 'evil.example', this page is served on loopback only"))
+    >>> token_in({"authorization": "Bearer one"}), token_in({"cookie": "wetwell_token=two"}), token_in({})
+    ('one', 'two', '')
+    """
+    scheme, _, token = headers.get("authorization", "").partition(" ")
+    if scheme.lower() == "bearer":
+        return token.strip()
+    cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+    return "" if cookie is None else cookie.value
+
+
+def foreign_name(headers: Mapping[str, str]) -> tuple[int, str] | None:
+    """Refusal of a request by a name that is none of this machine's.
+
+    Examples
+    --------
+    >>> foreign_name({"host": "localhost:8080"}), foreign_name({"host": "evil.example"})
+    (None, (421, "host: got 'evil.example', this page is for its own machine only"))
     """
     host = headers.get("host", "")
-    if urlsplit(f"//{host}").hostname not in LOOPBACK:
-        return 421, f"host: got '{host}', this page is served on loopback only"
+    if is_loopback(_name(host)):
+        return None
+    return 421, f"host: got '{host}', this page is for its own machine only"
+
+
+def foreign_act(method: str, headers: Mapping[str, str]) -> tuple[int, str] | None:
+    """Refusal of an act that another page may have sent: it is no JSON, or says that it comes from elsewhere."""
     if method in {"GET", "HEAD"}:
         return None
     if headers.get("content-type", "").partition(";")[0].strip() != "application/json":
         return 415, "content-type: must be application/json"
     origin = headers.get("origin")
-    if origin is not None and urlsplit(origin).netloc != host:
+    if origin is not None and urlsplit(origin).netloc != headers.get("host", ""):
         return 403, f"origin: got '{origin}', must be this page"
     return None
+
+
+def _name(host: str) -> str:
+    try:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return ""

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 
 QUEUE = 16
 """Events that may wait for a browser."""
-RESYNC = b"event: resync\ndata: {}\n\n"
+RESYNC = b"retry: 1000\nevent: resync\ndata: {}\n\n"
 """Tells a browser to ask for the whole state: at the beginning, and when it has missed something."""
 KEEP_ALIVE = b": \n\n"
 KEEP_ALIVE_S = 15.0

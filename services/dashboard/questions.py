@@ -25,8 +25,8 @@ class RefusalError(WetwellError):
         self.status = status
 
 
-async def act_on_alarm(bus: Bus, station: str, body: bytes) -> dict[str, Any]:
-    """Answer of the alarm service to an act: an `AlarmAct` in JSON.
+async def act_on_alarm(bus: Bus, station: str, body: bytes, by: str | None = None) -> dict[str, Any]:
+    """Answer of the alarm service to an act: an `AlarmAct` in JSON, by whom it says, or by who is known to ask.
 
     Raises
     ------
@@ -34,11 +34,13 @@ async def act_on_alarm(bus: Bus, station: str, body: bytes) -> dict[str, Any]:
         If the body is no act, or nobody answers.
     """
     try:
-        act = AlarmAct.model_validate_json(body, by_name=True)
+        act = AlarmAct.model_validate_json(body)
     except ValidationError as error:
         raise RefusalError(400, first_fault(error)) from error
     if act.station != station:
         raise RefusalError(400, f"station: got '{act.station}', must be '{station}'")
+    if by is not None:
+        act = act.model_copy(update={"by": by})
     for payload in await bus.ask(alarm_act_key(station), act.encode(), timeout_s=ANSWER_S):
         try:
             answer: dict[str, Any] = AlarmAnswer.decode(payload).model_dump(mode="json")

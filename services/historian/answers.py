@@ -10,7 +10,6 @@ from wetwell.protocols.stamps import to_iso
 from wetwell.services.historian.hours import HOUR_NS, Hours, joined_hours
 from wetwell.services.historian.samples import Floats, Integers, Samples, merged
 from wetwell.services.historian.store import DAY_NS, StationSpan, Store, StoreError, blocks, day_of
-from wetwell.services.historian.summary import Summary, joined
 
 
 def answer(store: Store, station: str, payload: bytes) -> History:
@@ -52,23 +51,10 @@ def _of_station(span: StationSpan) -> dict[str, str | None]:
 
 
 def _of_samples(store: Store, station: str, start_ns: int, end_ns: int, points: int) -> History:
-    """The samples if they are few, else a summary, block by block."""
-    span_ns = -(-(end_ns - start_ns) // points)
-    few: list[Samples] = []
-    parts: list[Summary] = []
-    for block in blocks(store, station, start_ns, end_ns):
-        few.append(block)
-        if parts or sum(map(len, few)) > points:
-            parts += [Summary.of(each).over(start_ns, span_ns) for each in few]
-            few = []
-    # after the samples: these turn into minutes, and what is seen twice changes no mean, least or largest value
-    parts += [part.over(start_ns, span_ns) for part in store.summaries(station, start_ns, end_ns)]
-    if parts:
-        parts += [Summary.of(each).over(start_ns, span_ns) for each in few]
-    else:
-        samples = merged(few)
+    if store.is_few(station, start_ns, end_ns, points):
+        samples = merged(list(blocks(store, station, start_ns, end_ns)))
         return _columns(station, "samples", samples.time_ns, _by_name(samples))
-    summary = joined(parts).over(start_ns, span_ns)
+    summary = store.summary(station, start_ns, end_ns, -(-(end_ns - start_ns) // points))
     return _columns(station, "samples", summary.time_ns, summary.columns())
 
 

@@ -19,6 +19,8 @@ from wetwell.services.historian.summary import Summary
 
 Form = Literal["samples", "minutes"]
 _STAMP = pa.timestamp("ns", tz="UTC")
+_FEW_VALUES = ("running", "count", "quality")
+"""Endings of columns that repeat a few values; the others are measured, and take a third less as streams of bytes."""
 
 
 class Archive:
@@ -62,6 +64,14 @@ class Archive:
             return 0
         except (OSError, pa.ArrowException) as error:
             raise StoreError(f"{self.path('samples', station, day_ns)}: cannot be read: {error}") from error
+
+    def count(self, station: str, day_ns: int, start_ns: int, end_ns: int) -> int:
+        """Number of samples of a span in the file of a day; 0 if there is none."""
+        table = self._read(self.path("samples", station, day_ns), ["time"])
+        if table is None:
+            return 0
+        time_ns = _stamps(table)
+        return int(np.count_nonzero((time_ns >= start_ns) & (time_ns < end_ns)))
 
     def minutes(self, station: str, day_ns: int) -> Summary | None:
         """Minutes of a day; None if there is no file."""
@@ -111,9 +121,9 @@ class Archive:
         except OSError as error:
             raise StoreError(f"{path}: cannot be deleted: {error.strerror or error}") from error
 
-    def _read(self, path: Path) -> pa.Table | None:
+    def _read(self, path: Path, columns: list[str] | None = None) -> pa.Table | None:
         try:
-            return pa.parquet.ParquetFile(path).read()
+            return pa.parquet.ParquetFile(path).read(columns)
         except FileNotFoundError:
             return None
         except (OSError, pa.ArrowException) as error:
@@ -126,7 +136,16 @@ def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: di
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as file:
-            pa.parquet.write_table(table, file, compression="zstd")
+            pa.parquet.write_table(
+                table,
+                file,
+                compression="zstd",
+                use_dictionary=[name for name in table.column_names if name.endswith(_FEW_VALUES)],
+                use_byte_stream_split=[name for name in values if not name.endswith(_FEW_VALUES)],
+                column_encoding={
+                    name: "DELTA_BINARY_PACKED" for name in ("time", "seq") if name in table.column_names
+                },
+            )
             file.flush()
             os.fsync(file.fileno())
         _sync_folders(path.parent)

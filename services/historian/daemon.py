@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 
-from wetwell.protocols.keys import SITE, alarm_key, history_key, sample_key, verdict_key
+from wetwell.protocols.keys import ROOT, SITE, alarm_key, history_key, sample_key, verdict_key
 from wetwell.protocols.link import Bus, Request, Subscription
 from wetwell.services.bus import connect
 from wetwell.services.clock import now_ns
@@ -18,8 +18,8 @@ log = logging.getLogger(__name__)
 SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
-CAPACITY = 100_000
-"""Messages of one kind that wait to be taken: 100 s of a thousand stations."""
+CAPACITY = 1_000_000
+"""Most messages of one kind that wait to be taken: after a start a thousand publishers send what they hold."""
 
 SLICE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
@@ -30,9 +30,17 @@ async def serve_historian(settings: Settings) -> None:
     async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
         store = stack.enter_context(open_store(settings.historian))
         historian = Historian(store, spool_rows=settings.historian.spool_rows)
-        stack.callback(lambda: historian.commit(now_ns()))
+        stack.callback(_finish, historian)
         running = asyncio.create_task(_run(settings, historian, stack), name="historian.run")
         await until(stop, running)
+
+
+def _finish(historian: Historian) -> None:
+    """Keep what is left."""
+    historian.commit(now_ns())
+    waiting = historian.figures(now_ns())["waiting"]
+    if waiting:
+        log.error("%d rows could not be kept and are lost, but for what their publishers still have", waiting)
 
 
 async def _run(settings: Settings, historian: Historian, stack: contextlib.AsyncExitStack) -> None:
@@ -86,5 +94,5 @@ async def _maintain(historian: Historian, period_s: float) -> None:
 async def _answer(historian: Historian, questions: Subscription[Request]) -> None:
     while True:
         for request in await questions.receive():
-            _, station, _ = request.key.split("/")
+            station = request.key.removeprefix(f"{ROOT}/").removesuffix("/history")
             request.reply(await asyncio.to_thread(historian.answer, station, request.payload))

@@ -7,12 +7,13 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from wetwell.services.historian.archive import Archive
+from wetwell.services.historian.archive import Archive, Form
+from wetwell.services.historian.file_query import summary_of_files
 from wetwell.services.historian.hours import HOUR_NS, Hours
 from wetwell.services.historian.live_database import LiveDatabase
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of
-from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller
+from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
 log = logging.getLogger(__name__)
 
@@ -85,44 +86,62 @@ class FolderStore:
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span."""
-        live_ns = set()
-        next_ns = self.live.next_time_ns(station, start_ns)  # before the files: rows go from here to there
-        while next_ns is not None and next_ns < end_ns:
-            live_ns.add(day_of(next_ns))
-            next_ns = self.live.next_time_ns(station, day_of(next_ns) + DAY_NS)
-        filed_ns = {day for day in self.archive.days_ns("samples", station) if start_ns - DAY_NS < day < end_ns}
-        return sorted(live_ns | filed_ns)
+        live_ns = self.live.days_ns(station, start_ns, end_ns)  # before the files: rows go from here to there
+        return sorted({*live_ns, *self._filed("samples", station, start_ns, end_ns)})
 
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
         """Samples of a span; where file and database have the same one, that of the file."""
         live = self.live.samples(station, start_ns, end_ns)  # before the files, likewise
-        filed = [
-            self.archive.samples(station, day_ns)
-            for day_ns in self.archive.days_ns("samples", station)
-            if start_ns - DAY_NS < day_ns < end_ns
-        ]
+        filed = [self.archive.samples(station, day) for day in self._filed("samples", station, start_ns, end_ns)]
         return merged([*(each.between(start_ns, end_ns) for each in filed if each is not None), live])
 
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
-        counts = [
-            self.archive.pumps(station, day_ns)
-            for day_ns in self.archive.days_ns("samples", station)
-            if start_ns - DAY_NS < day_ns < end_ns
-        ]
+        counts = [self.archive.pumps(station, day) for day in self._filed("samples", station, start_ns, end_ns)]
         live = self.live.pumps(station, start_ns, end_ns)
         return max(counts if live is None else [*counts, live], default=None)
 
-    def summaries(self, station: str, start_ns: int, end_ns: int) -> Iterator[Summary]:
-        """Minutes of days of which the samples are gone."""
-        with_samples = set(self.archive.days_ns("samples", station))
-        for day_ns in self.archive.days_ns("minutes", station):
-            if day_ns in with_samples or not start_ns - DAY_NS < day_ns < end_ns:
-                continue
+    def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
+        """Whether a span has at most so many samples, and none that have become minutes."""
+        if self._filed("minutes", station, start_ns, end_ns):
+            return False
+        count = self.live.count(station, start_ns, end_ns, points + 1)
+        for day_ns in self._filed("samples", station, start_ns, end_ns):
+            if count > points:
+                break
+            count += self.archive.count(station, day_ns, start_ns, end_ns)
+        return count <= points
+
+    def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        """Summary of the days in files by DuckDB, of those that are in the database, too, by NumPy."""
+        try:
+            return self._summary(station, start_ns, end_ns, span_ns)
+        except StoreError:
+            return self._summary(station, start_ns, end_ns, span_ns)  # a file has gone on while it was to be read
+
+    def _summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        live_ns = set(self.live.days_ns(station, start_ns, end_ns))
+        of_samples = set(self._filed("samples", station, start_ns, end_ns))
+        of_minutes = set(self._filed("minutes", station, start_ns, end_ns))
+        parts = []
+        for day_ns in sorted(live_ns | (of_samples & of_minutes)):
+            day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
             minutes = self.archive.minutes(station, day_ns)
-            if minutes is not None:
-                is_asked = (minutes.time_ns >= start_ns) & (minutes.time_ns < end_ns)
-                yield minutes.take(is_asked)
+            if minutes is not None:  # late samples, or a downsampling that was broken off
+                day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
+            parts.append(day.over(start_ns, span_ns))
+        filed: dict[Form, set[int]] = {
+            "samples": of_samples - live_ns - of_minutes,
+            "minutes": of_minutes - live_ns - of_samples,
+        }
+        for form, days_ns in filed.items():
+            if days_ns:
+                paths = [self.archive.path(form, station, day_ns) for day_ns in sorted(days_ns)]
+                parts.append(summary_of_files(form, paths, start_ns, end_ns, start_ns, span_ns))
+        return joined(parts).over(start_ns, span_ns)
+
+    def _filed(self, form: Form, station: str, start_ns: int, end_ns: int) -> list[int]:
+        return [day_ns for day_ns in self.archive.days_ns(form, station) if start_ns - DAY_NS < day_ns < end_ns]
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""
@@ -172,10 +191,14 @@ class FolderStore:
         live = self.live.samples(station, day_ns, day_ns + DAY_NS)
         filed = self.archive.samples(station, day_ns)
         samples = live if filed is None else merged([filed, live])
-        around = self.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
+        end_ns = day_ns + DAY_NS
+        before, after = (
+            self.samples(station, day_ns - HOUR_NS, day_ns),
+            self.samples(station, end_ns, end_ns + HOUR_NS),
+        )
         self.archive.write_samples(station, day_ns, samples)
         if day_ns not in self.archive.days_ns("minutes", station):  # else these are a few late ones
-            self.live.write_hours(station, Hours.of_samples(around, day_ns, day_ns + DAY_NS))
+            self.live.write_hours(station, Hours.of_samples(merged([before, samples, after]), day_ns, end_ns))
         self.live.delete_samples(station, live)
         return f"{self.archive.path('samples', station, day_ns)}: {len(samples)} samples"
 

@@ -7,6 +7,7 @@ a power failure. One connection writes; each reading has a connection of its own
 import contextlib
 import hashlib
 import logging
+import operator
 import sqlite3
 import threading
 from collections.abc import Iterator, Sequence
@@ -15,13 +16,16 @@ from pathlib import Path
 from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.samples import Samples
-from wetwell.services.historian.store import Batch, EventKind, StationSpan, StoreError, span_of
+from wetwell.services.historian.store import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of, span_of
 
 log = logging.getLogger(__name__)
 
 VERSION = 1
 BUSY_S = 10.0
 """So long one process waits for another that writes."""
+
+_BY_KEY = operator.itemgetter(0, 1, 2)
+"""Station, time, `seq` of a `SampleRow`: inserting in this order takes half the time."""
 
 _SCHEMA = f"""
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
@@ -74,7 +78,10 @@ class LiveDatabase:
             before = database.total_changes
             database.executemany(
                 "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?)",
-                [(ids[row.station], row.time_ns, row.seq, row.quality, row.data) for row in batch.samples],
+                [
+                    (ids[row.station], row.time_ns, row.seq, row.quality, row.data)
+                    for row in sorted(batch.samples, key=_BY_KEY)  # rows of a page together
+                ],
             )
             database.executemany(
                 "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?)",
@@ -141,14 +148,40 @@ class LiveDatabase:
             ).fetchone()
         return None if time_ns is None else int(time_ns)
 
+    def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
+        """Beginnings of the days that have samples in a span, in order."""
+        days_ns = []
+        next_ns = self.next_time_ns(station, start_ns)
+        while next_ns is not None and next_ns < end_ns:
+            days_ns.append(day_of(next_ns))
+            next_ns = self.next_time_ns(station, days_ns[-1] + DAY_NS)
+        return days_ns
+
+    def count(self, station: str, start_ns: int, end_ns: int, most: int) -> int:
+        """Number of samples of a span, counted up to `most`."""
+        with self._reading() as database:
+            (count,) = database.execute(
+                "SELECT count(*) FROM (SELECT 1 FROM sample WHERE station = (SELECT id FROM station WHERE name = ?) "
+                "AND time_ns >= ? AND time_ns < ? LIMIT ?)",
+                (station, start_ns, end_ns, most),
+            ).fetchone()
+        return int(count)
+
     def delete_samples(self, station: str, samples: Samples) -> None:
         """Delete these samples, and no others that came meanwhile."""
-        keys = zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True)
+        keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
         with self._transaction() as database:
             (number,) = database.execute("SELECT id FROM station WHERE name = ?", (station,)).fetchone()
-            database.executemany(
-                "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?", [(number, *key) for key in keys]
-            )
+            span = (number, keys[0][0], keys[-1][0])
+            between = "FROM sample WHERE station = ? AND time_ns BETWEEN ? AND ?"
+            (count,) = database.execute(f"SELECT count(*) {between}", span).fetchone()
+            if count == len(keys):
+                database.execute(f"DELETE {between}", span)
+            else:
+                database.executemany(
+                    "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?",
+                    [(number, *key) for key in keys],
+                )
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, LiteralString
 
+import numpy as np
 import psycopg
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
@@ -25,7 +26,7 @@ from wetwell.services.historian.store import (
     day_of,
     span_of,
 )
-from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller
+from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
 log = logging.getLogger(__name__)
 
@@ -161,7 +162,7 @@ class PostgresStore:
             "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
             "AND time_ns >= %(start)s AND time_ns < %(end)s) AS at UNION ALL "
             "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
-            "AND time_ns >= (floor(at::numeric / %(day)s) + 1) * %(day)s AND time_ns < %(end)s) "
+            "AND time_ns >= ((floor(at::numeric / %(day)s) + 1) * %(day)s)::bigint AND time_ns < %(end)s) "
             "FROM next WHERE at IS NOT NULL) SELECT at FROM next WHERE at IS NOT NULL",
             {"station": station, "start": start_ns, "end": end_ns, "day": DAY_NS},
         )
@@ -185,16 +186,40 @@ class PostgresStore:
         )
         return None if width is None else (width - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
 
-    def summaries(self, station: str, start_ns: int, end_ns: int) -> Iterator[Summary]:
-        """Minutes of the days of which the samples are gone."""
+    def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
+        """Whether a span has at most so many samples, and none that have become minutes."""
+        ((samples, minutes),) = self._read(
+            "WITH s AS (SELECT id FROM wetwell.station WHERE name = %(station)s) SELECT "
+            "(SELECT count(*) FROM (SELECT 1 FROM wetwell.sample WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s LIMIT %(most)s) AS few), "
+            "EXISTS (SELECT 1 FROM wetwell.minute WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s)",
+            {"station": station, "start": start_ns, "end": end_ns, "most": points + 1},
+        )
+        return samples <= points and not minutes
+
+    def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
+        days_ns = self.days_ns(station, start_ns, end_ns)
+        parts = []
+        for day_ns in days_ns:
+            day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
+            minutes = self._minutes(station, day_ns, day_ns + DAY_NS)
+            if len(minutes):  # late samples, or a day that has become minutes just now
+                day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
+            parts.append(day.over(start_ns, span_ns))
+        minutes = self._minutes(station, start_ns, end_ns)
+        parts.append(minutes.take(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
+        return joined(parts).over(start_ns, span_ns)
+
+    def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:
         rows = self._read(
             "SELECT time_ns, array_send(count), array_send(mean), array_send(low), array_send(high) "
             "FROM wetwell.minute WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
             "AND time_ns >= %s AND time_ns < %s ORDER BY time_ns",
             (station, start_ns, end_ns),
         )
-        if rows:
-            yield Summary.of_rows([(time_ns, *map(from_postgres, arrays)) for time_ns, *arrays in rows])
+        return Summary.of_rows([(time_ns, *map(from_postgres, arrays)) for time_ns, *arrays in rows])
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""
@@ -226,9 +251,8 @@ class PostgresStore:
         return None
 
     def figures(self) -> dict[str, float]:
-        """Size of the database."""
-        ((size,),) = self._read("SELECT pg_database_size(current_database())")
-        return {"database_bytes": float(size)}
+        """Whether it is connected."""
+        return {"is_connected": float(self._writer is not None)}
 
     def _sum_up(self, station: str, newest_ns: int) -> str | None:
         """Work out the hours of the oldest complete day that has none yet, or has had late samples since."""
@@ -237,7 +261,7 @@ class PostgresStore:
         day_ns = next(iter(self.days_ns(station, summed_ns, end_ns)), None) if summed_ns < end_ns else None
         if day_ns is None:
             return None
-        has_minutes = any(True for _ in self.summaries(station, day_ns, day_ns + DAY_NS))
+        has_minutes = len(self._minutes(station, day_ns, day_ns + DAY_NS)) > 0
         around = self.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
         hours = Hours.of_samples(around, day_ns, day_ns + DAY_NS)
         with self._transaction() as database:
@@ -263,8 +287,7 @@ class PostgresStore:
         day_ns = days_ns[0]
         samples = self.samples(station, day_ns, day_ns + DAY_NS)
         minutes = Summary.of(samples).over(day_ns, MINUTE_NS)
-        for earlier in self.summaries(station, day_ns, day_ns + DAY_NS):
-            minutes = fuller(earlier, minutes)
+        minutes = fuller(self._minutes(station, day_ns, day_ns + DAY_NS), minutes)
         keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
         with self._transaction() as database:
             ((number,),) = database.execute("SELECT id FROM wetwell.station WHERE name = %s", (station,)).fetchall()

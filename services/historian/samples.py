@@ -104,7 +104,7 @@ class Samples:
             for number, row in enumerate(rows):
                 values[number, : len(row[3]) // 8] = np.frombuffer(row[3], dtype="<f8")
         keys = np.array([row[:3] for row in rows], dtype=np.int64).reshape(len(rows), 3)
-        return cls(time_ns=keys[:, 0], seq=keys[:, 1], quality=keys[:, 2], values=values).in_order()
+        return cls(time_ns=keys[:, 0], seq=keys[:, 1], quality=keys[:, 2], values=_finite(values)).in_order()
 
     @classmethod
     def of_recording(cls, recording: Recording) -> "Samples":
@@ -112,7 +112,7 @@ class Samples:
         columns = [recording.column(name) for name in columns_of(recording.pumps)]
         zeros = np.zeros(len(recording), dtype=np.int64)
         values = np.stack(columns, axis=1) if columns else np.empty((0, 0))
-        return cls(time_ns=recording.time_ns, seq=zeros, quality=zeros, values=values).in_order()
+        return cls(time_ns=recording.time_ns, seq=zeros, quality=zeros, values=_finite(values)).in_order()
 
     def in_order(self) -> "Samples":
         """The same in order, each once."""
@@ -163,6 +163,11 @@ def merged(parts: Sequence[Samples]) -> Samples:
         quality=np.concatenate([none, *(part.quality for part in parts)]),
         values=np.concatenate([np.empty((0, len(columns_of(pumps)))), *(part.padded(pumps) for part in parts)]),
     ).in_order()
+
+
+def _finite(values: Floats) -> Floats:
+    """Infinities mean "no value", too."""
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _follows(time_ns: Integers, seq: Integers) -> npt.NDArray[np.bool_]:

@@ -68,8 +68,11 @@ class Store(Protocol):
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
 
-    def summaries(self, station: str, start_ns: int, end_ns: int) -> Iterator[Summary]:
-        """Minutes of the days of which the samples are no longer kept."""
+    def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
+        """Whether a span has at most so many samples, and none that have become minutes."""
+
+    def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""

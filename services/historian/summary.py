@@ -38,7 +38,7 @@ class Summary:
     @classmethod
     def of(cls, samples: Samples) -> "Summary":
         """Samples, each as a span of its own."""
-        values = np.where(np.isfinite(samples.values), samples.values, np.nan)
+        values = samples.values
         count = (~np.isnan(values)).astype(np.float64)
         return cls(time_ns=samples.time_ns, count=count, mean=values, low=values, high=values)
 
@@ -102,6 +102,10 @@ class Summary:
             low=self.low[rows],
             high=self.high[rows],
         )
+
+    def between(self, start_ns: int, end_ns: int) -> "Summary":
+        """Those that begin from `start_ns` until before `end_ns`."""
+        return self.take((self.time_ns >= start_ns) & (self.time_ns < end_ns))
 
     def columns(self) -> dict[str, Floats]:
         """Columns by name: `level_m`, `level_m_min`, `level_m_max`, and so on."""

@@ -70,15 +70,24 @@ class CaseScore:
     parameters: tuple[dict[str, Any], ...]
 
 
-def score_case(label: Label, answer: Answer | None) -> CaseScore:
-    """Score of one answer; None for a diagnosis that failed, which is wrong in all."""
+def score_case(label: Label, answer: Answer | None, whole: Answer | None = None) -> CaseScore:
+    """Score of one answer; None for a diagnosis that failed, which is wrong in all.
+
+    Parameters
+    ----------
+    label : Label
+    answer : Answer or None
+    whole : Answer or None
+        Of the same diagnosis with the whole library, where a name was left out: it tells what is equivalent to that.
+    """
     answer = answer and _without(answer, set(label.inherent) - set(label.names))
     told = answer.verdict if answer else FAILED
     names = answer.names if answer and told == "effect" else ()
     is_known = label.kind in {"single", "pair"}
     place = answer.where[0].component if answer and answer.where else ""
     expected = VERDICT_OF[label.kind]
-    named_equivalent = bool(answer and names and set(answer.effects[0].equivalent) & set(label.names))
+    told_by = [one for one in (answer, whole) if one and names]
+    named_equivalent = any(_is_equivalent(names[0], label.names, one) for one in told_by)
     return CaseScore(
         label=label,
         told=told,
@@ -91,6 +100,11 @@ def score_case(label: Label, answer: Answer | None) -> CaseScore:
         shrinkage=answer.gap.shrinkage if answer and is_known and told == "effect" else 0.0 if is_known else None,
         parameters=tuple(_parameter_rows(label, answer)) if answer and is_known else (),
     )
+
+
+def _is_equivalent(told: str, true: Sequence[str], answer: Answer) -> bool:
+    """Whether a diagnosis declares an effect and a true one equivalent."""
+    return any({told, name} <= {effect.name, *effect.equivalent} for effect in answer.effects for name in true)
 
 
 def _without(answer: Answer, names: set[str]) -> Answer:

@@ -106,7 +106,7 @@ def _motor_slip(truth: Truth, p: Mapping[str, Any]) -> None:
 
 def _ramp_shape(truth: Truth, p: Mapping[str, Any]) -> None:
     """S-ramp (half cosine) or parabola in the drive."""
-    truth.change(ramp_bow=p["bow"])
+    truth.change(ramp_bow=p["bow"] if "bow" in p else -p["parabola"])
 
 
 def _load_dependent_power(truth: Truth, p: Mapping[str, Any]) -> None:
@@ -170,6 +170,11 @@ def _wear(d: Draw) -> Parameters:
     if d.rng.random() < 0.6:
         return {"head_loss": d.over(0.05, 0.2), "pump": d.pump}
     return {"ring_m3h": d.over(0.08, 0.2) * d.flow_m3h, "duty_head_m": d.head_m, "pump": d.pump}
+
+
+def _ramp(d: Draw) -> Parameters:
+    bow, parabola = d.between(0.6, 1.0), d.between(0.4, 0.9)
+    return {"bow": bow} if d.either(1.0, -1.0) > 0.0 else {"parabola": parabola}
 
 
 def _shift(d: Draw) -> Parameters:
@@ -284,7 +289,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
     "ramp_shape": Kind(
         "drive",
         ("flow_m3h", "head_m"),
-        lambda d: {"bow": d.either(d.between(0.6, 1.0), -d.between(0.4, 0.9))},
+        _ramp,
         _ramp_shape,
     ),
     "load_dependent_power": Kind(

@@ -48,6 +48,8 @@ SWMM_OPEN = (
 ROUTING_STEP_S = 0.5
 SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
 """Inertance of the mains, times rated flow over head: with more or less, pumps stick or surge in ramps. [s]"""
+FASTEST_M_S = 14.0
+"""Beyond, the solver loses friction: a fifth of it at 18 m/s."""
 ROUGHNESS_MM = 0.1
 GRAVITY = 9.81
 WATER_NU_M2_S = 1.1e-6
@@ -143,12 +145,14 @@ def _main(loss: float, inertance: float, rated_flow: float) -> tuple[float, floa
     $$K = \frac{8 f \ell}{\pi^2 g D^5}, \qquad I = \frac{4 \ell}{\pi g D^2} \quad\Rightarrow\quad
     D^3 = \frac{2 f I}{\pi K}$$
 
-    with f from Colebrook's equation, by repetition.
+    with f from Colebrook's equation, by repetition. The pipe is wider, and so longer, where the water would be faster
+    than SWMM's solver bears.
     """
     diameter_m, friction = 0.1, 0.02
+    least_m = math.sqrt(4.0 * rated_flow / (math.pi * FASTEST_M_S))
     for _ in range(50):
         friction = _friction_factor(diameter_m, rated_flow)
-        diameter_m = (2.0 * friction * inertance / (math.pi * loss)) ** (1.0 / 3.0)
+        diameter_m = max((2.0 * friction * inertance / (math.pi * loss)) ** (1.0 / 3.0), least_m)
     return loss * math.pi**2 * GRAVITY * diameter_m**5 / (8.0 * friction), diameter_m
 
 

@@ -34,12 +34,14 @@ class Effect(Table):
 
     A subclass is one file: the equation and its source, parameters with range and unit, and `modify` or `force`.
     `neutral` names the parameters that are its strength, with the values at which it changes nothing, bit for bit.
-    `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open.
+    `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_shaped`
+    says that the field knows other forms of it also while nothing is switched, as of the shape of a sump.
     """
 
     component: ClassVar[Component]
     neutral: ClassVar[dict[str, float]]
     has_one_form: ClassVar[bool] = False
+    is_shaped: ClassVar[bool] = False
 
     name: str
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from wetwell.detector.gate import COUNTS
 from wetwell.services.alarms.keeper import AlarmKeeper
 from wetwell.services.alarms.listing import TARGETS
 from wetwell.services.alarms.rules import RULES
@@ -33,7 +34,7 @@ def test_the_table_of_metrics_is_that_of_the_code():
 
 
 def test_every_count_of_detector_and_alarms_has_its_meaning():
-    counted = {
+    counted = set(COUNTS) | {
         name for path in SOURCES for name in re.findall(r'counts\["(\w+)"\]', path.read_text(encoding="utf-8"))
     }
     assert {"samples", "malformed", "acts"} <= counted

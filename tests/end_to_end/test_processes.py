@@ -128,7 +128,7 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
         services = set()
         for sample in statuses:
             services.add(json.loads(sample.payload.to_string())["service"])
-            if services == {"simulator", "detector", "alarms"}:
+            if services >= {"simulator", "detector", "alarms", "historian", "dashboard"}:
                 break
         with socket.create_connection(("127.0.0.1", modbus_port), timeout=10) as plc:
             plc.sendall(bytes.fromhex("000100000006010400000002"))  # read level_m by function code 04
@@ -137,7 +137,7 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
         with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/stations/alpha", timeout=10) as page:
             assert json.load(page)["model"]["station"] == "alpha"
         children = _children(up.pid)
-        assert len(children) == 3
+        assert len(children) == 5
         code, out, err = stop(up, signal.SIGINT)
         assert code == 0, err
         assert f"mbpoll -m tcp -p {modbus_port}" in out
@@ -207,14 +207,15 @@ def _figures(statuses: Iterator[zenoh.Sample], service: str, *, least_samples: f
     raise AssertionError("the statuses have ended")
 
 
-def test_children_stop_when_the_supervisor_is_killed() -> None:
+def test_children_stop_when_the_supervisor_is_killed(tmp_path: Path) -> None:
     flags = ["--zenoh", f"tcp/127.0.0.1:{free_port()}", "--modbus", f"127.0.0.1:{free_port()}"]
     flags += ["--page", f"127.0.0.1:{free_port()}"]
+    flags += ["--data", str(tmp_path)]
     with wetwell("up", *flags) as up:
         end = time.monotonic() + DEADLINE_S
-        while len(children := _children(up.pid)) < 3 and time.monotonic() < end:
+        while len(children := _children(up.pid)) < 5 and time.monotonic() < end:
             time.sleep(0.05)  # real processes: there is no virtual time here
-        assert len(children) == 3
+        assert len(children) == 5
         up.kill()
         while any(_is_alive(child) for child in children) and time.monotonic() < end:
             time.sleep(0.05)

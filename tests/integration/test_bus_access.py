@@ -165,7 +165,9 @@ async def check_roles(router: Router, gateway: ZenohAccess, dashboard: ZenohAcce
         async with asyncio.timeout(LIMIT_S):
             true.put(b"1")
             got = await samples.receive()
-            (presence,) = await presences.receive()
+            seen: set[str] = set()
+            while alive_key("alpha", "gateway") not in seen:  # the router shows itself too
+                seen |= {presence.key for presence in await presences.receive()}
             while not (
                 router.has_said("'gateway' may not put on wetwell/alpha/verdict/1: dropped")
                 and router.has_said("'dashboard' may not put on wetwell/alpha/sample: dropped")
@@ -177,7 +179,6 @@ async def check_roles(router: Router, gateway: ZenohAccess, dashboard: ZenohAcce
             while b"2" not in got:
                 got += await samples.receive()
         assert list(dict.fromkeys(got)) == [b"1", b"2"]
-        assert presence.key == alive_key("alpha", "gateway")
         late = watcher.subscribe(sample_key("alpha"), history=10)
         async with asyncio.timeout(LIMIT_S):
             kept: list[bytes] = []

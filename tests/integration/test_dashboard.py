@@ -8,6 +8,7 @@ import httpx
 import pytest
 
 from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
+from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.history_messages import History, HistoryQuery
 from wetwell.protocols.keys import alarm_act_key, history_key, sample_key
 from wetwell.protocols.memory_link import MemoryBus
@@ -15,11 +16,13 @@ from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.recording import read_recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.dashboard.app import Desk, dashboard_app
+from wetwell.services.dashboard.daemon import serve_dashboard
 from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.hub import Hub
-from wetwell.services.dashboard.questions import ROWS_A_QUESTION
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
+from wetwell.services.settings import DashboardSettings, Settings
+from wetwell.services.tokens import new_token
 
 PAGE = "http://127.0.0.1:8080"
 
@@ -193,7 +196,7 @@ def test_an_act_goes_to_the_alarm_service_and_its_answer_comes_back() -> None:
 
 
 @pytest.mark.parametrize(
-    "query", ["", "kind=samples", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
+    "query", ["", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
 )
 def test_what_is_no_question_to_the_historian_is_told(query) -> None:
     answer = get(f"/api/stations/alpha/history?{query}", desk_with(MemoryBus()))
@@ -201,15 +204,17 @@ def test_what_is_no_question_to_the_historian_is_told(query) -> None:
     assert answer.json()["error"]
 
 
-def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path) -> None:
-    rows = ROWS_A_QUESTION + 500
+def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("wetwell.services.dashboard.questions.ROWS_A_QUESTION", 100)
+    rows = 250
+    every = [json.loads(a_sample(second).encode()) for second in range(rows)]
 
     def answer(payload):
         query = HistoryQuery.decode(payload)
         assert query.raw
-        found = [second for second in range(rows) if query.start <= second * NS_PER_S < query.end]
-        messages = tuple(json.loads(a_sample(second).encode()) for second in found[: query.points])
-        return History(station="alpha", kind="samples", messages=messages, more=len(found) > query.points).encode()
+        found = every[-(-query.start // NS_PER_S) : query.end // NS_PER_S]
+        messages, more = tuple(found[: query.points]), len(found) > query.points
+        return History(station="alpha", kind="samples", messages=messages, more=more).encode()
 
     async def run():
         bus = MemoryBus()
@@ -264,7 +269,7 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
             async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
                 assert stream.headers["content-type"].startswith("text/event-stream")
                 lines = stream.aiter_lines()
-                assert await anext(lines) == "event: resync"
+                assert [await anext(lines) for _ in range(2)] == ["retry: 1000", "event: resync"]
                 publisher.put(a_sample(1).encode())
                 async for line in lines:
                     if line.startswith('data: {"id"'):
@@ -277,3 +282,145 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
     events, state = asyncio.run(run())
     assert [row[0] for event in events for row in event["rows"]] == [1000]
     assert state["rows"] == events[0]["rows"]
+
+
+async def until(is_so):
+    """Wait for what the server does in this very loop."""
+    async with asyncio.timeout(30):
+        while not is_so():  # noqa: ASYNC110 - it is the server's doing, not a wait for time
+            await asyncio.sleep(0)
+
+
+def test_200_open_pages_get_each_frame_at_once() -> None:
+    pages, frames = 200, 4
+
+    async def look(client, delays_s, sent_s):
+        async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
+            async for line in stream.aiter_lines():
+                if line.startswith('data: {"id"'):
+                    number = json.loads(line.removeprefix("data: "))["id"]
+                    delays_s.append(asyncio.get_running_loop().time() - sent_s[number])
+                    if number == frames:
+                        return
+
+    async def run():
+        desk = desk_with(MemoryBus())
+        listener = open_socket("127.0.0.1", 0)
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        delays_s, sent_s = [], {}
+        limits = httpx.Limits(max_connections=None)
+        loop = asyncio.get_running_loop()
+        async with (
+            httpx.AsyncClient(base_url=address, timeout=30, limits=limits) as client,
+            web_server(dashboard_app(desk), listener, desk.hub),
+            asyncio.TaskGroup() as group,
+        ):
+            for _ in range(pages):
+                group.create_task(look(client, delays_s, sent_s))
+            await until(lambda: desk.hub.clients == pages)
+            for number in range(1, frames + 1):
+                desk.view.take_sample(a_sample(number).encode())
+                sent_s[number] = loop.time()
+                desk.hub.send("alpha", desk.view.advance(loop.time())["alpha"])
+                await until(lambda: len(delays_s) == number * pages)  # noqa: B023 - awaited in this turn
+        return sorted(delays_s)
+
+    delays_s = asyncio.run(run())
+    assert len(delays_s) == pages * frames, "everybody must get every frame"
+    assert delays_s[int(0.99 * len(delays_s))] < 1.0
+
+
+@pytest.fixture(scope="module")
+def tokens(tmp_path_factory):
+    """File of tokens, and the tokens of an operator and a viewer."""
+    file = tmp_path_factory.mktemp("tokens") / "tokens.toml"
+    return file, new_token(file, "ada", "operator"), new_token(file, "eve", "viewer")
+
+
+@contextlib.asynccontextmanager
+async def guarded(file, bus=None):
+    app = dashboard_app(desk_with(bus), file, is_local=False)
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="https://site.example") as client:
+        yield client
+
+
+def test_with_tokens_data_needs_one_and_the_shell_does_not(tokens) -> None:
+    file, _, viewer = tokens
+
+    async def run():
+        async with guarded(file) as client:
+            for path in ("/", "/favicon.ico", "/api/who"):
+                assert (await client.get(path)).status_code == 200, path
+            for path in (
+                "/api/stations",
+                "/api/stations/a",
+                "/api/alarms",
+                "/api/health",
+                "/events",
+                "/reports/x.html",
+            ):
+                for headers in ({}, {"authorization": "Bearer wrong"}, {"cookie": "wetwell_token=wrong"}):
+                    assert (await client.get(path, headers=headers)).status_code == 401, path
+            bearer = {"authorization": f"Bearer {viewer}"}
+            assert (await client.get("/api/stations", headers=bearer)).status_code == 200
+
+    asyncio.run(run())
+
+
+def test_a_login_sets_a_cookie_that_scripts_and_other_sites_do_not_get(tokens) -> None:
+    file, operator, _ = tokens
+
+    async def run():
+        async with guarded(file) as client:
+            assert (await client.get("/api/who")).json() == {"asks": True, "name": None, "role": None}
+            wrong = await client.post("/api/login", json={"token": "wrong"})
+            assert wrong.json()["name"] is None
+            assert (await client.post("/api/login", json={})).status_code == 400
+            right = await client.post("/api/login", json={"token": operator})
+            assert right.json() == {"asks": True, "name": "ada", "role": "operator"}
+            cookie = right.headers["set-cookie"].lower()
+            for word in ("httponly", "samesite=strict", "secure", "path=/"):
+                assert word in cookie
+            assert (await client.get("/api/stations")).status_code == 200  # the client keeps the cookie
+
+    asyncio.run(run())
+
+
+def test_only_operators_act_and_always_in_their_own_name(tokens) -> None:
+    file, operator, viewer = tokens
+    acts = []
+
+    def answer(payload):
+        acts.append(AlarmAct.decode(payload))
+        return AlarmAnswer(id=acts[-1].id, is_done=True).encode()
+
+    async def run():
+        bus = MemoryBus()
+        statuses = []
+        async with answering(bus, alarm_act_key("alpha"), answer), guarded(file, bus) as client:
+            for token in ("", viewer, operator):
+                headers = {"content-type": "application/json", "authorization": f"Bearer {token}"}
+                told = await client.post("/api/stations/alpha/alarm-act", content=ACT.encode(), headers=headers)
+                statuses.append(told.status_code)
+        return statuses
+
+    assert asyncio.run(run()) == [401, 403, 200]
+    assert [act.by for act in acts] == ["ada"]
+
+
+def test_a_file_of_tokens_that_cannot_be_read_lets_nobody_in(tokens, tmp_path) -> None:
+    _, operator, _ = tokens
+    broken = tmp_path / "tokens.toml"
+    broken.write_text("token = 1")
+
+    async def run():
+        async with guarded(broken) as client:
+            return await client.get("/api/stations", headers={"authorization": f"Bearer {operator}"})
+
+    assert asyncio.run(run()).status_code == 503
+
+
+def test_a_page_for_others_is_refused_without_tokens() -> None:
+    settings = Settings(dashboard=DashboardSettings(host="0.0.0.0", port=0))
+    with pytest.raises(ConfigError, match="refuses to listen"):
+        asyncio.run(serve_dashboard(settings))

@@ -17,9 +17,9 @@ from distributed import Client, LocalCluster
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
 from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.keys import alive_key, history_key, sample_key, verdict_key
+from wetwell.protocols.keys import alive_key, history_key, sample_key, status_key, verdict_key
 from wetwell.protocols.link import Presence, Request, Subscription
-from wetwell.protocols.messages import Sample, Verdict
+from wetwell.protocols.messages import Sample, Status, Verdict
 from wetwell.protocols.zenoh_link import ZenohBus, open_router
 from wetwell.services.fleet.controller import Fleet
 from wetwell.services.fleet.inventory import Inventory
@@ -34,7 +34,7 @@ Verdicts = dict[str, dict[tuple[int, int], bytes]]
 
 NAMES = ("north", "south", "east", "west")
 HOURS = 7
-PART = 300
+PART = 3600
 
 
 def station_file(name: str) -> str:
@@ -83,9 +83,10 @@ async def judged_and_wanted(tmp_path: Path) -> tuple[Verdicts, Verdicts]:
                 name: list(Simulation(station, Scenario(name="plain"), number).advance(HOURS * 3600).samples(name))
                 for number, (name, station) in enumerate(inventory.items())
             }
-            publishers = {name: bus.publisher(sample_key(name), history=600) for name in NAMES}
+            publishers = {name: bus.publisher(sample_key(name), history=HOURS * 3600) for name in NAMES}
             known: dict[str, list[Sample]] = {name: [] for name in NAMES}
             historian = asyncio.create_task(answer(bus.answer(history_key("*")), known))
+            statuses = bus.subscribe(status_key("*", "detector"))
             await judged(bus.watch(alive_key("*", "detector")))
             got: Verdicts = {name: {} for name in NAMES}
             for first in range(0, HOURS * 3600, PART):
@@ -96,7 +97,7 @@ async def judged_and_wanted(tmp_path: Path) -> tuple[Verdicts, Verdicts]:
                 if first == 3 * 3600:
                     workers = await client.run(os.getpid)
                     os.kill(next(iter(workers.values())), signal.SIGKILL)
-                await collect(verdicts, got, quiet_s=0.02)
+                await caught_up(statuses, first + PART)
             wanted = {name: undisturbed(inventory[name], samples[name]) for name in NAMES}
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(60):
@@ -118,6 +119,17 @@ async def judged(watch: Subscription[Presence]) -> None:
     async with asyncio.timeout(60):
         while missing:
             missing -= {presence.key for presence in await watch.receive() if presence.is_alive}
+
+
+async def caught_up(statuses: Subscription[bytes], number: int) -> None:
+    """Wait until every station has so many samples: a judge that is away longer than its mailbox holds loses some."""
+    behind = set(NAMES)
+    async with asyncio.timeout(60):
+        while behind:
+            for payload in await statuses.receive():
+                status = Status.decode(payload)
+                if status.figures.get("samples", 0.0) >= number:
+                    behind.discard(status.station)
 
 
 async def answer(requests: Subscription[Request], known: dict[str, list[Sample]]) -> None:

@@ -33,6 +33,7 @@ station = "foreign"
 host = "127.0.0.1"
 port = {port}
 period_s = 0.05
+answer_timeout_s = 10.0
 pumps = 3
 clock = "plc"
 
@@ -113,7 +114,8 @@ def test_libmodbus_with_every_type_and_byte_order(libmodbus_plc, tmp_path):
 def own_map(tmp_path, port, more=""):
     (tmp_path / "map.csv").write_text(register_csv(register_table(2, 2)))
     file = tmp_path / "plc.toml"
-    file.write_text(f'station = "own"\nhost = "127.0.0.1"\nport = {port}\npumps = 2\nmap = "map.csv"\n{more}')
+    settings = f'station = "own"\nhost = "127.0.0.1"\nport = {port}\npumps = 2\nmap = "map.csv"\n'
+    file.write_text(f"{settings}answer_timeout_s = 10.0\nconnect_timeout_s = 10.0\n{more}")
     return load_plcs(file)
 
 
@@ -175,7 +177,10 @@ async def tls_in_front(port, context):
                 writer.write(data)
         writer.transport.abort()
 
+    connections = set()
+
     async def serve(reader, writer):
+        connections.add(asyncio.current_task())
         plc_reader, plc_writer = await asyncio.open_connection("127.0.0.1", port)
         await asyncio.gather(pass_on(reader, plc_writer), pass_on(plc_reader, writer))
 
@@ -185,7 +190,7 @@ async def tls_in_front(port, context):
     finally:
         server.close()
         await server.wait_closed()
-        await asyncio.sleep(0.1)  # until the last connections have ended
+        await asyncio.gather(*connections)
 
 
 def test_modbus_over_tls_and_who_is_refused(tmp_path):

@@ -167,6 +167,19 @@ def test_late_samples_join_their_day_and_its_figures(name: str, make_store: Call
         assert close(ask(historian, **question), ask(whole, **question)), question
 
 
+@pytest.mark.parametrize("name", ["folder", "postgres"])
+def test_late_samples_do_not_hide_the_minutes_of_their_day(name: str, make_store: Callable[..., Store]) -> None:
+    historian = filled(make_store(name, downsample_after_days=2))
+    mean = ask(historian, kind="samples", points=24)
+    maintain(historian)
+    for done in (False, True):
+        assert close(ask(historian, kind="samples", points=24), mean), done
+        historian.take("samples", samples(1)[3].encode())
+        assert historian.commit(NOW_NS) == 1
+        assert close(ask(historian, kind="samples", points=24), mean), done
+        maintain(historian)
+
+
 def test_an_address_that_is_none_and_a_second_historian_are_refused(
     make_store: Callable[..., Store], postgres
 ) -> None:

@@ -143,6 +143,8 @@ def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
     assert len((folder / "spy.jsonl").read_text().splitlines()) == runs == COUNT
     with pytest.raises(ConfigError, match="holds a trial with another seed"):
         run_fake("perfect", folder, monkeypatch, seed=4)
+    with pytest.raises(ConfigError, match="holds a trial with another diagnoser"):
+        run_fake("perfect", folder, monkeypatch, command=(*FAKE, "--only", "friction_bias"))
 
 
 def test_shrinkage_on_unseen_recordings(folder, monkeypatch):

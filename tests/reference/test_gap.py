@@ -119,6 +119,9 @@ def test_the_command_writes_report_page_and_station(alpha, tmp_path):
     assert [effect.name for effect in report.effects] == ["head_sensor_offset"]
     assert GapReport.model_validate_json((tmp_path / "out" / "report.json").read_text(encoding="utf-8")) == report
     assert load_station(tmp_path / "out" / "station.toml").effect[0].name == "head_sensor_offset"
+    told = report.detector
+    assert told.verdicts > 0
+    assert (told.has_new_curves, told.false_per_day_before) == (False, told.false_per_day_after)
     assert "<svg" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 

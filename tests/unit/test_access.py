@@ -5,10 +5,23 @@ import logging
 import os
 
 import pytest
+import zenoh
 from typer.testing import CliRunner
 
 from wetwell.protocols.access import load_access
 from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.keys import (
+    SITE,
+    alarm_act_key,
+    alarm_key,
+    alive_key,
+    history_key,
+    model_key,
+    order_key,
+    sample_key,
+    status_key,
+    verdict_key,
+)
 from wetwell.protocols.zenoh_access import ZenohAccess
 from wetwell.protocols.zenoh_log import LogReader
 from wetwell.services.bus import access_of, listen
@@ -31,6 +44,48 @@ def test_the_default_table_lets_only_the_gateway_and_the_simulator_put_samples()
     names = {rule["id"] for rule in rules["rules"]}
     assert all(set(policy["rules"]) <= names for policy in rules["policies"])
     assert {subject["id"] for subject in rules["subjects"]} == {role.name for role in table.role}
+
+
+@pytest.mark.parametrize(
+    ("role", "act", "key"),
+    [
+        ("gateway", "publish", sample_key("alpha")),
+        ("simulator", "publish", sample_key("alpha")),
+        ("detector", "read", sample_key("alpha")),
+        ("detector", "read", order_key("alpha")),
+        ("detector", "publish", verdict_key("alpha", 1)),
+        ("detector", "publish", model_key("alpha")),
+        ("detector", "publish", status_key(SITE, "shard-3")),
+        ("detector", "ask", history_key("alpha")),
+        ("historian", "read", sample_key("*")),
+        ("historian", "read", verdict_key("*")),
+        ("historian", "read", alarm_key("*")),
+        ("historian", "answer", history_key("*")),
+        ("alarms", "read", verdict_key("*")),
+        ("alarms", "read", status_key("*", "gateway")),
+        ("alarms", "read", alive_key("*", "*")),
+        ("alarms", "publish", alarm_key("alpha", "a")),
+        ("alarms", "answer", alarm_act_key("*")),
+        ("dashboard", "read", model_key("*")),
+        ("dashboard", "read", status_key("*", "*")),
+        ("dashboard", "ask", alarm_act_key("alpha")),
+        ("operator", "publish", order_key("alpha")),
+        ("operator", "read", verdict_key("alpha", 1)),
+    ],
+)
+def test_the_default_table_lets_each_daemon_do_its_duty(role, act, key):
+    table = access_of(load_settings(flags={"zenoh": {"access_control": "default"}}).zenoh).table
+    assert table is not None
+    (found,) = (each for each in table.role if each.name == role)
+    assert any(zenoh.KeyExpr(allowed).includes(zenoh.KeyExpr(key)) for allowed in getattr(found, act))
+
+
+@pytest.mark.parametrize("role", ["gateway", "detector", "historian", "alarms", "dashboard", "simulator"])
+def test_each_daemon_may_show_that_it_lives(role):
+    table = access_of(load_settings(flags={"zenoh": {"access_control": "default"}}).zenoh).table
+    assert table is not None
+    (found,) = (each for each in table.role if each.name == role)
+    assert {status_key("*", role), alive_key("*", role)} <= set(found.publish)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The command line: a user's error is one line on standard error and exit code 2, and nothing half written."""
 
 import json
+import socket
 import sys
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
         (["up", "--page", "here"], "--page: got 'here', must be HOST:PORT such as 127.0.0.1:8080"),
         (
             ["dashboard", "--page", "0.0.0.0:80"],
-            "settings: dashboard.host: got '0.0.0.0', input should be '127.0.0.1'",
+            "dashboard.host: refuses to listen on 0.0.0.0, where others reach it",
         ),
         (["up", "--zenoh", "udp"], "settings: zenoh.endpoint: got 'udp', string should match pattern"),
         (["export", "--data", "{tmp}/no", "--out", "{tmp}/x.csv"], "historian.folder: {tmp}/no: there is no history"),
@@ -221,3 +222,27 @@ def test_station_show_gives_the_duty_points(
     shown = json.loads(capsys.readouterr().out)
     assert shown["each_pump_alone"][0]["flow_m3h"] == pytest.approx(200.0, abs=0.01)
     assert shown["total_flow_m3h"] == pytest.approx(600.0, abs=0.03)
+
+
+def test_a_file_of_plcs_is_checked_and_a_plc_that_is_away_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, "modbus-map") == 0
+    (tmp_path / "map.csv").write_text(capsys.readouterr().out)
+    file = tmp_path / "plc.toml"
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.0.1", 0))  # and does not listen
+        file.write_text(f'station = "s"\nhost = "127.0.0.1"\nport = {deaf.getsockname()[1]}\nmap = "map.csv"\n')
+        assert run(monkeypatch, "gateway", "check", file, "--json") == 0
+        shown = json.loads(capsys.readouterr().out)["s"]
+        assert (shown["pumps"], len(shown["signals"]), shown["not_in_the_map"]) == (3, 19, "")
+        assert run(monkeypatch, "gateway", "read", file, "--json") == 1
+        assert json.loads(capsys.readouterr().out)["s"]["error"] == "cannot connect: connection refused"
+    file.write_text("plc = 3\n")
+    for arguments, said in (
+        (["gateway", "check", file], f"wetwell: {file}: plc: "),
+        (["gateway", "--plc", file], f"wetwell: {file}: plc: "),
+        (["gateway"], "wetwell: gateway: give --plc FILE, or gateway.plcs in the settings"),
+    ):
+        assert run(monkeypatch, *arguments) == 2
+        assert capsys.readouterr().err.startswith(said)

@@ -2,6 +2,7 @@
 
 import math
 import struct
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,8 @@ from wetwell.protocols.device_map import load_plcs
 from wetwell.protocols.device_signal import Signal
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.registers import decode, encode, register_csv, register_table
+from wetwell.services import gateway
+from wetwell.services.gateway.survey import described
 
 PLC = 'station = "s"\nhost = "h"\n'
 LEVEL = "[signal.level_m]\naddress = 0\n"
@@ -206,3 +209,12 @@ def test_a_block_is_halved_down_to_its_signals():
     assert halves(first, signals) == ()
     assert [(half.address, half.count) for half in halves(second, signals)] == [(2, 2), (10, 2)]
     assert second.words_of(signals["pump3_head_m"], list(range(10))) == [8, 9]
+
+
+def test_the_example_is_a_valid_file():
+    harbour, mill_lane = load_plcs(Path(gateway.__file__).with_name("example.toml"))
+    assert (harbour.station, harbour.pumps, mill_lane.station, mill_lane.pumps) == ("harbour", 2, "mill-lane", 1)
+    assert harbour.signals["level_m"].value([5000], "CDAB", "m") == pytest.approx(2.8)
+    assert mill_lane.signals["pump1_head_m"].value([1101], "ABCD", "m") == pytest.approx((110.1 - 12.0) / 9.81)
+    assert described(mill_lane)["not_in_the_map"] == "inflow_m3h, heartbeat, pump1_frequency_hz, pump1_power_kw"
+    assert [request["count"] for request in described(harbour)["requests"]] == [31, 10]

@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from wetwell.detector.nominal import nominal_of
+from wetwell.detector.nominal import duty_flows, nominal_of
 from wetwell.detector.pipeline import Detector
+from wetwell.detector.runs import new_pumps
 from wetwell.detector.station_model import station_model
 from wetwell.protocols.keys import model_key
 from wetwell.protocols.memory_link import MemoryBus
@@ -31,7 +32,11 @@ def test_before_learning_only_the_datasheet_is_known(alpha) -> None:
 
 def test_the_learnt_curves_of_a_healthy_station_are_the_datasheets(alpha, learnt) -> None:
     model = station_model(alpha, learnt.baselines, {}, 0)
-    duty_m3h = nominal_of(alpha).duty_flows([1.0, 0.0, 0.0])[0]
+    nominal = nominal_of(alpha)
+    duty = new_pumps(nominal)
+    duty["duty_speed"] = (1.0, 0.0, 0.0)
+    duty_flows(nominal.table(), duty)
+    duty_m3h = float(duty["duty_m3h"][0])
     for pump in model.pumps:
         for known, datasheet in (
             (pump.learnt_pump, pump.configured_pump),

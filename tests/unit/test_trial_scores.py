@@ -90,6 +90,15 @@ def test_outside_of_the_library(kind, given, is_right):
     assert score.top_1 is score.top_2 is score.shrinkage is None
 
 
+def test_what_the_whole_library_cannot_tell_apart_is_right_for_the_one_left_out():
+    true = label("leave_one_out", ("motor_slip",))
+    one = answer(effects=told("pump_wear"))
+    assert score_case(true, one, answer(effects=told("motor_slip", equivalent=["pump_wear"]))).verdict_right
+    assert score_case(true, one, answer(effects=told("pump_wear", equivalent=["motor_slip"]))).verdict_right
+    assert not score_case(true, one, answer(effects=told("motor_slip", equivalent=["ragging"]))).verdict_right
+    assert not score_case(label("open"), one, answer(effects=told("pump_wear"))).verdict_right
+
+
 def test_none_and_component():
     nothing = label("none", (), ())
     assert score_case(nothing, answer("none")).false_attribution is False

@@ -2,12 +2,13 @@
 
 import { html } from "./dom.js";
 import { words } from "./format.js";
+import { who } from "./who.js";
 
 const NAME = "operator";
 const MINUTES = [["15", "15 minutes"], ["60", "1 hour"], ["240", "4 hours"], ["480", "8 hours"], ["1440", "1 day"]];
 
 export function askAct(alarm, act, tell) {
-  const by = html("input", { name: "by", required: true, maxlength: 64, autocomplete: "name", value: localStorage.getItem(NAME) ?? "" });
+  const by = html("input", { name: "by", required: true, maxlength: 64, autocomplete: "name", value: who.name ?? localStorage.getItem(NAME) ?? "", readonly: who.name !== null });
   const minutes = act === "shelve" ? html("select", { name: "minutes" }, ...MINUTES.map(([value, word]) => html("option", { value }, word))) : null;
   const reason = act === "acknowledge" ? null : html("input", { name: "reason", maxlength: 500 });
   const dialog = html("dialog", { "aria-labelledby": "act-title" });

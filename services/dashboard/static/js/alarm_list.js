@@ -4,12 +4,13 @@ import { askAct } from "./alarm_act.js";
 import { html, say } from "./dom.js";
 import { millis, moment, words } from "./format.js";
 import { icon } from "./states.js";
+import { who } from "./who.js";
 
 const PRIORITIES = ["urgent", "high", "medium", "low"];
 const SHAPES = { urgent: "pump_and_system_fault", high: "pump_fault", medium: "system_fault", low: "sensor_fault" };
 const KINDS = { urgent: "urgent", high: "urgent", medium: "gone", low: "sensor" };
 
-export const ACTS = {
+const ACTS = {
   unacknowledged: ["acknowledge", "shelve"],
   acknowledged: ["shelve", "out_of_service"],
   returned: ["acknowledge", "shelve"],
@@ -19,7 +20,7 @@ export const ACTS = {
 
 const open = (alarm) => alarm.state === "unacknowledged" || alarm.state === "returned";
 
-export function inOrder(alarms) {
+function inOrder(alarms) {
   return [...alarms].sort((a, b) => open(b) - open(a) || PRIORITIES.indexOf(a.priority) - PRIORITIES.indexOf(b.priority) || (b.raised ?? "").localeCompare(a.raised ?? ""));
 }
 
@@ -63,7 +64,7 @@ export function alarmList({ withStation }) {
 
 function cells(alarm, withStation) {
   const failed = html("span", { class: "error", role: "alert" });
-  const buttons = (ACTS[alarm.state] ?? []).map((act) =>
+  const buttons = (who.role === "viewer" ? [] : (ACTS[alarm.state] ?? [])).map((act) =>
     html("button", { type: "button", "data-act": act, "aria-label": `${words(act)} ${alarm.text}`, onclick: () => askAct(alarm, act, (reason) => say(failed, reason)) }, words(act)));
   const kind = alarm.is_active ? KINDS[alarm.priority] : "calm";
   const until = alarm.until ? ` until ${moment(millis(alarm.until))}` : "";

@@ -7,6 +7,7 @@ import { moment, words } from "./format.js";
 import { pastOf } from "./past.js";
 
 const SPANS = { "1h": 1, "6h": 6, "24h": 24, "7d": 168, "30d": 720 };
+const DEFAULT = "24h";
 const HOUR_MS = 3_600_000;
 const POINTS = 700;
 const QUANTITIES = { level_m: "Level, m", flow_m3h: "Flow, m³/h", head_m: "Head, m", frequency_hz: "Frequency, Hz", power_kw: "Power, kW", inflow_m3h: "Inflow, m³/h" };
@@ -33,6 +34,12 @@ export function historyPanel(station) {
   const element = panel("History", html("div", { class: "buttons" }, choice, ...buttons, back, on, download), plot.element, note);
   element.classList.add("is-history");
   plot.element.hidden = true;
+  const sight = new IntersectionObserver((entries) => {
+    if (span || !station.time || !entries.some((entry) => entry.isIntersecting)) return;
+    span = { name: DEFAULT, hours: SPANS[DEFAULT] };
+    load();
+  });
+  sight.observe(element);
 
   function parseSpan() {
     const [from, to] = [Date.parse(query("from")), Date.parse(query("to"))];
@@ -107,6 +114,9 @@ export function historyPanel(station) {
     update(changed) {
       if (span && changed.has("begin")) load();
     },
-    end: plot.end,
+    end() {
+      sight.disconnect();
+      plot.end();
+    },
   };
 }

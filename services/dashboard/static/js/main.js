@@ -7,6 +7,7 @@ import { overviewPage } from "./overview_page.js";
 import { reportsPage } from "./reports_page.js";
 import { stationPage } from "./station_page.js";
 import { startTheme } from "./theme.js";
+import { learnWho } from "./who.js";
 
 const PAGES = { "/": overviewPage, "/alarms": alarmsPage, "/reports": reportsPage, "/health": healthPage };
 
@@ -38,5 +39,6 @@ function show(isFirst) {
 }
 
 startTheme();
+await learnWho();
 onMove(() => show(false));
 show(true);

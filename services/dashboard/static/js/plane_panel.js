@@ -24,7 +24,7 @@ export function planePanel(station, chosen) {
   const key = html("ul", { class: "key" },
     ...[["configured", "as configured"], ["learnt", "learnt, with 95 % band"], ["now", "as the last run shows"]]
       .map(([kind, word]) => html("li", {}, html("span", { class: `stroke ${kind}` }), word)),
-    html("li", {}, html("span", { class: "dot" }), "operating point and trail"));
+    html("li", {}, html("span", { class: "dot" }), "operating point and trail, hollow while the pump stands"));
   const element = panel("Operating point", drawing, key, words);
   element.classList.add("is-plane");
   const title = element.querySelector("h2");
@@ -65,8 +65,8 @@ export function planePanel(station, chosen) {
       line(known.learnt_pump, "learnt"), line(known.learnt_system, "learnt"),
       band(known.now_pump, isPump ? "now fault" : "now"), band(known.now_system, isMain ? "now fault" : "now"),
       line(known.now_pump, isPump ? "now fault" : "now"), line(known.now_system, isMain ? "now fault" : "now"),
-      label(known.now_pump ?? known.learnt_pump ?? known.configured_pump, 0.08, isPump ? "pump curve, moved" : "pump curve", 16),
-      label(known.now_system ?? known.learnt_system ?? known.configured_system, 0.16, isMain ? "system curve, moved" : "system curve", -9),
+      label(known.now_pump ?? known.learnt_pump ?? known.configured_pump, 0.62, isPump ? "pump curve, moved" : "pump curve", -6),
+      label(known.now_system ?? known.learnt_system ?? known.configured_system, 0.26, isMain ? "system curve, moved" : "system curve", 14),
     );
   }
 
@@ -85,7 +85,7 @@ export function planePanel(station, chosen) {
 
   function label(curve, share, word, rise) {
     const place = Math.round(share * (curve.flow_m3h.length - 1));
-    return svg("text", { class: "label", x: x(curve.flow_m3h[place]), y: y(curve.head_m[place]) + rise }, word);
+    return svg("text", { class: "label", x: x(curve.flow_m3h[place]) + 8, y: y(curve.head_m[place]) + rise }, word);
   }
 
   function drawPoints() {
@@ -100,8 +100,10 @@ export function planePanel(station, chosen) {
       svg("path", { d: points.slice(place * size, (place + 1) * size).join(""), opacity: (place + 1) / FADES })));
     const { flow, head, frequency } = station.pump(chosen());
     const runs = station.isRunning(chosen()) && Number.isFinite(flow) && Number.isFinite(head);
-    mark(point, "visibility", runs ? "visible" : "hidden");
-    if (runs) mark(point, "transform", `translate(${x(flow).toFixed(1)} ${y(head).toFixed(1)})`);
+    const last = points.at(-1)?.slice(1, -2);
+    mark(point, "class", runs ? "point" : "point stands");
+    mark(point, "visibility", runs || last ? "visible" : "hidden");
+    if (runs || last) mark(point, "transform", `translate(${runs ? `${x(flow).toFixed(1)} ${y(head).toFixed(1)}` : last})`);
     const main = station.totalFlow();
     const isShared = runs && station.model?.is_common_header && main > 1.02 * flow;
     mark(total, "visibility", isShared ? "visible" : "hidden");

@@ -6,7 +6,7 @@ import { icon, isFault, state } from "./states.js";
 
 const WIDTH = 560;
 const HEIGHT = 400;
-const WELL = { left: 70, right: 530, top: 120, bottom: 330 };
+const WELL = { left: 84, right: 534, top: 120, bottom: 330 };
 
 export function wellPanel(station, chosen, choose) {
   const drawing = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "well", role: "img", "aria-labelledby": "well-words" });

@@ -1,0 +1,79 @@
+"""Station-days of whole sites on a virtual clock, with accidents: one JSON object on standard output.
+
+python benchmarks/simulation.py --sites 100 --workers 2
+python benchmarks/simulation.py --first-seed SEED --sites 1    # a seed that failed, again
+"""
+
+import argparse
+import json
+import logging
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "simulation"))
+
+from rules import broken_rules
+from simulated_site import Site
+from virtual_loop import run_virtual
+
+from wetwell.services.presets import find_scenario, find_station
+
+MEMORY = Path("/dev/shm")  # noqa: S108 -- each site has a folder of its own there
+
+
+def lived(task: tuple[int, int, float, int]) -> tuple[int, list[str], Counter[str]]:
+    """Seed, broken rules and accidents of a site."""
+    seed, stations, days, period_s = task
+    logging.disable(logging.CRITICAL)
+    alpha = find_station("alpha")
+    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
+        site = Site(
+            seed=seed,
+            stations=[alpha.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
+            scenario=find_scenario("paper"),
+            seconds=round(days * 86_400.0),
+            period_s=period_s,
+            folder=Path(folder),
+        )
+        run_virtual(site.live())
+        return seed, broken_rules(site), Counter(site.accidents)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sites", type=int, default=10)
+    parser.add_argument("--first-seed", type=int, default=1000)
+    parser.add_argument("--stations", type=int, default=10, help="of each site")
+    parser.add_argument("--days", type=float, default=2.0)
+    parser.add_argument("--period-s", type=int, default=60)
+    parser.add_argument("--workers", type=int, default=1)
+    given = parser.parse_args()
+    begin_s = time.perf_counter()
+    tasks = [
+        (seed, given.stations, given.days, given.period_s)
+        for seed in range(given.first_seed, given.first_seed + given.sites)
+    ]
+    accidents: Counter[str] = Counter()
+    broken: dict[int, list[str]] = {}
+    with ProcessPoolExecutor(given.workers) as pool:
+        for seed, rules, happened in pool.map(lived, tasks):
+            accidents.update(happened)
+            if rules:
+                broken[seed] = rules
+    result = {
+        "station_days": given.sites * given.stations * given.days,
+        "period_s": given.period_s,
+        "first_seed": given.first_seed,
+        "accidents": dict(accidents),
+        "broken": broken,
+        "wall_s": round(time.perf_counter() - begin_s, 1),
+    }
+    print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()

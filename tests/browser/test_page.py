@@ -1,0 +1,151 @@
+"""The page in a real browser, over the real processes."""
+
+import json
+import re
+import signal
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+AXE = Path(__file__).parent / "vendor" / "axe.min.js"
+SLOW_MS = 30_000
+
+
+def test_the_overview_lives_and_leads_to_the_station(site, open_page, screenshots) -> None:
+    page = open_page(site.url)
+    line = page.get_by_role("row").filter(has_text="alpha")
+    expect(line).to_contain_text("m", timeout=SLOW_MS)
+    level = line.locator(".gauge .value")
+    before = level.inner_text()
+    expect(level).not_to_have_text(before, timeout=SLOW_MS)
+    page.screenshot(path=screenshots / "overview.png")
+    line.get_by_role("link", name="alpha").click()
+    expect(page).to_have_url(f"{site.url}/station/alpha")
+    expect(page.get_by_role("heading", level=1)).to_have_text("alpha")
+
+
+def test_live_values_move_and_pumps_turn(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha")
+    level = page.locator(".well .big")
+    expect(level).to_contain_text("m", timeout=SLOW_MS)
+    before = level.text_content()
+    expect(level).not_to_have_text(before, timeout=SLOW_MS)
+    expect(page.locator(".pump.runs").first).to_be_visible(timeout=SLOW_MS)
+    name = page.locator(".pump.runs .impeller").first.evaluate("node => getComputedStyle(node).animationName")
+    assert name in {"turn", "none"}  # none: the pump has stopped meanwhile
+
+
+def test_who_wants_no_motion_gets_none(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha", reduced_motion="reduce")
+    expect(page.locator(".pump.runs").first).to_be_visible(timeout=SLOW_MS)
+    moving = page.locator(".pump .impeller").evaluate_all(
+        "nodes => nodes.filter(node => getComputedStyle(node).animationName !== 'none').length"
+    )
+    assert moving == 0
+
+
+def test_a_blockage_turns_the_right_pump_red_and_tells_why(site, open_page, screenshots) -> None:
+    page = open_page(f"{site.url}/station/alpha?pump=2")
+    expect(page.locator('.pump[data-state="pump_fault"] .name')).to_have_text(["Pump 2"], timeout=60_000)
+    pump = page.locator('.pump[data-state="pump_fault"]')
+    red = page.locator(":root").evaluate("node => getComputedStyle(node).getPropertyValue('--urgent').trim()")
+    colour = pump.locator("circle").evaluate("node => getComputedStyle(node).stroke")
+    assert colour == "rgb({}, {}, {})".format(*(int(red[place : place + 2], 16) for place in (1, 3, 5)))
+    expect(pump.locator(".condition")).to_have_text("pump fault")
+    expect(page.locator("#station-state")).to_have_attribute("data-state", "pump_fault")
+    expect(page.locator(".curve.now.fault")).to_have_count(1)
+    expect(page.locator(".plane .label").first).to_have_text("pump curve, moved")
+    change = page.get_by_role("list", name="Changes of state, newest first").get_by_role("button", name="pump fault")
+    change.first.click()
+    evidence = page.locator(".evidence")
+    for word in ("pull the pump", "onset", "loss of speed", "F-test, pump", "I_W", "cheapest", "pump curve"):
+        expect(evidence).to_contain_text(word)
+    page.screenshot(path=screenshots / "station.png", full_page=True)
+    overview = open_page(f"{site.url}/?state=fault")
+    line = overview.get_by_role("row").filter(has_text="alpha")
+    expect(line.locator(".state")).to_have_text("pump fault", timeout=SLOW_MS)
+    told = re.compile(r"pump 1 \w+, normal; pump 2 \w+, pump fault; pump 3 \w+, normal")
+    expect(line.get_by_role("img")).to_have_attribute("aria-label", told)
+
+
+def test_acknowledging_by_name_works_and_survives_a_reload(site, open_page, screenshots) -> None:
+    page = open_page(f"{site.url}/alarms")
+    row = page.get_by_role("row").filter(has_text="gamma: high level")
+    expect(row).to_contain_text("unacknowledged", timeout=SLOW_MS)
+    page.screenshot(path=screenshots / "alarms.png")
+    row.get_by_role("button", name="acknowledge").click()
+    page.get_by_label("Your name").fill("Ada")
+    page.get_by_role("dialog").get_by_role("button", name="acknowledge").click()
+    expect(row).to_contain_text("acknowledged by Ada", timeout=SLOW_MS)
+    assert [(act.alarm, act.act, act.by) for act in site.acts] == [("station.high_level", "acknowledge", "Ada")]
+    page.reload()
+    expect(row).to_contain_text("acknowledged by Ada", timeout=SLOW_MS)
+    row.get_by_role("button", name="shelve").click()
+    expect(page.get_by_label("Your name")).to_have_value("Ada")
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).to_have_count(0)
+
+
+def test_the_address_holds_the_view(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha")
+    page.get_by_role("group", name="Pump").get_by_role("button", name="Pump 3").click()
+    page.get_by_role("button", name="24h").click()
+    page.get_by_label("Theme").select_option("dark")
+    expect(page.locator(".is-history .chart canvas")).to_be_visible()
+    assert "pump=3" in page.url
+    assert "span=24h" in page.url
+    assert "theme=dark" in page.url
+    page.reload()
+    expect(page.get_by_role("button", name="Pump 3")).to_have_attribute("aria-pressed", "true", timeout=SLOW_MS)
+    expect(page.get_by_role("button", name="24h")).to_have_attribute("aria-pressed", "true")
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+    assert "recording.csv" in page.get_by_role("link", name="download as recording").get_attribute("href")
+
+
+def test_the_page_comes_back_when_the_server_does(site, open_page, unused_port) -> None:
+    port = unused_port()
+    with site.dashboard(port) as server:
+        page = open_page(f"http://127.0.0.1:{port}/station/alpha", may_lose_its_server=True)
+        expect(page.locator("#link")).to_have_text("live", timeout=SLOW_MS)
+        server.send_signal(signal.SIGTERM)
+        assert server.wait(10) == 0, "an open event stream must not hold the server up"
+        expect(page.locator("#link")).to_have_text("connection lost, trying again", timeout=SLOW_MS)
+    with site.dashboard(port):
+        expect(page.locator("#link")).to_have_text("live", timeout=SLOW_MS)
+        told = page.locator("#station-time")
+        before = told.inner_text()
+        expect(told).not_to_have_text(before, timeout=SLOW_MS)
+
+
+@pytest.mark.parametrize(
+    ("path", "scheme"),
+    [
+        ("/", "light"),
+        ("/", "dark"),
+        ("/station/alpha", "light"),
+        ("/station/alpha", "dark"),
+        ("/alarms", "dark"),
+        ("/reports", "light"),
+        ("/health", "light"),
+    ],
+)
+def test_axe_finds_nothing_serious(site, open_page, path, scheme) -> None:
+    page = open_page(site.url + path, color_scheme=scheme)
+    expect(page.get_by_role("heading", level=1)).to_be_visible()
+    expect(page.locator("#link")).to_have_text("live", timeout=SLOW_MS)
+    found = page.evaluate(AXE.read_text() + "; axe.run()")
+    serious = [
+        (violation["id"], [node["html"][:200] for node in violation["nodes"]][:3])
+        for violation in found["violations"]
+        if violation["impact"] in {"serious", "critical"}
+    ]
+    assert serious == [], json.dumps(serious, indent=1)
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (1280, 720), (2560, 1440)])
+def test_nothing_sticks_out_from_phone_to_wall(site, open_page, screenshots, width, height) -> None:
+    page = open_page(f"{site.url}/station/alpha", viewport={"width": width, "height": height}, color_scheme="dark")
+    expect(page.locator(".well .big")).to_contain_text("m", timeout=SLOW_MS)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.screenshot(path=screenshots / f"station-{width}.png")

@@ -1,0 +1,124 @@
+"""Each process of a site is killed with -9 in turn, the router too: nothing is lost or told otherwise."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from wetwell.detector.nominal import nominal_of
+from wetwell.detector.pipeline import Detector
+from wetwell.protocols.messages import Sample, Verdict
+from wetwell.protocols.stamps import MAX_STAMP_NS
+from wetwell.services.historian.folder_store import FolderStore
+
+SPEED = 50
+"""Seconds of the station in one on the wall: the publishers' caches reach back 12 s."""
+LIMIT_S = 60.0
+VICTIMS = ("detector", "historian", "alarms", "router")
+
+
+class Site:
+    """Processes of a site that can be killed and started again."""
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        self.folder = folder
+        self._log = folder / "log"
+        self._commands = {
+            "router": ["router"],
+            "historian": ["historian", "--data", str(folder / "history")],
+            "detector": ["detector"],
+            "alarms": ["alarms"],
+            "simulator": ["simulator", "--speed", str(SPEED), "--seed", "3"],
+        }
+        self._environment = os.environ | {
+            "WETWELL_DETECTOR__STATE_DIR": str(folder / "detector"),
+            "WETWELL_DETECTOR__CHECKPOINT_S": "1",
+            "WETWELL_ALARMS__STATE_DIR": str(folder / "alarms"),
+        }
+        self.running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, name: str) -> None:
+        """Start a process."""
+        command = [sys.executable, "-m", "wetwell.services", *self._commands[name], "--zenoh", self.endpoint]
+        with self._log.open("ab") as log:
+            self.running[name] = subprocess.Popen(command, stdout=log, stderr=log, env=self._environment)
+
+    def stop(self, name: str, sig: signal.Signals) -> int:
+        """End a process and return its exit code."""
+        process = self.running.pop(name)
+        process.send_signal(sig)
+        return process.wait(LIMIT_S)
+
+    def kept(self) -> int:
+        """Number of samples that the historian has kept."""
+        try:
+            store = FolderStore(self.folder / "history", keep_live_days=1)
+        except Exception:  # noqa: BLE001 -- it is just being made
+            return 0
+        with contextlib.closing(store):
+            return len(store.samples("alpha", 0, MAX_STAMP_NS))
+
+    def wait_for(self, samples: int) -> None:
+        """Wait until so many samples are kept."""
+        end = time.monotonic() + LIMIT_S
+        while (kept := self.kept()) < samples:
+            assert time.monotonic() < end, f"{kept} samples of {samples} after {LIMIT_S:g} s; see {self._log}"
+            time.sleep(0.1)  # real processes: there is no virtual time here
+
+
+@contextlib.contextmanager
+def site(folder: Path) -> Iterator[Site]:
+    it = Site(folder)
+    try:
+        yield it
+    finally:
+        for process in it.running.values():
+            process.kill()
+            process.wait()
+
+
+def undisturbed(alpha, folder: Path) -> tuple[list[int], set[bytes], list[bytes]]:
+    """Numbers of the kept samples, verdicts of a detector that was never disturbed, verdicts that were kept."""
+    with contextlib.closing(FolderStore(folder / "history", keep_live_days=1)) as store:
+        kept = store.samples("alpha", 0, MAX_STAMP_NS)
+        verdicts = store.events("verdicts", "alpha", 0, MAX_STAMP_NS, 1_000_000)
+    samples = [
+        Sample.model_validate(sample.model_dump() | {"seq": seq})
+        for sample, seq in zip(kept.recording().samples("alpha"), kept.seq.tolist(), strict=True)
+    ]
+    detector = Detector("alpha", nominal_of(alpha))
+    wanted = {verdict.encode() for sample in samples for verdict in detector.update(sample)}
+    return kept.seq.tolist(), wanted, verdicts
+
+
+def test_nothing_is_lost_or_told_otherwise_when_each_process_is_killed_in_turn(alpha, tmp_path):
+    with site(tmp_path) as it:
+        for name in ("router", "historian", "detector", "alarms", "simulator"):
+            it.start(name)
+        samples = 300
+        it.wait_for(samples)
+        for victim in VICTIMS:
+            assert it.stop(victim, signal.SIGKILL) == -signal.SIGKILL
+            it.start(victim)
+            samples = it.kept() + 8 * SPEED
+            it.wait_for(samples)
+        ended = it.kept() + 4 * SPEED
+        it.wait_for(ended)
+        assert it.stop("simulator", signal.SIGTERM) == 0
+        quiet = -1
+        while quiet != (quiet := it.kept()):
+            time.sleep(2.0)
+        assert [it.stop(name, signal.SIGTERM) for name in ("detector", "alarms", "historian", "router")] == [0] * 4
+    seqs, wanted, verdicts = undisturbed(alpha, tmp_path)
+    assert seqs == list(range(len(seqs)))
+    assert len(verdicts) == len(set(verdicts))
+    told = {Verdict.decode(verdict).model_dump_json() for verdict in verdicts}
+    assert told == {Verdict.decode(verdict).model_dump_json() for verdict in wanted}
