@@ -11,8 +11,9 @@ import importlib.metadata
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,12 +49,30 @@ class BiasedRecording(SimulatedRecording):
 
 
 @dataclass(frozen=True, slots=True)
+class PolledRecording(SimulatedRecording):
+    """A station that is asked once in so many seconds."""
+
+    period_s: int = 1
+
+    def load(self) -> Recording:
+        """Simulate, then keep every so manieth row."""
+        recording = SimulatedRecording.load(self)
+        kept = slice(None, None, self.period_s)
+        return replace(
+            recording,
+            time_ns=recording.time_ns[kept],
+            columns={name: values[kept] for name, values in recording.columns.items()},
+            truth={name: values[kept] for name, values in recording.truth.items()},
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Configuration:
     """Stations and scenarios of one row of the table."""
 
     station: Station
     scenario: Scenario
-    kind: type[SimulatedRecording] = SimulatedRecording
+    kind: Callable[..., SimulatedRecording] = SimulatedRecording
     learning_s: float = LEARNING_S
 
 
@@ -84,6 +103,13 @@ def configurations() -> dict[str, Configuration]:
         "nominal, noise AR(1) 0.95, flow meters ±1 % over the day": Configuration(
             correlated, nominal, BiasedRecording, DAY_S
         ),
+        **{
+            f"{scenario.name}, polled every {period_s} s": Configuration(
+                alpha, scenario, partial(PolledRecording, period_s=period_s)
+            )
+            for period_s in (5, 10, 30, 60)
+            for scenario in (paper, nominal)
+        },
     }
 
 

@@ -1,6 +1,6 @@
 """Speed and memory of the detector, its F-tests side by side with statsmodels: one JSON object on standard output.
 
-    python benchmarks/detector_speed.py
+    python benchmarks/detector_speed.py [--year]
 
 Each time is the least of several, counted by the processor. Ratios are of figures of the same run. Without
 statsmodels its figures are null.
@@ -13,7 +13,7 @@ import json
 import os
 import platform
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -21,13 +21,14 @@ import numpy as np
 import numpy.typing as npt
 from timing import least_s
 
-from wetwell.detector.curve_drift import RollingFTest
-from wetwell.detector.gate import Gate
+from wetwell.detector.block import blocks
 from wetwell.detector.nominal import Nominal, nominal_of
 from wetwell.detector.pipeline import Detector
 from wetwell.detector.pump_record import ROLLING_SAMPLES
+from wetwell.detector.rolling_f_test import LOG_P, RollingFTest, scan
 from wetwell.protocols.messages import Sample
 from wetwell.protocols.recording import Recording
+from wetwell.protocols.station import Station
 from wetwell.services.presets import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
@@ -36,29 +37,31 @@ LIVE_FROM_S = 8 * 3600
 """The learning phase is over."""
 LIVE_SAMPLES = 20_000
 MEMORY_DAYS = (1, 10, 40)
-TESTS = 200
+YEAR_DAYS = 365
+REFITS = 200
 
 Floats = npt.NDArray[np.float64]
 
 
 def judge(nominal: Nominal, recording: Recording) -> None:
-    """The whole pipeline over a recording."""
+    """The whole pipeline over a recording, as `wetwell detect` has it."""
+    detector = Detector("alpha", nominal)
+    for block in blocks(recording, nominal.pumps):
+        detector.take(block)
+    detector.finish()
+
+
+def judge_by_samples(nominal: Nominal, recording: Recording) -> None:
+    """The same, a sample at a time."""
     detector = Detector("alpha", nominal)
     for row in recording.rows():
         detector.update(row)
     detector.finish()
 
 
-def rows_alone(recording: Recording) -> None:
-    for _ in recording.rows():
+def blocks_alone(nominal: Nominal, recording: Recording) -> None:
+    for _ in blocks(recording, nominal.pumps):
         pass
-
-
-def gate_alone(nominal: Nominal, recording: Recording) -> None:
-    """Rows and gate, without which no sample comes in."""
-    gate = Gate(nominal)
-    for row in recording.rows():
-        gate.update(row)
 
 
 def decode(payloads: list[bytes]) -> None:
@@ -86,7 +89,7 @@ def live_s(nominal: Nominal, recording: Recording, repeats: int) -> dict[str, fl
     }
 
 
-def memory_kb(seed: int) -> dict[str, dict[str, float]]:
+def memory_kb(seed: int, days: Sequence[int]) -> dict[str, dict[str, float]]:
     """Memory of one detector after some days of one station, as the allocator sees it, and its snapshot. [kB].
 
     The detector is made anew from its snapshot while its memory is traced: the samples of a day are no part of it.
@@ -95,11 +98,10 @@ def memory_kb(seed: int) -> dict[str, dict[str, float]]:
     nominal = nominal_of(station)
     simulation, detector = Simulation(station, find_scenario("nominal"), seed), Detector("alpha", nominal)
     figures = {}
-    for day in range(1, max(MEMORY_DAYS) + 1):
-        for row in simulation.advance(DAY_S, truth=False).rows():
-            detector.update(row)
-        if day not in MEMORY_DAYS:
-            continue
+    largest = 0.0
+    for day in range(1, max(days) + 1):
+        for block in blocks(simulation.advance(DAY_S, truth=False), nominal.pumps):
+            detector.take(block)
         state = detector.snapshot()
         gc.collect()
         tracemalloc.start()
@@ -108,19 +110,25 @@ def memory_kb(seed: int) -> dict[str, dict[str, float]]:
         gc.collect()
         held_bytes = tracemalloc.get_traced_memory()[0]
         tracemalloc.stop()
+        largest = max(largest, held_bytes / 1000)
+        if day not in days:
+            continue
         figures[f"after_{day}_days"] = {
             "held": round(held_bytes / 1000, 1),
-            "snapshot": round(len(twin.snapshot()) / 1000, 1),
+            "snapshot": round(len(state) / 1000, 1),
+            "most_held_so_far": round(largest, 1),
         }
     return figures
 
 
-def steady_samples(recording: Recording) -> Iterator[tuple[float, ...]]:
-    """Time, flow, head and speed ratio of the first pump while it runs at full speed."""
-    columns = [recording.column(f"pump1_{quantity}") for quantity in ("frequency_hz", "flow_m3h", "head_m")]
-    for second, (frequency_hz, flow_m3h, head_m) in enumerate(zip(*(c.tolist() for c in columns), strict=True)):
-        if frequency_hz > 49.0:
-            yield float(second), flow_m3h, head_m, frequency_hz / 50.0
+def steady_samples(recording: Recording) -> Floats:
+    """(5, n) time, flow, head, speed ratio and total flow of the first pump while it runs at full speed."""
+    frequency_hz, flow_m3h, head_m = (
+        recording.column(f"pump1_{quantity}") for quantity in ("frequency_hz", "flow_m3h", "head_m")
+    )
+    columns = np.array([np.arange(float(len(recording))), flow_m3h, head_m, frequency_hz / 50.0, flow_m3h])
+    steady: Floats = np.ascontiguousarray(columns[:, frequency_hz > 49.0])
+    return steady
 
 
 def statsmodels_log_p(sm: Any, window: Floats) -> tuple[float, float]:
@@ -139,30 +147,31 @@ def statsmodels_log_p(sm: Any, window: Floats) -> tuple[float, float]:
 
 
 def f_tests(recording: Recording, repeats: int) -> dict[str, Any]:
-    """Both F-tests over the window of the detector, beside a refit of the same window in statsmodels."""
-    samples = list(steady_samples(recording))[: ROLLING_SAMPLES + 5000]
+    """Both F-tests after each sample over the window of the detector, beside a refit of it in statsmodels."""
+    samples = steady_samples(recording)
     rolling = RollingFTest(ROLLING_SAMPLES)
-
-    def take() -> None:
-        for sample in samples:
-            rolling.update(*sample)
-
-    take_s = least_s(take, repeats) / len(samples)
-    test_s = least_s(lambda: [rolling.value() for _ in range(TESTS)], repeats) / TESTS
-    figures: dict[str, Any] = {"take_a_sample_us": _us(take_s), "pair_of_tests_us": _us(test_s)}
+    for sample in samples.T.tolist():
+        rolling.update(*sample)
+    scan_s = least_s(lambda: scan(samples, ROLLING_SAMPLES), repeats) / samples.shape[1]
+    test_s = least_s(lambda: [rolling.value() for _ in range(REFITS)], repeats) / REFITS
+    figures: dict[str, Any] = {
+        "samples": samples.shape[1],
+        "rolling_pair_us": _us(scan_s),
+        "pair_when_a_verdict_asks_us": _us(test_s),
+    }
     try:
         import statsmodels.api as sm  # noqa: PLC0415 - no part of the product
     except ImportError:
         return figures | {"statsmodels_refit_us": None}
-    window, tests = rolling.samples(), rolling.value()
-    refit_s = least_s(lambda: [statsmodels_log_p(sm, window) for _ in range(TESTS)], repeats) / TESTS
-    if tests is None:
-        raise ValueError("the recording has no window of steady samples")
-    difference = np.subtract(statsmodels_log_p(sm, window), (tests.pump.log_p, tests.system.log_p))
+    found = scan(samples, ROLLING_SAMPLES)[:, :, LOG_P]
+    last = range(ROLLING_SAMPLES, samples.shape[1] + 1, max((samples.shape[1] - ROLLING_SAMPLES) // REFITS, 1))
+    windows = [samples[:, end - ROLLING_SAMPLES : end] for end in last]
+    refits = [statsmodels_log_p(sm, window) for window in windows]
+    refit_s = least_s(lambda: [statsmodels_log_p(sm, window) for window in windows], repeats) / len(windows)
     return figures | {
         "statsmodels_refit_us": _us(refit_s),
-        "ratio": round(refit_s / test_s, 1),
-        "largest_difference_of_log_p": float(f"{np.abs(difference).max():.1e}"),
+        "ratio": round(refit_s / scan_s),
+        "largest_difference_of_log_p": float(f"{np.abs(found[[end - 1 for end in last]] - refits).max():.1e}"),
     }
 
 
@@ -170,31 +179,42 @@ def _us(seconds: float) -> float:
     return round(seconds * 1e6, 2)
 
 
-def figures(seed: int, repeats: int) -> dict[str, Any]:
+def pipeline(station: Station, scenario: str, seed: int, repeats: int) -> dict[str, float]:
+    """Speed of the whole pipeline over a day of a station."""
+    nominal, pumps = nominal_of(station), len(station.pump)
+    recording = Simulation(station, find_scenario(scenario), seed).advance(DAY_S, truth=False)
+    whole_s = least_s(partial(judge, nominal, recording), repeats)
+    single_s = least_s(partial(judge_by_samples, nominal, recording), repeats)
+    blocks_s = least_s(partial(blocks_alone, nominal, recording), repeats)
+    return {
+        "k_pump_samples_per_s": round(pumps * len(recording) / whole_s / 1000),
+        "station_sample_us": _us(whole_s / len(recording)),
+        "of_which_columns_to_blocks_us": _us(blocks_s / len(recording)),
+        "k_pump_samples_per_s_one_by_one": round(pumps * len(recording) / single_s / 1000),
+    }
+
+
+def figures(seed: int, repeats: int, days: Sequence[int]) -> dict[str, Any]:
     """All figures of one run."""
     station = find_station("alpha")
-    nominal, pumps = nominal_of(station), len(station.pump)
-    pipeline = {}
-    days = {
+    main = station.rising_main.model_copy(update={"layout": "common"})
+    control = station.control.model_copy(update={"mode": "pid", "min_frequency_hz": 25.0})
+    by_speed = station.model_copy(update={"rising_main": main, "control": control})
+    day = {
         name: Simulation(station, find_scenario(name), seed).advance(DAY_S, truth=False)
         for name in ("nominal", "paper")
     }
-    for name, recording in days.items():
-        whole_s = least_s(partial(judge, nominal, recording), repeats)
-        gate_s = least_s(partial(gate_alone, nominal, recording), repeats)
-        rows_s = least_s(partial(rows_alone, recording), repeats)
-        pipeline[name] = {
-            "k_pump_samples_per_s": round(pumps * len(recording) / whole_s / 1000),
-            "station_sample_us": _us(whole_s / len(recording)),
-            "of_which_rows_us": _us(rows_s / len(recording)),
-            "of_which_rows_and_gate_us": _us(gate_s / len(recording)),
-            "limit_of_the_gate_alone_k_pump_samples_per_s": round(pumps * len(recording) / gate_s / 1000),
-        }
     return {
-        "pipeline": pipeline,
-        "live_sample_us": {name: _us(cost_s) for name, cost_s in live_s(nominal, days["paper"], repeats).items()},
-        "f_tests": f_tests(days["nominal"], repeats),
-        "memory_kb": memory_kb(seed),
+        "pipeline": {
+            "nominal": pipeline(station, "nominal", seed, repeats),
+            "paper": pipeline(station, "paper", seed, repeats),
+            "nominal, PID on a common header": pipeline(by_speed, "nominal", seed, repeats),
+        },
+        "live_sample_us": {
+            name: _us(cost_s) for name, cost_s in live_s(nominal_of(station), day["paper"], repeats).items()
+        },
+        "f_tests": f_tests(day["nominal"], repeats),
+        "memory_kb": memory_kb(seed, days),
     }
 
 
@@ -202,7 +222,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--repeats", type=int, default=5, help="times that each figure is measured")
+    parser.add_argument("--year", action="store_true", help="watch the memory for 365 days instead of 40; minutes")
     arguments = parser.parse_args()
+    days = (*MEMORY_DAYS, YEAR_DAYS) if arguments.year else MEMORY_DAYS
     about = {
         "benchmark": "detector_speed",
         "version": importlib.metadata.version("wetwell"),
@@ -213,7 +235,7 @@ def main() -> None:
         "seed": arguments.seed,
         "repeats": arguments.repeats,
     }
-    print(json.dumps(about | figures(arguments.seed, arguments.repeats), indent=2))
+    print(json.dumps(about | figures(arguments.seed, arguments.repeats, days), indent=2))
 
 
 if __name__ == "__main__":

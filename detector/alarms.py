@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from wetwell.detector.runs import WARM_UP_S
-from wetwell.detector.scoring import FAULTS, LEARNING_S, learning_end_ns, severity_column, truth_of
+from wetwell.detector.scoring import FAULTS, LEARNING_S, learning_end_ns, severity_column, step_s, truth_of
 from wetwell.protocols.messages import State, Verdict
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
@@ -70,11 +70,11 @@ def false_alarms(verdicts: Iterable[Verdict], recording: Recording) -> FalseAlar
         was_false = is_false.get(verdict.pump, False)
         is_false[verdict.pump] = verdict.state in FAULTS and bool(np.all(truth_of(verdict, recording) == "normal"))
         count += is_false[verdict.pump] and not was_false
-    healthy_s = sum(
+    healthy_rows = sum(
         int(np.sum((recording.truth[f"truth_pump{pump}_state"] == "normal") & (recording.time_ns >= from_ns)))
         for pump, from_ns in watched_from_ns.items()
     )
-    return FalseAlarms(count, healthy_s / DAY_S / max(recording.pumps, 1))
+    return FalseAlarms(count, healthy_rows * step_s(recording) / DAY_S / max(recording.pumps, 1))
 
 
 def poisson_interval(count: int, exposure: float, confidence: float = 0.95) -> tuple[float, float]:

@@ -28,6 +28,7 @@ from wetwell.detector.scoring import (
     macro_f1,
     precision_and_recall,
     scored_runs,
+    step_s,
 )
 from wetwell.protocols.messages import State, Verdict
 from wetwell.protocols.recording import Recording
@@ -55,7 +56,7 @@ def outcome(
         runs=tuple(scored_runs(verdicts, recording, learning_s)),
         alarms=false_alarms(verdicts, recording),
         detections=tuple(detections(verdicts, recording, learning_s)),
-        station_days=len(recording) / DAY_S,
+        station_days=len(recording) * step_s(recording) / DAY_S,
         judging_s=judging_s,
     )
 

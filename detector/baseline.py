@@ -1,14 +1,15 @@
 """The baseline: what a healthy pump shows at any operating point, and how it scatters. Learnt, then fixed."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from wetwell.detector.robust import NORMAL_MEDIAN, median
-from wetwell.detector.runs import Segments
+from wetwell.detector.runs import SEGMENT_SAMPLES, Segments
+from wetwell.protocols.jit import compiled
 
 Floats = npt.NDArray[np.float64]
 Curve = tuple[float, float, float]
@@ -71,6 +72,8 @@ class Baseline:
         Covariance of segment means within a run, times `correlation_factor`. [m²]
     correlation_factor : float
         Growth of the variance of a run's mean by correlation between its segments.
+    segment_samples : int
+        In each of the learnt segments.
     run_covariance : (2, 2) array
         Covariance of run means that the scatter within runs does not explain, floor included. [m²]
     """
@@ -84,6 +87,7 @@ class Baseline:
     segment_covariance: Floats
     correlation_factor: float
     run_covariance: Floats
+    segment_samples: int = SEGMENT_SAMPLES
 
     @property
     def offset_m(self) -> Floats:
@@ -102,12 +106,13 @@ class Baseline:
 
     def shifts(self, segments: Segments) -> Floats:
         """(m, 2) distance of segments from what the baseline expects at their operating points. [m]."""
-        level_m = self._levels(segments.level_m)
-        flow_m3h, total_m3h = segments.flow_m3h, segments.total_m3h
-        shifts: Floats = segments.residual_m.copy()
-        shifts[:, 0] -= _at(self.pump, flow_m3h, flow_m3h * flow_m3h, level_m)
-        shifts[:, 1] -= _at(self.system, total_m3h * total_m3h, level_m)
-        return shifts
+        shifts_m = np.empty((len(segments), 2))
+        level_m = self.level_m if math.isfinite(self.level_m) else 0.0
+        _subtract_expected(
+            *(segments.residual_m, segments.flow_m3h, segments.total_m3h, segments.level_m, level_m),
+            *(self.pump.origin, self.pump.mean, self.system.origin, self.system.mean, shifts_m),
+        )
+        return shifts_m
 
     def deviations(self, runs: Sequence[Segments]) -> Floats:
         """(runs, 2) distance of the means of healthy runs from what is expected at the datasheet's flows. [m]."""
@@ -141,11 +146,17 @@ class Baseline:
             ]
         )
 
+    def noise(self, segments: Segments) -> Floats:
+        """(2, 2) covariance of such segments in health; more where they hold fewer samples than the learnt ones."""
+        covariance: Floats = self.segment_covariance * max(1.0, self.segment_samples / segments.samples)
+        return covariance
+
     def with_noise_of(self, segments: Segments, weight: float, shutoff_head_m: float) -> "Baseline":
         """The baseline with its scatter moved towards that of a normal run; what it expects never moves."""
-        if len(segments) < 3:
+        if len(segments) < 3 or segments.samples != self.segment_samples:
             return self
-        recent = np.cov(segments.residual_m, rowvar=False) * self.correlation_factor
+        deviation_m = segments.residual_m - segments.residual_m.mean(axis=0)
+        recent = deviation_m.T @ deviation_m / (len(segments) - 1) * self.correlation_factor
         recent += np.eye(2) * (LEAST_NOISE_SHARE * shutoff_head_m) ** 2
         limit = 4.0 * np.trace(self.segment_covariance)
         recent *= min(1.0, limit / max(float(np.trace(recent)), 1e-300))
@@ -202,15 +213,31 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
         segment_covariance=within,
         correlation_factor=factor,
         run_covariance=run_covariance,
+        segment_samples=round(float(np.median([run.samples for run in runs]))),
     )
 
 
-def _at(model: Model, *point: Floats) -> Floats:
-    """What a model expects at points of which these are the coordinates."""
-    expected: Any = model.mean[0]
-    for value, origin, slope in zip(point, model.origin, model.mean[1:], strict=True):
-        expected = expected + slope * (value - origin)
-    return np.asarray(expected)
+@compiled
+def _subtract_expected(
+    residual_m: Floats,
+    flow_m3h: Floats,
+    total_m3h: Floats,
+    level_m: Floats,
+    usual_level_m: float,
+    pump_origin: Floats,
+    pump: Floats,
+    system_origin: Floats,
+    system: Floats,
+    shifts_m: Floats,
+) -> None:
+    """Set the distance of segments from what is expected at their operating points."""
+    for at in range(shifts_m.shape[0]):
+        level = usual_level_m if math.isnan(level_m[at]) else level_m[at]
+        flow, square = flow_m3h[at], total_m3h[at] * total_m3h[at]
+        expected_m = pump[0] + pump[1] * (flow - pump_origin[0]) + pump[2] * (flow * flow - pump_origin[1])
+        shifts_m[at, 0] = residual_m[at, 0] - (expected_m + pump[3] * (level - pump_origin[2]))
+        expected_m = system[0] + system[1] * (square - system_origin[0])
+        shifts_m[at, 1] = residual_m[at, 1] - (expected_m + system[2] * (level - system_origin[1]))
 
 
 def _pump_points(flow_m3h: Floats, level_m: Floats) -> Floats:

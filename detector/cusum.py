@@ -5,12 +5,28 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.jit import compiled
+
 Floats = npt.NDArray[np.float64]
 
 DEAD_BAND = 0.75
 THRESHOLD = 5.0
 LARGEST_STEP = 3.0
 """A step counts no more than this after the dead band is taken off, so that one burst alone does not trip."""
+
+
+@compiled
+def _update(sums: Floats, since: Floats, shift_m: Floats, deviation_m: Floats) -> int:
+    tripped = 0
+    for residual in range(2):
+        z = shift_m[residual] / deviation_m[residual]
+        for way in range(2):
+            step = min((-z if way else z) - DEAD_BAND, LARGEST_STEP)
+            sums[way, residual] = max(sums[way, residual] + step, 0.0)
+            since[way, residual] = since[way, residual] + 1.0 if sums[way, residual] > 0.0 else 0.0
+            if sums[way, residual] > THRESHOLD:
+                tripped = max(tripped, int(since[way, residual]))
+    return tripped
 
 
 @dataclass(slots=True)
@@ -36,11 +52,7 @@ class Cusum:
 
     def update(self, shift_m: Floats, deviation_m: Floats) -> int:
         """Segments since the change that has tripped, 0 if none has; (2,) shift of a segment and its σ. [m]."""
-        z = shift_m / deviation_m
-        self.sums = np.maximum(self.sums + np.minimum(np.array([z, -z]) - DEAD_BAND, LARGEST_STEP), 0.0)
-        self.since = np.where(self.sums > 0.0, self.since + 1.0, 0.0)
-        tripped = self.since[self.sums > THRESHOLD]
-        return int(tripped.max()) if tripped.size else 0
+        return _update(self.sums, self.since, shift_m, deviation_m)
 
     def reset(self) -> None:
         """Begin anew, at the start of a run."""

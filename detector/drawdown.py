@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from wetwell.detector.block import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.detector.gate import seconds_between
+from wetwell.detector.runs import is_break
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 
@@ -23,8 +24,11 @@ Floats = npt.NDArray[np.float64]
 
 SETTLED_S = 15.0
 SETTLED_NS = int(SETTLED_S * NS_PER_S)
-MIN_SAMPLES = 45
-MAX_SAMPLES = 600
+MIN_S = 60.0
+MIN_NS = int(MIN_S * NS_PER_S)
+MIN_SAMPLES = 4
+MAX_S = 600.0
+MAX_NS = int(MAX_S * NS_PER_S)
 """A longer phase begins anew, so that the inflow before a run is that just before it."""
 MAX_AGE_S = 600.0
 MAX_GAP_S = 10.0
@@ -70,7 +74,7 @@ def _end(phases: Any, area_m2: float, pumps: Any) -> None:
     """Keep what the phase that ends has told."""
     phase, idle = phases[NOW], phases[IDLE]
     running = phase["running"]
-    if running == NO_PHASE or phase["samples"] < MIN_SAMPLES:
+    if running == NO_PHASE or phase["samples"] < MIN_SAMPLES or phase["end_ns"] - phase["begin_ns"] < MIN_NS:
         return
     if running == 0:
         phases[IDLE] = phases[NOW]
@@ -103,7 +107,7 @@ def _add(phase: Any, time_ns: int, level_m: float, inflow_m_s: float, flow_m3h: 
 
 
 @compiled
-def draw_down(phases: Any, area_m2: float, time_ns: int, gap_s: float, frame: Floats, pumps: Any) -> None:
+def draw_down(phases: Any, area_m2: float, pace: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any) -> None:
     """Take a frame into account.
 
     Parameters
@@ -111,6 +115,8 @@ def draw_down(phases: Any, area_m2: float, time_ns: int, gap_s: float, frame: Fl
     phases : new_phases()
     area_m2 : float
         A. [m²]
+    pace : new_pace()[0]
+        Before this frame.
     time_ns, gap_s, frame
         A sample that has passed the gate.
     pumps : (pumps,) records
@@ -121,10 +127,10 @@ def draw_down(phases: Any, area_m2: float, time_ns: int, gap_s: float, frame: Fl
         if pumps[pump]["is_running"]:
             running |= 1 << pump
     phase = phases[NOW]
-    if phase["running"] != running or not gap_s <= MAX_GAP_S:
+    if phase["running"] != running or is_break(pace, gap_s, MAX_GAP_S):
         _end(phases, area_m2, pumps)
         _begin(phase, running, time_ns)
-    elif phase["samples"] >= MAX_SAMPLES and running == 0:
+    elif time_ns - phase["begin_ns"] >= MAX_NS and running == 0:
         _end(phases, area_m2, pumps)
         _begin(phase, running, time_ns - SETTLED_NS)
     if time_ns - phase["begin_ns"] < SETTLED_NS or math.isnan(frame[LEVEL]):

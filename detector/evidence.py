@@ -10,7 +10,7 @@ from wetwell.detector.f_test import FTest
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.observation import COMPONENTS, Observation
 from wetwell.detector.residuals import Array
-from wetwell.detector.runs import SEGMENT_SAMPLES, Run
+from wetwell.detector.runs import Run
 from wetwell.detector.tangent import attribution_index, tangent_residuals
 
 MIN_SAMPLES = 10
@@ -38,7 +38,7 @@ def run_evidence(run: Run, nominal: Nominal, rng: np.random.Generator) -> dict[s
             run.speed_ratio,
             curve=nominal.curves[run.pump],
             friction_h2_m5=nominal.friction_h2_m5,
-            samples_per_segment=SEGMENT_SAMPLES,
+            samples_per_segment=run.segments.samples,
             total_flow_m3h=run.total_flow_m3h,
         )
         evidence["tangent"] = index_figures(*steps, rng)

@@ -124,7 +124,11 @@ def observe(
     )
     slope_variance = np.maximum(baseline.variances(flow_m3h, total_m3h, level_m) - healthy_variance, 0.0)
     covariance = np.zeros((4, 4))
-    covariance[:2, :2] = _noise(shifts_m, baseline) + baseline.run_covariance + np.diag(healthy_variance)
+    covariance[:2, :2] = (
+        _noise(shifts_m, baseline.noise(segments), baseline.correlation_factor)
+        + baseline.run_covariance
+        + np.diag(healthy_variance)
+    )
     covariance[DRAWDOWN, DRAWDOWN] = drawdown[1].variance
     covariance[POWER, POWER] = power.variance
     speed_ratio = float(median(segments.speed_ratio))
@@ -144,11 +148,10 @@ def _towards(explained_m3h: float, measured_m3h: float, scatter: float) -> float
     return min(max(measured_m3h, explained_m3h - reach_m3h), explained_m3h + reach_m3h)
 
 
-def _noise(shifts_m: Floats, baseline: Baseline) -> Floats:
-    """Covariance of the median of the segments of a run."""
-    covariance = baseline.segment_covariance
+def _noise(shifts_m: Floats, covariance: Floats, correlation_factor: float) -> Floats:
+    """Covariance of the median of the segments of a run, from that of one segment."""
     if len(shifts_m) >= MIN_STEPS:
-        own = step_variance(shifts_m) * baseline.correlation_factor
+        own = step_variance(shifts_m) * correlation_factor
         covariance = covariance * max(1.0, float(np.max(own / np.diag(covariance))) / NOISIER_FACTOR)
     noise: Floats = covariance * (np.pi / 2.0 / len(shifts_m))
     return noise

@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.belief import SystemBelief, joint_prior, remember
-from wetwell.detector.block import Block, LiveBlock
+from wetwell.detector.blind_watch import new_blinds
+from wetwell.detector.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES, Block, LiveBlock
 from wetwell.detector.decision import decide
 from wetwell.detector.dispatch import Costs, advice, expected_costs
 from wetwell.detector.drawdown import new_phases
 from wetwell.detector.evidence import f_test_figures, run_evidence, shift_evidence
 from wetwell.detector.gate import Gate
-from wetwell.detector.kernel import BEGIN, DONE, ENDED, FULL, GOES_ON, LOOK, advance
+from wetwell.detector.kernel import BEGIN, DONE, ENDED, FULL, GATHERED, GOES_ON, LOOK, advance
 from wetwell.detector.learning import sibling_objection
 from wetwell.detector.meter_watch import new_meters, noisy_meters, stuck_names
 from wetwell.detector.nominal import Nominal
@@ -36,7 +37,7 @@ from wetwell.detector.posterior import (
 from wetwell.detector.pump_record import ROLLING_SAMPLES, Knowledge, PumpRecord
 from wetwell.detector.robust import median
 from wetwell.detector.rolling_f_test import RollingFTest
-from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, SEGMENT_SAMPLES, Run, RunTracker
+from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, Run, RunTracker
 from wetwell.detector.severity import severity
 from wetwell.detector.snapshot import decode_snapshot, encode_snapshot
 from wetwell.protocols.messages import State, Verdict
@@ -49,7 +50,7 @@ WRONG = ("stuck", "dead", "lost", "noisy")
 """What a meter can be without any doubt."""
 DEAD_LOG_RATIO = -1.5
 """A flow meter that shows less than a fifth of what leaves the wet well, against health, is dead."""
-_ARRAYS = ("gate", "pumps", "rows", "phases", "meters", "windows", "moments", "counts")
+_ARRAYS = ("gate", "pumps", "pace", "rows", "phases", "meters", "blinds", "windows", "moments", "counts")
 
 
 class Detector:
@@ -82,6 +83,7 @@ class Detector:
         self._runs = RunTracker(nominal)
         self._phases = new_phases()
         self._meters = new_meters(nominal.pumps)
+        self._blinds = new_blinds(nominal.pumps)
         self._rolling = RollingFTest(ROLLING_SAMPLES, nominal.pumps)
         self._live = LiveBlock(nominal.pumps)
         self._system = SystemBelief()
@@ -124,6 +126,10 @@ class Detector:
         if stop == FULL:
             self._runs.make_room()
             return []
+        if stop == GATHERED:
+            full = np.flatnonzero(self._blinds["is_full"]).tolist()
+            changed = [pump for pump in full if self._pumps[pump].blind.take(self._blinds[pump])]
+            return [self._tell_blind(pump, now_ns) for pump in changed]
         if stop == LOOK:
             return [verdict for pump in self._runs.full_pumps() for verdict in self._look_early(pump, now_ns)]
         runs = self._runs.take_ended(now_ns) if stop == ENDED else self._runs.newly_blind_runs()
@@ -133,8 +139,8 @@ class Detector:
         """The state that the loop over the samples changes."""
         gate, runs, rolling = self._gate, self._runs, self._rolling
         return (
-            *(runs.table, gate.state, gate.ranges, gate.frame, runs.pumps, runs.rows),
-            *(self._phases, self._nominal.area_m2, self._meters),
+            *(runs.table, gate.state, gate.ranges, gate.frame, runs.pumps, runs.pace, runs.rows),
+            *(self._phases, self._nominal.area_m2, self._meters, self._blinds),
             *(rolling.windows, rolling.moments, rolling.counts),
         )
 
@@ -158,15 +164,17 @@ class Detector:
             If it is damaged, of another format or station; this detector is left as it was.
         """
         state = decode_snapshot(data, self._station, self._nominal)
-        self._runs.rows = np.empty_like(state["arrays"]["rows"])
+        blank = Detector(self._station, self._nominal)
+        arrays = dict(zip(_ARRAYS, blank._stateful_arrays(), strict=True)) | state["arrays"]
+        self._runs.rows = np.empty_like(arrays["rows"])
         for name, array in zip(_ARRAYS, self._stateful_arrays(), strict=True):
-            array[...] = state["arrays"][name]
+            array[...] = arrays[name]
         self._system, self._pumps = state["system"], state["pumps"]
 
     def _stateful_arrays(self) -> tuple[npt.NDArray[Any], ...]:
         gate, runs, rolling = self._gate, self._runs, self._rolling
         return (
-            *(gate.state, runs.pumps, runs.rows, self._phases, self._meters),
+            *(gate.state, runs.pumps, runs.pace, runs.rows, self._phases, self._meters, self._blinds),
             *(rolling.windows, rolling.moments, rolling.counts),
         )
 
@@ -193,6 +201,7 @@ class Detector:
     def _begin_anew(self, pump: int) -> None:
         """Forget what the open run has shown under another baseline."""
         self._runs.pumps["stuck"][pump] = 0
+        self._blinds[pump] = new_blinds(1)[0]
         self._runs.pumps["is_learning"][pump] = self._pumps[pump].known is None
 
     def _every(self) -> range:
@@ -204,6 +213,17 @@ class Detector:
         if pump.known is not None:
             evidence["baseline"] = pump.known.version
         return self._verdict(index, time_ns, window_ns, {pump.state: 1.0}, evidence)
+
+    def _tell_blind(self, index: int, time_ns: int) -> Verdict:
+        """Verdict on a pump that cannot be judged, when it begins or ceases to run as it used to."""
+        pump, now = self._pumps[index], (time_ns, time_ns)
+        reading = self._gate.frame[FIRST_PUMP + PUMP_VALUES * index :]
+        needed = {"flow_m3h": FLOW, "frequency_hz": FREQUENCY, "head_m": HEAD}
+        lacking = [name for name, at in needed.items() if math.isnan(reading[at])]
+        pump.take_state("unknown", now, None)
+        evidence = {"early": True, "missing": lacking, "reason": _blind(lacking)}
+        evidence |= pump.blind.evidence(int(self._blinds["running"][index]))
+        return self._verdict(index, time_ns, now, {"unknown": 1.0}, evidence)
 
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         """Verdict on a run that has ended."""
@@ -254,13 +274,11 @@ class Detector:
         lacking = sorted(run.missing & NEEDED)
         if lacking and pump.known is not None:
             return self._blame_meter(run, time_ns, evidence | {"lost": lacking})
-        evidence["reason"] = (
-            f"without {', '.join(lacking)} pump and system cannot be told apart"
-            if lacking
-            else f"fewer than {SEGMENT_SAMPLES} steady samples"
-        )
+        evidence["reason"] = _blind(lacking) if lacking else f"fewer than {run.segments.samples} steady samples"
         if lacking or pump.known is not None:
             pump.take_state("unknown", run.window_ns, None)
+        if lacking:
+            evidence |= pump.blind.evidence(int(self._blinds["running"][run.pump]))
         return self._verdict(run.pump, time_ns, run.window_ns, {pump.state: 1.0}, evidence)
 
     def _wrong_meters(self, index: int, stuck: list[str], log_ratio: float) -> dict[str, list[str]]:
@@ -296,8 +314,9 @@ class Detector:
         if pump.known is None or not filled:
             return []
         baseline = pump.known.baseline
-        deviation_m = np.sqrt(np.diag(baseline.segment_covariance + baseline.run_covariance))
-        since = pump.cusum.update(baseline.shifts(self._runs.last_segment(index))[0], deviation_m)
+        last = self._runs.last_segment(index)
+        deviation_m = np.sqrt(baseline.noise(last).diagonal() + baseline.run_covariance.diagonal())
+        since = pump.cusum.update(baseline.shifts(last)[0], deviation_m)
         if since < EARLY_SEGMENTS or self._runs.pumps["stuck"][index]:
             pump.early = None
             return []
@@ -377,12 +396,14 @@ class Detector:
         evidence: dict[str, Any],
     ) -> Verdict:
         pump = self._pumps[index]
-        rolling = self._rolling.value(index)
+        running, rolling = self._runs.pumps[index], self._rolling.value(index)
         if rolling is not None:
             evidence["rolling_f_test"] = {
                 "pump": f_test_figures(rolling.pump),
                 "system": f_test_figures(rolling.system),
+                "strongest_log_p": {"pump": float(running["pump_log_p"]), "system": float(running["system_log_p"])},
             }
+            running["pump_log_p"] = running["system_log_p"] = 0.0
         return Verdict(
             time=time_ns,
             station=self._station,
@@ -393,6 +414,10 @@ class Detector:
             onset=pump.onset_ns if pump.state in FAULTS else None,
             window=window_ns,
         )
+
+
+def _blind(lacking: list[str]) -> str:
+    return f"without {', '.join(lacking)} pump and system cannot be told apart"
 
 
 def _with_noise(baseline: Baseline, run: Run, nominal: Nominal) -> Baseline:

@@ -32,6 +32,8 @@ LOAD_SHARE = 0.5
 DISTURBED_DRAWDOWN = 0.5
 DISTURBED_SHARE = 0.05
 """Of runs in which inflow or supply disturb drawdown or power, so that they say nothing."""
+FLOW_TRUST = 0.01
+"""A flow meter is believed to this share where no drawdown that is as exact watches it."""
 LOSING_SHARE = 0.95
 """Of pump faults: the curve falls. A pump that gets better has been cleaned, or was not healthy when learnt."""
 RISING_SHARE = 0.9
@@ -65,15 +67,22 @@ class Weighed:
         Of the hypotheses; sums to one.
     shift_m, deviation_m : (2,) arrays
         Estimates of the shifts of (r_p, r_s) if both may have moved, and their standard deviations. [m]
+    tolerance_m : (2,) array
+        What a flow meter that is wrong by `FLOW_TRUST` makes of them; 0 where the drawdown watches it. [m]
     flow_error, head_error_m : float
         Estimates under the hypothesis that this meter is wrong. [1, m]
+    flow_deviation, head_deviation_m : float
+        Their standard deviations. [1, m]
     """
 
     probability: Floats
     shift_m: Floats
     deviation_m: Floats
+    tolerance_m: Floats
     flow_error: float
     head_error_m: float
+    flow_deviation: float
+    head_deviation_m: float
 
 
 def _ways(
@@ -169,10 +178,27 @@ def weigh(observation: Observation, scales: Scales, prior: Floats) -> Weighed:
     log_weight[[PUMP_FAULT, BOTH]] += np.log(usual_pump)
     log_weight[[SYSTEM_FAULT, BOTH]] += np.log(usual_system)
     weight = np.exp(log_weight - log_weight.max())
+    is_watched = bool(observation.covariance[DRAWDOWN, DRAWDOWN] < FLOW_TRUST**2)
+    flow_error, flow_deviation = _meter_error(
+        observation.flow_meter[known], FLOW_METER_ERROR**2, inverse[FLOW_METER], mean
+    )
+    head_error_m, head_deviation_m = _meter_error(
+        observation.head_sensor[known], scales.head_m**2, inverse[HEAD_SENSOR], mean
+    )
     return Weighed(
         probability=weight / weight.sum(),
         shift_m=estimates,
         deviation_m=deviations,
-        flow_error=float(FLOW_METER_ERROR**2 * observation.flow_meter[known] @ inverse[FLOW_METER] @ mean),
-        head_error_m=float(scales.head_m**2 * observation.head_sensor[known] @ inverse[HEAD_SENSOR] @ mean),
+        tolerance_m=(not is_watched) * FLOW_TRUST * np.abs(observation.flow_meter[[PUMP, SYSTEM]]),
+        flow_error=flow_error,
+        head_error_m=head_error_m,
+        flow_deviation=flow_deviation,
+        head_deviation_m=head_deviation_m,
     )
+
+
+def _meter_error(direction: Floats, prior_variance: float, inverse: Floats, mean: Floats) -> tuple[float, float]:
+    """Error of a meter that is wrong, and its standard deviation."""
+    error = prior_variance * float(direction @ inverse @ mean)
+    variance = prior_variance - prior_variance**2 * float(direction @ inverse @ direction)
+    return error, max(variance, 0.0) ** 0.5

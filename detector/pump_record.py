@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline, Curve
 from wetwell.detector.belief import PumpBelief
+from wetwell.detector.blind_watch import BlindWatch
 from wetwell.detector.cusum import Cusum
 from wetwell.detector.index_limits import IndexLimits
 from wetwell.detector.learning import Learning
@@ -64,6 +65,8 @@ class PumpRecord:
         What was told last.
     onset_ns : int
         Estimate of when the fault began that is told.
+    blind : BlindWatch
+        What is watched while head or frequency is not measured.
     early : State
         Fault that the last look at an open run was sure of.
     """
@@ -77,6 +80,7 @@ class PumpRecord:
     state: State = "learning"
     onset_ns: int | None = None
     early: State | None = None
+    blind: BlindWatch = field(default_factory=BlindWatch)
     cusum: Cusum = field(default_factory=Cusum)
     limits: IndexLimits = field(default_factory=IndexLimits)
     log_ratios: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
@@ -140,6 +144,7 @@ class PumpRecord:
         self.onset_ns, self.early = None, None
         self.limits = IndexLimits()
         self.recent.clear()
+        self.blind = BlindWatch()
         self.cusum.reset()
 
     def _forget(self) -> None:

@@ -30,10 +30,10 @@ LEAST_PIVOT = 1e-5
 """Share of its length by which a column must stand out from those before it; below, sums lose too many digits."""
 PUMP_SIZE, SYSTEM_SIZE = 7, 5
 PUMP_NULLS, SYSTEM_NULLS = 3, 2
-SYSTEM_ROW, ORIGIN, SCALE, COLUMNS, WORK = 7, 12, 13, 14, 15
+SYSTEM_ROW, ORIGIN, SCALE, COLUMNS, WORK, FIGURES = 7, 12, 13, 14, 15, 22
 """Rows of `moments`: sums of the pump, of the system, origins and scales of (u, x, y, w, H), the columns of one
-sample, and the work space of the factorisation."""
-ROWS = 22
+sample, the work space of the factorisation, and the figures of both tests after the last sample."""
+ROWS = 24
 F, LOG_P, AIC_NULL, AIC_ALTERNATIVE = range(4)
 
 

@@ -11,12 +11,15 @@ from wetwell.detector.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POW
 from wetwell.detector.gate import Frame
 from wetwell.detector.nominal import Nominal, Table, duty_flows
 from wetwell.detector.residuals import distances
+from wetwell.detector.robust import median
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 
 Floats = npt.NDArray[np.float64]
 
 SEGMENT_SAMPLES = 25
+SEGMENT_S = 25.0
+"""A feed slower than one sample a second has fewer samples in a segment, but one at least."""
 WARM_UP_S = 30.0
 SETTLING_S = 10.0
 SPEED_STEP = 0.02
@@ -25,6 +28,8 @@ MIN_SPEED_RATIO = 0.4
 MAX_SPEED_RATIO = 1.25
 MAX_RUN_S = 1800.0
 BREAK_S = 60.0
+USUAL_GAPS = 2.5
+"""A feed that is slow by itself breaks only where it lacks more than so many of its usual steps."""
 RUNNING_SHARE = 0.05
 """Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
 NO_FLOW_SHARE = 0.01
@@ -58,15 +63,20 @@ PUMP = np.dtype(
             "stuck",
         )
     ]
-    + [(name, np.float64) for name in ("speed_ratio", "duty_speed", "duty_m3h", "run_s", "log_ratio")]
+    + [
+        (name, np.float64)
+        for name in ("speed_ratio", "duty_speed", "duty_m3h", "run_s", "log_ratio", "pump_log_p", "system_log_p")
+    ]
 )
 """What is known of a pump from sample to sample.
 
 The open run: its start, that of the part being collected, its last sample, when it will be steady, how many steady
 samples it has, a bit for each signal that it has had, and whether one that is needed has never come. Speed and flow
 by the datasheet. For others: whether the pump is being learnt, a bit for each meter that was stuck in the run, time
-that it ran, and the drawdown figure of its last run.
+that it ran, the drawdown figure of its last run, and the smallest log p of the rolling tests since they were told.
 """
+PACE = np.dtype([("segment_samples", np.int64), ("gap_s", np.float64), ("gap_before_s", np.float64)])
+"""How fast a feed comes: samples in a segment, by the pace of the last run, and the last two gaps that are known."""
 COLUMNS = 10
 """Of a steady sample: pump, time, flow, head, speed ratio, total flow, level, power, both flows by the datasheet."""
 LEAST_ROOM = 256
@@ -75,7 +85,7 @@ SEGMENT_MEANS = 8
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """Means over 25 steady samples each, m of them.
+    """Means over steady samples, m of them: 25 samples each, or what a slow feed has in `SEGMENT_S`.
 
     Attributes
     ----------
@@ -88,6 +98,8 @@ class Segments:
     level_m : (m,) array
         NaN where the level is not known. [m]
     speed_ratio : (m,) array
+    samples : int
+        In each segment.
     """
 
     residual_m: Floats
@@ -97,6 +109,7 @@ class Segments:
     duty_total_m3h: Floats
     level_m: Floats
     speed_ratio: Floats
+    samples: int = SEGMENT_SAMPLES
 
     def __len__(self) -> int:
         return len(self.flow_m3h)
@@ -139,6 +152,27 @@ def new_pumps(nominal: Nominal) -> npt.NDArray[np.void]:
     return pumps
 
 
+def new_pace() -> npt.NDArray[np.void]:
+    """Pace of a feed before its first sample."""
+    pace = np.zeros(1, dtype=PACE)
+    pace["segment_samples"] = SEGMENT_SAMPLES
+    return pace
+
+
+@compiled
+def is_break(pace: Any, gap_s: float, limit_s: float) -> bool:
+    """Whether a gap is longer than the limit, and than the feed's own pace explains."""
+    return bool(gap_s > limit_s and gap_s > USUAL_GAPS * min(pace["gap_s"], pace["gap_before_s"]))
+
+
+@compiled
+def note_gap(pace: Any, gap_s: float) -> None:
+    """Remember a gap, after it has been judged."""
+    if gap_s < math.inf:
+        pace["gap_before_s"] = pace["gap_s"]
+        pace["gap_s"] = gap_s
+
+
 @compiled
 def _says_running(own: Any, frame: Floats, at: int, is_open: bool) -> bool:
     """Whether a pump runs: by its flag, else by frequency or flow, else as it did."""
@@ -157,21 +191,21 @@ def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
 
 
 @compiled
-def note_running(table: Table, pumps: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+def note_running(table: Table, pumps: Any, pace: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
-    is_break = gap_s > BREAK_S
+    is_broken = is_break(pace, gap_s, BREAK_S)
     is_changed = any_ending = False
     for number in range(pumps.shape[0]):
         pump = pumps[number]
         is_open = pump["is_open"] != 0
         at = FIRST_PUMP + PUMP_VALUES * number
-        is_running = _says_running(table[number], frame, at, is_open and not is_break)
+        is_running = _says_running(table[number], frame, at, is_open and not is_broken)
         is_changed = is_changed or is_running != (pump["is_running"] != 0)
         pump["is_running"] = is_running
-        is_over = is_break or not is_running or time_ns - pump["part_ns"] >= PART_NS
+        is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= PART_NS
         pump["is_ending"] = is_open and is_over
         any_ending = any_ending or (is_open and is_over)
-        if is_open and is_break:
+        if is_open and is_broken:
             pump["is_open"] = 0
     if is_changed:
         for number in range(pumps.shape[0]):
@@ -286,12 +320,12 @@ def collect(table: Table, pumps: Any, time_ns: int, frame: Floats, rows: Floats)
 
 
 @compiled
-def _average(table: Table, pump: int, rows: Floats, means: Floats) -> None:
-    """Set the means of each segment: both residuals, then as in `Segments`."""
+def _average(table: Table, pump: int, rows: Floats, samples: int, means: Floats) -> None:
+    """Set the means of each segment of so many samples: both residuals, then as in `Segments`."""
     own = table[pump]
     for segment in range(means.shape[1]):
         means[:, segment] = 0.0
-        for at in range(segment * SEGMENT_SAMPLES, (segment + 1) * SEGMENT_SAMPLES):
+        for at in range(segment * samples, (segment + 1) * samples):
             flow_m3h, head_m, speed_ratio, total_m3h = rows[at, 2], rows[at, 3], rows[at, 4], rows[at, 5]
             pump_m, system_m = distances(
                 *(flow_m3h, head_m, speed_ratio, total_m3h, own["c0"], own["c1"], own["c2"]),
@@ -307,7 +341,7 @@ def _average(table: Table, pump: int, rows: Floats, means: Floats) -> None:
             means[6, segment] += rows[at, 6]
             means[7, segment] += speed_ratio
         for mean in range(SEGMENT_MEANS):
-            means[mean, segment] /= SEGMENT_SAMPLES
+            means[mean, segment] /= samples
 
 
 class RunTracker:
@@ -315,7 +349,7 @@ class RunTracker:
 
     A sample is steady `WARM_UP_S` after its pump has started and after any other pump has started or stopped, and
     `SETTLING_S` after the last change of its speed. A run ends when the pump stops, when the stream breaks for more
-    than `BREAK_S`, or in parts of `MAX_RUN_S`, so that a pump that never stops is judged too.
+    than `BREAK_S` and its own pace explain, or in parts of `MAX_RUN_S`, so that one that never stops is judged too.
 
     Memory: 80 bytes a steady sample of the open runs, at most `MAX_RUN_S` of each.
     """
@@ -324,12 +358,14 @@ class RunTracker:
         self._nominal = nominal
         self.table = nominal.table()
         self.pumps = new_pumps(nominal)
+        self.pace = new_pace()
         self.rows = np.zeros((LEAST_ROOM, COLUMNS))
 
     def update(self, frame: Frame) -> list[Run]:
         """Runs that this frame ends."""
         values = np.array(frame.values())
-        is_ending = note_running(self.table, self.pumps, frame.time_ns, frame.gap_s, values)
+        is_ending = note_running(self.table, self.pumps, self.pace[0], frame.time_ns, frame.gap_s, values)
+        note_gap(self.pace[0], frame.gap_s)
         ended = self.take_ended(frame.time_ns) if is_ending else []
         if self.is_full:
             self.make_room()
@@ -342,15 +378,16 @@ class RunTracker:
         return steady_rows(self.pumps) + len(self.pumps) > len(self.rows)
 
     def make_room(self) -> None:
-        """Double the room for steady samples."""
-        self.rows = np.concatenate((self.rows, np.zeros_like(self.rows)))
+        """Make room for some more steady samples."""
+        self.rows = np.concatenate((self.rows, np.zeros((LEAST_ROOM, COLUMNS))))
 
     def take_ended(self, time_ns: int) -> list[Run]:
         """Runs that end with the frame of this stamp; what was kept of them is dropped."""
-        ended = [self._as_run(pump) for pump in np.flatnonzero(self.pumps["is_ending"]).tolist()]
+        ended = [self._finished(pump) for pump in np.flatnonzero(self.pumps["is_ending"]).tolist()]
         drop_ended(self.pumps, self.rows, time_ns)
-        if steady_rows(self.pumps) == 0 and len(self.rows) > LEAST_ROOM:
-            self.rows = np.zeros((LEAST_ROOM, COLUMNS))
+        needed = LEAST_ROOM * (1 + steady_rows(self.pumps) // LEAST_ROOM)
+        if needed < len(self.rows):
+            self.rows = self.rows[:needed].copy()
         return ended
 
     def finish(self) -> list[Run]:
@@ -365,25 +402,28 @@ class RunTracker:
 
     def full_pumps(self) -> list[int]:
         """Pumps that have just filled a segment."""
-        is_full = (self.pumps["is_steady"] > 0) & (self.pumps["samples"] % SEGMENT_SAMPLES == 0)
-        return [int(pump) for pump in np.flatnonzero(is_full)]
+        return [pump for pump in range(len(self.pumps)) if self.full_segments(pump)]
 
     def full_segments(self, pump: int) -> int:
         """Number of segments of an open run, when it has just filled one; else 0."""
         state = self.pumps[pump]
-        if not state["is_steady"] or state["samples"] % SEGMENT_SAMPLES:
+        if not state["is_steady"] or state["samples"] % self._segment_samples:
             return 0
-        return int(state["samples"]) // SEGMENT_SAMPLES
+        return int(state["samples"]) // self._segment_samples
 
     def last_segments(self, pump: int, segments: int) -> Run:
         """The last segments of an open run, of which the window begins with them."""
         if not self.pumps["is_open"][pump]:
             raise ValueError(f"pump {pump} has no open run")
-        return self._as_run(pump, int(self.pumps["samples"][pump]) - segments * SEGMENT_SAMPLES)
+        return self._as_run(pump, int(self.pumps["samples"][pump]) - segments * self._segment_samples)
 
     def last_segment(self, pump: int) -> Segments:
         """The last segment of an open run."""
-        return self._segments(pump, self._rows_of(pump)[-SEGMENT_SAMPLES:])
+        return self._segments(pump, self._rows_of(pump)[-self._segment_samples :])
+
+    @property
+    def _segment_samples(self) -> int:
+        return int(self.pace["segment_samples"][0])
 
     def _rows_of(self, pump: int) -> Floats:
         rows = self.rows[: steady_rows(self.pumps)]
@@ -391,9 +431,28 @@ class RunTracker:
         return own
 
     def _segments(self, pump: int, rows: Floats) -> Segments:
-        means = np.empty((SEGMENT_MEANS, len(rows) // SEGMENT_SAMPLES))
-        _average(self.table, pump, rows, means)
-        return Segments(np.ascontiguousarray(means[:2].T), *means[2:])
+        samples = self._segment_samples
+        means = np.empty((SEGMENT_MEANS, len(rows) // samples))
+        _average(self.table, pump, rows, samples, means)
+        flow_m3h, total_m3h, duty_m3h, duty_total_m3h, level_m, speed_ratio = means[2:]
+        return Segments(
+            residual_m=np.ascontiguousarray(means[:2].T),
+            flow_m3h=flow_m3h,
+            total_m3h=total_m3h,
+            duty_m3h=duty_m3h,
+            duty_total_m3h=duty_total_m3h,
+            level_m=level_m,
+            speed_ratio=speed_ratio,
+            samples=samples,
+        )
+
+    def _finished(self, pump: int) -> Run:
+        """The whole open run; its pace says how many samples a segment has from now on."""
+        time_s = self._rows_of(pump)[:, 1]
+        if len(time_s) > 1:
+            period_s = float(median(np.diff(time_s)))
+            self.pace["segment_samples"] = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
+        return self._as_run(pump)
 
     def _as_run(self, pump: int, first_row: int = 0) -> Run:
         """The open run from a row on; where that is not the first, its window begins there."""

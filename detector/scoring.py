@@ -77,6 +77,11 @@ def learning_end_ns(recording: Recording, learning_s: float) -> int:
     return int(recording.time_ns[0]) + round(learning_s * NS_PER_S) if len(recording) else 0
 
 
+def step_s(recording: Recording) -> float:
+    """Time that one row stands for: the median step; 1 s with fewer than two rows. [s]."""
+    return float(np.median(np.diff(recording.time_ns))) / NS_PER_S if len(recording) > 1 else 1.0
+
+
 def truth_of(verdict: Verdict, recording: Recording) -> npt.NDArray[np.str_]:
     """True states of the pump in the window of a verdict."""
     states: npt.NDArray[np.str_] = recording.truth[f"truth_pump{verdict.pump}_state"][_rows(verdict, recording)]

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline import Baseline, Model
 from wetwell.detector.belief import PumpBelief, SystemBelief
+from wetwell.detector.blind_watch import BlindWatch
 from wetwell.detector.cusum import Cusum
 from wetwell.detector.index_limits import IndexLimits
 from wetwell.detector.learning import Learning
@@ -21,14 +22,17 @@ from wetwell.detector.nominal import Nominal
 from wetwell.detector.observation import Check
 from wetwell.detector.pump_record import Knowledge, PumpRecord
 from wetwell.detector.runs import Segments
+from wetwell.detector.snapshot_upgrade import UPGRADES
 from wetwell.protocols.errors import WetwellError
 
-SCHEMA = "wetwell.detector-snapshot/2"
+_SCHEMA_NAME, FORM = "wetwell.detector-snapshot", 2
+SCHEMA = f"{_SCHEMA_NAME}/{FORM}"
 
 _CLASSES: Mapping[str, type] = {
     cls.__name__: cls
     for cls in (
         Baseline,
+        BlindWatch,
         Check,
         Cusum,
         IndexLimits,
@@ -60,7 +64,7 @@ def encode_snapshot(station: str, nominal: Nominal, state: Mapping[str, Any]) ->
 
 
 def decode_snapshot(data: bytes, station: str, nominal: Nominal) -> dict[str, Any]:
-    """State in a snapshot.
+    """State in a snapshot; one of an older form is taken over, see `UPGRADES`.
 
     Raises
     ------
@@ -70,18 +74,26 @@ def decode_snapshot(data: bytes, station: str, nominal: Nominal) -> dict[str, An
     try:
         head, _, body = data.partition(b"\n")
         header, text = json.loads(head), body.rstrip(b"\n")
-        schema = header["schema"]
-    except (ValueError, KeyError, TypeError) as error:
+        name, _, number = header["schema"].partition("/")
+        form = int(number) if name == _SCHEMA_NAME else 0
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise SnapshotError(f"snapshot of station '{station}': damaged, its first line is no header") from error
-    if schema != SCHEMA:
-        raise SnapshotError(f"snapshot of station '{station}': format '{schema}', this version reads '{SCHEMA}'")
+    if form != FORM and form not in UPGRADES:
+        known = f"format '{header['schema']}', this version reads up to '{SCHEMA}'"
+        raise SnapshotError(f"snapshot of station '{station}': {known}")
     if hashlib.sha256(text).hexdigest() != header.get("sha256"):
         raise SnapshotError(f"snapshot of station '{station}': damaged, its checksum differs")
     if header.get("station") != station:
         raise SnapshotError(f"snapshot of station '{header.get('station')}': this is station '{station}'")
     if header.get("datasheet") != _fingerprint(nominal):
         raise SnapshotError(f"snapshot of station '{station}': the curves in the station file have changed since")
-    state: dict[str, Any] = _decoded(json.loads(text), nominal)
+    try:
+        encoded = json.loads(text)
+        while form < FORM:
+            encoded, form = UPGRADES[form](encoded, nominal), form + 1
+        state: dict[str, Any] = _decoded(encoded, nominal)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
     return state
 
 
@@ -150,6 +162,9 @@ def _array(content: list[Any], _nominal: Nominal) -> Any:
 
 def _object(content: list[Any], nominal: Nominal) -> Any:
     name, fields = content
+    lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys()
+    if lacking:
+        raise ValueError(f"a {name} without {', '.join(sorted(lacking))}")
     made: Any = object.__new__(_CLASSES[name])
     for field, value in fields.items():
         object.__setattr__(made, field, _decoded(value, nominal))

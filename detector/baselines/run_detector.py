@@ -64,7 +64,7 @@ class RunDetector(ABC):
 
     @abstractmethod
     def _told(self, run: Run) -> State:
-        """State of a run with at least one segment, after learning."""
+        """State of a run with at least 25 steady samples, after learning."""
 
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         state = self._state(run, time_ns)
@@ -85,7 +85,7 @@ class RunDetector(ABC):
         if learnt is not None:
             assert self._begin_ns is not None  # noqa: S101 - a run has samples
             if len(learnt) < MIN_RUNS or time_ns - self._begin_ns <= LEARNING_S * NS_PER_S:
-                if len(run.segments) >= MIN_SEGMENTS:
+                if len(run.time_s) >= MIN_SEGMENTS * SEGMENT_SAMPLES:
                     learnt.append(run)
                 return "learning"
             self._learn(run.pump, learnt)

@@ -92,6 +92,21 @@ def test_blocks_give_the_verdicts_and_the_state_of_single_samples(recordings, la
     assert [v.encode() for v in in_blocks.finish()] == [v.encode() for v in one_by_one.finish()]
 
 
+@pytest.mark.parametrize("every", [1, 5, 20, 60])
+def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
+    recording, station = recordings["alpha", "blocked"], stations()["alpha"]
+    columns = {name: values[::every] for name, values in recording.columns.items() if name != "pump2_head_m"}
+    recording = Recording(time_ns=recording.time_ns[::every], columns=columns)
+    one_by_one, in_blocks = (Detector(station.name, nominal_of(station)) for _ in range(2))
+    expected = [verdict for row in recording.rows() for verdict in one_by_one.update(row)]
+    pieces = (piece for block in blocks(recording, 3) for piece in cut(block, np.random.default_rng(every)))
+    told = [verdict.encode() for piece in pieces for verdict in in_blocks.take(piece)]
+    assert told == [verdict.encode() for verdict in expected]
+    assert in_blocks.snapshot() == one_by_one.snapshot()
+    assert any(verdict.evidence.get("abnormal") for verdict in expected if verdict.pump == 2)
+    assert {verdict.state for verdict in expected if verdict.pump == 1} >= {"learning", "normal"}
+
+
 def test_messages_give_the_verdicts_of_the_rows_that_they_were(recordings):
     recording, station = spoilt(recordings["alpha", "blocked"], np.random.default_rng(99)), stations()["alpha"]
     in_blocks, live = (Detector(station.name, nominal_of(station)) for _ in range(2))

@@ -1,5 +1,7 @@
 """What is learnt of a healthy pump: offset, slopes and scatter, against plants whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -233,3 +235,12 @@ def test_the_noise_follows_recent_runs_with_its_correlation_and_the_offset_does_
     noisier = baseline.with_noise_of(segments_of(np.array([9.0, 0.0]) + rng.normal(size=(10, 2))), 0.5, 36.0)
     assert (noisier.offset_m == baseline.offset_m).all()
     assert np.trace(noisier.segment_covariance) <= 2.5 * np.trace(baseline.segment_covariance) * (1.0 + 1e-9)
+
+
+def test_segments_of_fewer_samples_are_taken_to_be_noisier():
+    rng = np.random.default_rng(0)
+    runs = made_runs(rng, curve=CURVE, friction_h2_m5=FRICTION_H2_M5, speeds=np.ones(8))
+    baseline = learn(runs, CURVE, FRICTION_H2_M5)
+    short = replace(runs[0], samples=5)
+    np.testing.assert_allclose(baseline.noise(short), 5.0 * baseline.segment_covariance)
+    assert baseline.with_noise_of(short, 0.5, 36.0) is baseline

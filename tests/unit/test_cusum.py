@@ -27,7 +27,7 @@ def test_the_sums_are_those_of_the_textbook():
     sums = []
     for row in z:
         cusum.update(row * DEVIATION_M, DEVIATION_M)
-        sums.append(cusum.sums)
+        sums.append(cusum.sums.copy())
     expected = np.array([[by_loop(sign * z[:, column]) for column in (0, 1)] for sign in (1.0, -1.0)])
     np.testing.assert_allclose(np.transpose(sums, (1, 2, 0)), expected, atol=1e-9)
 

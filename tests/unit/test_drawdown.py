@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.drawdown import DEAD_RATIO, draw_down, new_phases
 from wetwell.detector.gate import Frame, PumpFrame
-from wetwell.detector.runs import PUMP
+from wetwell.detector.runs import PUMP, new_pace, note_gap
 from wetwell.protocols.stamps import NS_PER_S
 
 AREA_M2 = 8.0
@@ -40,11 +40,12 @@ IDLE, ONE, TWO = (0, 0), (1, 0), (1, 1)
 
 
 def told_of_both(frames, *, area_m2=AREA_M2):
-    phases, pumps = new_phases(), np.zeros(2, dtype=PUMP)
+    phases, pumps, pace = new_phases(), np.zeros(2, dtype=PUMP), new_pace()
     pumps["log_ratio"] = NAN
     for frame, running in frames:
         pumps["is_running"] = running
-        draw_down(phases, area_m2, frame.time_ns, frame.gap_s, np.array(frame.values()), pumps)
+        draw_down(phases, area_m2, pace[0], frame.time_ns, frame.gap_s, np.array(frame.values()), pumps)
+        note_gap(pace[0], frame.gap_s)
     return pumps["log_ratio"].tolist()
 
 
@@ -122,6 +123,13 @@ def test_the_inflow_just_before_the_run_counts_and_not_that_of_hours_ago():
 
     ratio = told(trace((7_000, IDLE), (200, ONE), (5, IDLE), inflow_m3h=evening))
     assert ratio == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("period_s", [5, 20, 60])
+def test_a_slow_feed_tells_too(period_s):
+    frames = list(trace((600, IDLE), (600, ONE), (120, IDLE), ratio=0.9))[::period_s]
+    slow = ((frame._replace(gap_s=float(period_s)), running) for frame, running in frames)
+    assert told(slow) == pytest.approx(math.log(0.9), abs=0.03)
 
 
 def test_no_level_no_figure():

@@ -64,6 +64,15 @@ def test_every_verdict_is_complete_and_survives_the_wire(verdicts):
             assert {"steady_samples", "shift_m", "shift_sigmas", "f_test", "index"} <= verdict.evidence.keys()
 
 
+def test_the_strongest_rolling_test_is_that_since_the_verdict_before(verdicts):
+    rolling = [verdict.evidence["rolling_f_test"] for verdict in verdicts if "rolling_f_test" in verdict.evidence]
+    assert len(rolling) > 20
+    for curve in ("pump", "system"):
+        assert all(figures["strongest_log_p"][curve] <= figures[curve]["log_p"] for figures in rolling)
+        assert any(figures["strongest_log_p"][curve] < figures[curve]["log_p"] - 1.0 for figures in rolling)
+        assert len({figures["strongest_log_p"][curve] for figures in rolling}) == len(rolling), "begun anew each time"
+
+
 def test_the_windows_of_a_pump_follow_one_another(verdicts):
     whole = [verdict for verdict in verdicts[3:] if "early" not in verdict.evidence]
     for pump in (1, 2, 3):

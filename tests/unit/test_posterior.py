@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.belief import PumpBelief, SystemBelief, joint_prior
 from wetwell.detector.meter_faults import flow_meter_direction, head_sensor_direction
-from wetwell.detector.observation import Observation
+from wetwell.detector.observation import DRAWDOWN, Observation
 from wetwell.detector.posterior import (
     BOTH,
     FLOW_METER,
@@ -55,6 +55,7 @@ def test_a_flow_meter_with_the_drawdown_against_it_is_the_one_that_is_wrong(erro
     weighed = weigh(seen(error * FLOW_DIRECTION, drawdown=error, power=0.0), SCALES, PRIOR)
     assert weighed.probability[FLOW_METER] > 0.99
     assert weighed.flow_error == pytest.approx(error, abs=0.01)
+    assert abs(weighed.flow_error - error) < 2.5 * weighed.flow_deviation < 0.025
 
 
 @pytest.mark.parametrize("error_m", [-3.0, -1.0, 1.0, 3.0])
@@ -62,6 +63,7 @@ def test_a_head_sensor_with_drawdown_and_power_in_order_is_the_one_that_is_wrong
     weighed = weigh(seen((error_m, error_m), drawdown=0.0, power=0.0), SCALES, PRIOR)
     assert weighed.probability[HEAD_SENSOR] > 0.9
     assert weighed.head_error_m == pytest.approx(error_m, abs=0.1)
+    assert abs(weighed.head_error_m - error_m) < 2.5 * weighed.head_deviation_m < 0.5
 
 
 def test_the_drawdown_tells_a_fault_of_both_curves_from_a_flow_meter():
@@ -112,3 +114,12 @@ def test_slopes_that_may_be_wrong_explain_a_small_shift_of_the_other_curve():
 def test_a_pump_that_loses_is_believed_sooner_than_one_that_gains():
     assert probability((-0.3, 0.0))[PUMP_FAULT] > 2.0 * probability((0.3, 0.0))[PUMP_FAULT]
     assert probability((0.0, 0.3))[SYSTEM_FAULT] > probability((0.0, -0.3))[SYSTEM_FAULT]
+
+
+def test_a_flow_meter_is_believed_to_one_percent_unless_the_drawdown_watches_it():
+    observation = seen((0.0, 1.5))
+    for deviation in (NAN, 0.02):
+        observation.covariance[DRAWDOWN, DRAWDOWN] = deviation**2
+        np.testing.assert_allclose(weigh(observation, SCALES, PRIOR).tolerance_m, np.abs(0.01 * FLOW_DIRECTION))
+    observation.covariance[DRAWDOWN, DRAWDOWN] = 0.005**2
+    assert weigh(observation, SCALES, PRIOR).tolerance_m.tolist() == [0.0, 0.0], "learnt, not seen in this run"

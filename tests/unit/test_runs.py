@@ -212,3 +212,21 @@ def test_a_closed_check_valve_says_nothing_of_the_main(tracker):
     feed(tracker, range(60), ON._replace(flow_m3h=0.0, head_m=1.0))
     (run,) = tracker.finish()
     np.testing.assert_allclose(run.segments.residual_m, [[1.0 - 36.0, 0.0]])
+
+
+@pytest.mark.parametrize(("period_s", "samples"), [(1, 25), (2, 12), (5, 5), (10, 2), (30, 1), (60, 1)])
+def test_a_slow_feed_has_shorter_segments(tracker, period_s, samples):
+    for second in range(0, 1800, period_s):
+        assert not tracker.update(frame(second, ON, gap_s=float(period_s)))
+    (run,) = tracker.update(frame(1800, gap_s=float(period_s)))
+    assert run.segments.samples == samples
+    assert len(run.segments) == len(run.time_s) // samples
+    assert run.time_s[0] == max(30, period_s)
+
+
+def test_a_slow_feed_breaks_only_where_more_than_one_sample_is_lacking(tracker):
+    seconds = [0, 61, 122, 244, 305, 488]
+    ended = []
+    for before, second in zip([-61, *seconds], seconds, strict=False):
+        ended.append(len(tracker.update(frame(second, ON, gap_s=float(second - before)))))
+    assert ended[2:] == [0, 0, 0, 1], "the feed's pace is 61 s; 122 s lack one sample, 183 s lack two"
