@@ -1,7 +1,7 @@
 """The diagnosis: verdict, where the gap lies, which effects cause it, and how far it shrinks with them."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,7 @@ from wetwell.sim2real.misfit import Misfit
 from wetwell.sim2real.plausibility import check_plausible
 from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, REGIMES, STEADY, Regimes, regimes_of
 from wetwell.sim2real.replay import Replay
-from wetwell.sim2real.shrinkage import Interval, Shrinkage, bootstrap, shrinkage_of
+from wetwell.sim2real.shrinkage import FLOOR, NOTHING, Interval, Shrinkage, bootstrap, shrinkage_of
 from wetwell.sim2real.structure import explained, repeating
 from wetwell.sim2real.sureness import is_sure
 from wetwell.sim2real.traces import Traces, traces_of
@@ -136,6 +136,8 @@ def diagnose(
     found = Attributor(replay, misfit, candidates, progress).search()
     bins, pumps = misfit.bins, traces.pumps
     rng = np.random.default_rng(seed)
+    if shrinkage_of(found.plain, found.plain, bins, found.held, rng).before < FLOOR + NOTHING:
+        found = replace(found, accepted=None, equivalent=(), ends=np.zeros((0, 2)))
     before = _repeating_gap(found.plain, bins, found, pumps)
     accepted = found.accepted
     after_residuals = found.plain if accepted is None else accepted.residuals
