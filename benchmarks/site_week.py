@@ -1,0 +1,132 @@
+"""Days of station time through detector, historian and alarms in one process, for the slope of its memory."""
+
+import asyncio
+import gc
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from wetwell.protocols.keys import alarm_key, sample_key, verdict_key
+from wetwell.protocols.link import Subscription
+from wetwell.protocols.memory_link import MemoryBus
+from wetwell.services.alarms.keeper import AlarmKeeper
+from wetwell.services.alarms.station_watch import Now
+from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.judge import SAMPLE_HISTORY, StationJudge
+from wetwell.services.historian.core import Historian
+from wetwell.services.historian.folder_store import FolderStore
+from wetwell.services.presets import find_scenario, find_station
+from wetwell.services.settings import AlarmSettings
+from wetwell.simulator.simulation import Simulation
+
+HOUR_S = 3_600
+SCENARIOS = ("nominal", "demo")
+PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+class Week:
+    """The classes of the daemons on a bus in memory, under the clock of the samples."""
+
+    def __init__(self, folder: Path, stations: int) -> None:
+        model = find_station("alpha")
+        self._plants = [
+            Simulation(model.model_copy(update={"name": f"s{n}"}), find_scenario(SCENARIOS[n % 2]), seed=n + 1)
+            for n in range(stations)
+        ]
+        files = [plant.station for plant in self._plants]
+        bus, self._clock = MemoryBus(), Now(0, 0.0)
+        self._historian = Historian(FolderStore(folder / "history"))
+        self._keeper = AlarmKeeper(bus, AlarmSettings(state_dir=folder / "alarms"), files, lambda: self._clock)
+        self._judges = [
+            StationJudge(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
+        ]
+        self._publishers = [bus.publisher(sample_key(station.name), history=SAMPLE_HISTORY) for station in files]
+        self._samples, self._verdicts = bus.subscribe(sample_key("*")), bus.subscribe(verdict_key("*"))
+        self._alarms = bus.subscribe(alarm_key("*"))
+        self._kept = 0
+
+    async def live(self, days: int) -> list[tuple[float, int]]:
+        """Memory of the process in MB and objects of Python, at the end of each hour."""
+        tasks = [
+            *(asyncio.create_task(judge.run()) for judge in self._judges),
+            asyncio.create_task(self._feed(self._samples, self._take_sample)),
+            asyncio.create_task(self._feed(self._verdicts, self._take_verdict)),
+            asyncio.create_task(
+                self._feed(self._alarms, lambda payload: self._historian.take("alarms", payload)),
+            ),
+        ]
+        hours = []
+        for hour in range(24 * days):
+            await self._hour(hour)
+            gc.collect()
+            hours.append((memory_mb(), len(gc.get_objects())))
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        return hours
+
+    async def _hour(self, hour: int) -> None:
+        recordings = [plant.advance(HOUR_S, truth=False) for plant in self._plants]
+        feeds = [
+            recording.samples(plant.station.name, hour * HOUR_S)
+            for plant, recording in zip(self._plants, recordings, strict=True)
+        ]
+        for minute in range(1, 61):
+            end = 60 * minute
+            self._clock = Now(int(recordings[0].time_ns[end - 1]), float(HOUR_S * hour + end))
+            for publisher, feed in zip(self._publishers, feeds, strict=True):
+                for _ in range(60):
+                    publisher.put(next(feed).encode())
+            while (  # noqa: ASYNC110 - what is waited for are other tasks
+                self._kept < (HOUR_S * hour + end) * len(feeds)
+                or min(judge.figures().get("samples", 0.0) for judge in self._judges) < HOUR_S * hour + end
+            ):
+                await asyncio.sleep(0)
+            self._keeper.look()
+            self._historian.commit(self._clock.wall_ns)
+        while self._historian.maintain(self._clock.wall_ns):
+            pass
+        for judge in self._judges:
+            judge.keep()
+        self._keeper.save()
+
+    async def _feed(self, inbox: Subscription[bytes], take: Callable[[bytes], None]) -> None:
+        while True:
+            for payload in await inbox.receive():
+                take(payload)
+            self._keeper.commit()
+
+    def _take_sample(self, payload: bytes) -> None:
+        self._historian.take("samples", payload)
+        self._keeper.take_sample(payload)
+        self._kept += 1
+
+    def _take_verdict(self, payload: bytes) -> None:
+        self._historian.take("verdicts", payload)
+        self._keeper.take_verdict(payload)
+
+
+def memory_mb() -> float:
+    """Resident memory of this process."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_BYTES / 1e6
+
+
+def memory_of_a_week(folder: Path, stations: int, days: int) -> dict[str, object]:
+    """Memory after each day, and its slope over the second half, when all that is bounded is full."""
+    begun_s = time.process_time()
+    hours = np.array(asyncio.run(Week(folder, stations).live(days)))
+    cpu_s = time.process_time() - begun_s
+    late = np.arange(len(hours)) >= len(hours) // 2
+    by_day = np.polyfit(np.arange(len(hours))[late] / 24.0, hours[late], 1)[0]
+    return {
+        "stations": stations,
+        "days": days,
+        "cpu_us_a_sample": round(1e6 * cpu_s / (stations * days * 24 * HOUR_S), 1),
+        "memory_after_each_day_mb": [round(float(value), 1) for value in hours[23::24, 0]],
+        "objects_after_each_day": [int(value) for value in hours[23::24, 1]],
+        "memory_slope_mb_a_day": round(float(by_day[0]), 3),
+        "objects_slope_a_day": round(float(by_day[1]), 1),
+    }
