@@ -81,7 +81,7 @@ class StationJudge:
             payloads = await self._samples.receive()
             self._quarantine.enter(self.station)
             for payload in payloads:
-                self._decode(payload)
+                self.take_payload(payload)
             self._quarantine.leave()
             self._heard_s = time.monotonic()
             await asyncio.sleep(0)  # let the health figures out between batches
@@ -100,7 +100,7 @@ class StationJudge:
         """Carry out the orders of operators for ever. One that is none is counted and left out."""
         while True:
             for payload in await self._orders.receive():
-                self._carry_out(payload)
+                self.take_order(payload)
 
     def keep(self) -> None:
         """Save the state, if it is kept anywhere."""
@@ -113,7 +113,8 @@ class StationJudge:
         age_s = time.monotonic() - self._heard_s
         return counts | {"dropped": float(self._samples.dropped), "sample_age_s": age_s}
 
-    def _decode(self, payload: bytes) -> None:
+    def take_payload(self, payload: bytes) -> None:
+        """Judge a sample; a payload that is none is counted and left out."""
         try:
             sample = Sample.decode(payload)
         except MessageError as error:
@@ -135,7 +136,8 @@ class StationJudge:
         for verdict in verdicts:
             self._publish(verdict)
 
-    def _carry_out(self, payload: bytes) -> None:
+    def take_order(self, payload: bytes) -> None:
+        """Carry out an order, once; one that is none is counted and left out."""
         try:
             order = Order.decode(payload)
         except MessageError as error:
