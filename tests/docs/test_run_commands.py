@@ -17,7 +17,7 @@ BACKGROUND = "wetwell plc "
 """Runs while the rest of its page does."""
 NOT_RUN = {
     "wetwell up": "runs for ever; tests/end_to_end/test_processes.py runs it",
-    "wetwell router": "runs for ever; tests/integration/test_zenoh_link.py",
+    "wetwell router": "runs for ever; tests/integration/test_zenoh_link.py opens the same router",
     "wetwell gateway --plc": "runs for ever; tests/end_to_end/test_gateway.py",
     "wetwell detector --station": "runs for ever; tests/end_to_end/test_processes.py",
     "wetwell dashboard": "runs for ever; tests/integration/test_dashboard.py",
@@ -35,7 +35,7 @@ def commands(page: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_commands_of_a_page_run(page, tmp_path):
+def test_commands_of_a_page_run(page: str, tmp_path: Path) -> None:
     folder = tmp_path / "bin"
     folder.mkdir()
     (folder / "wetwell").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m wetwell.services "$@"\n')
