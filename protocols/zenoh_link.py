@@ -11,9 +11,8 @@ import logging
 import random
 import re
 import threading
-from collections.abc import Callable
 from datetime import timedelta
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self
 
 import zenoh
 import zenoh.ext
@@ -25,8 +24,6 @@ from wetwell.protocols.messages import JSON_ENCODING
 from wetwell.protocols.zenoh_access import OPEN, ZenohAccess
 
 logger = logging.getLogger(__name__)
-
-T = TypeVar("T")
 
 RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 """How a client looks for a lost router. Zenoh's own 1 to 4 s would leave a gap of that length."""
@@ -53,7 +50,7 @@ class ZenohPublisher:
             sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=LAST_LOSS_S),
             publisher_detection=True,
         )
-        self._queryable = session.declare_queryable(key, _at_once(self._answer))
+        self._queryable = session.declare_queryable(key, self._answer)
 
     def put(self, payload: bytes) -> None:
         """Send a message; without a router it is kept in the cache for the time after.
@@ -179,7 +176,7 @@ class ZenohBus:
             subscriber = zenoh.ext.declare_advanced_subscriber(
                 self._session,
                 key,
-                _at_once(deliver),
+                deliver,
                 history=kept,
                 recovery=_recovery(with_history=history > 0),
             )
@@ -202,7 +199,7 @@ class ZenohBus:
             mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
 
         try:
-            self._declared.append(self._session.declare_queryable(key, _at_once(deliver)))
+            self._declared.append(self._session.declare_queryable(key, deliver))
         except zenoh.ZError as error:
             raise LinkError(f"cannot answer '{key}': {_reason(error)}") from error
         return mailbox
@@ -253,7 +250,7 @@ class ZenohBus:
             mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
 
         try:
-            self._declared.append(self._session.liveliness().declare_subscriber(key, _at_once(deliver), history=True))
+            self._declared.append(self._session.liveliness().declare_subscriber(key, deliver, history=True))
         except zenoh.ZError as error:
             raise LinkError(f"cannot watch '{key}': {_reason(error)}") from error
         return mailbox
@@ -372,11 +369,6 @@ async def _open_in_thread(endpoint: str, access: ZenohAccess, timeout_s: float) 
 def _close_late(opening: concurrent.futures.Future[ZenohBus]) -> None:
     if not opening.cancelled() and opening.exception() is None:
         opening.result().close()
-
-
-def _at_once(deliver: Callable[[T], None]) -> "zenoh.handlers.Callback[T]":
-    """A callback in a thread of the session; by default zenoh starts one for each, thousands in a large site."""
-    return zenoh.handlers.Callback(deliver, indirect=False)
 
 
 def _recovery(*, with_history: bool) -> zenoh.ext.RecoveryConfig:

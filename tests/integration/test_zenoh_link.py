@@ -6,7 +6,6 @@ import queue
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 
@@ -193,7 +192,6 @@ def test_what_is_declared_without_router_works_afterwards(endpoint):
 def test_killed_publisher_is_followed_by_its_successor(endpoint):
     script = """
 import sys
-import threading
 from wetwell.protocols.zenoh_link import open_client
 with open_client(sys.argv[1]) as bus:
     publisher = bus.publisher("wetwell/alpha/sample", history=10)
@@ -314,7 +312,6 @@ def test_wrong_key_is_told_in_one_line(router, use):
 def test_process_that_closes_its_bus_ends_by_itself_and_quietly(endpoint, closing):
     script = f"""
 import sys
-import threading
 from wetwell.protocols.zenoh_link import open_client, open_router
 with open_router(sys.argv[1]) as router, open_client(sys.argv[1]) as client:
     client.announce("wetwell/alpha/alive/plc")
@@ -325,14 +322,3 @@ with open_router(sys.argv[1]) as router, open_client(sys.argv[1]) as client:
     with python(script, endpoint) as process:
         output, errors = process.communicate(timeout=LIMIT_S)
         assert (process.returncode, output, errors) == (0, "", "")
-
-
-def test_what_is_declared_starts_no_thread_of_its_own(endpoint):
-    with open_router(endpoint) as bus:
-        before = threading.active_count()
-        for number in range(50):
-            bus.publisher(f"wetwell/s{number}/sample")
-            bus.subscribe(f"wetwell/s{number}/order/detector", history=1)
-            bus.answer(f"wetwell/s{number}/history")
-            bus.watch(f"wetwell/s{number}/alive/*")
-        assert threading.active_count() < before + 10
