@@ -343,6 +343,7 @@ def main() -> None:
         "seconds": arguments.seconds,
         "samples_per_s": stations * arguments.accelerate,
         "sent": sent_s.size,
+        "bytes_a_sample": len(next(load[0].recording.samples(load[0].name)).encode()),
         "sent_late_at_most_s": round(late_s, 3),
         "verdicts": len(latency_ms),
         "sample_to_verdict_ms": {
