@@ -34,6 +34,7 @@ from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.zenoh_link import ZenohBus, connect_client
 from wetwell.services.charts import Series, line_chart
+from wetwell.services.daemon import PARENT_VARIABLE
 from wetwell.services.presets import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
@@ -47,6 +48,7 @@ SUMP_AREA_M2 = 2.0
 """A small wet well: about 130 runs a pump and day."""
 HISTORY = 600
 SETTLE_S = 5.0
+ARRIVAL_S = 0.02
 TICK_S = 0.01
 PATIENCE_S = 300.0
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
@@ -102,7 +104,10 @@ def play(endpoint: str, played: list[Played], accelerate: float, out: Path) -> N
 
     async def run() -> None:
         with await connect_client(endpoint) as bus:
-            publishers = [bus.publisher(sample_key(each.name), history=HISTORY) for each in played]
+            publishers = []
+            for each in played:  # stations that all come in one moment are a storm of questions for the router
+                publishers.append(bus.publisher(sample_key(each.name), history=HISTORY))
+                await asyncio.sleep(ARRIVAL_S)
             messages = [each.recording.samples(each.name, each.begin_s) for each in played]
             sent_s = np.full((len(played[0].recording), len(played)), np.nan)
             await asyncio.sleep(SETTLE_S)
@@ -144,13 +149,14 @@ def daemons(folder: Path, endpoint: str) -> Iterator[dict[str, subprocess.Popen[
     environment = os.environ | {
         "WETWELL_DETECTOR": json.dumps({"state_dir": str(folder / "state")}),
         "WETWELL_ALARMS": json.dumps({"state_dir": str(folder / "alarms")}),
+        PARENT_VARIABLE: "1",
         "WETWELL_LOG": json.dumps({"level": "WARNING"}),
     }
     started: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, words in commands.items():
             command = [sys.executable, "-m", "wetwell.services", *words, "--zenoh", endpoint]
-            started[name] = subprocess.Popen(command, env=environment)  # noqa: S603 - our own commands
+            started[name] = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE)  # noqa: S603 - our own commands
         yield started
     finally:
         for process in reversed(started.values()):
@@ -226,7 +232,7 @@ async def observe(endpoint: str, folder: Path, load: list[Played], accelerate: f
         context = multiprocessing.get_context("spawn")
         player = context.Process(target=play, args=(endpoint, load, accelerate, folder / "sent.npz"), daemon=True)
         player.start()
-        await asyncio.sleep(SETTLE_S)
+        await asyncio.sleep(SETTLE_S + ARRIVAL_S * len(load))
         hearing.append(asyncio.create_task(site.look(period_s)))
         while player.is_alive():
             for name, process in started.items():
@@ -329,6 +335,7 @@ def main() -> None:
     finally:
         shutil.rmtree(folder)
     latency_ms, judged = latencies_ms(site, load, sent_s), site.summed("detector")
+    judged["samples"] -= sum(each.begin_s for each in load)
     if arguments.plots is not None:
         plots(site.curve, arguments.plots)
     result = {
@@ -336,6 +343,7 @@ def main() -> None:
         "seconds": arguments.seconds,
         "samples_per_s": stations * arguments.accelerate,
         "sent": sent_s.size,
+        "bytes_a_sample": len(next(load[0].recording.samples(load[0].name)).encode()),
         "sent_late_at_most_s": round(late_s, 3),
         "verdicts": len(latency_ms),
         "sample_to_verdict_ms": {
