@@ -19,8 +19,8 @@ from wetwell.protocols.stamps import MAX_STAMP_NS
 from wetwell.protocols.zenoh_link import connect_client
 from wetwell.services.historian.folder_store import FolderStore
 
-SPEED = 30
-"""Seconds of the station in one on the wall: the publishers' caches reach back 20 s."""
+SPEED = 15
+"""Seconds of the station in one on the wall: the publishers' caches reach back 40 s."""
 LIMIT_S = 60.0
 VICTIMS = ("detector", "historian", "alarms", "router")
 

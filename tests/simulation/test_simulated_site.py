@@ -59,7 +59,7 @@ def test_a_seed_gives_the_same_events_again(alpha, folder):
 def test_many_seeds_see_every_accident(alpha, folder):
     happened: Counter[str] = Counter()
     for seed in range(100, 105):
-        site = lived(alpha, folder / str(seed), seed, stations=3, days=2.0, period_s=60)
+        site = lived(alpha, folder / str(seed), seed, stations=5, days=2.0, period_s=60)
         assert broken_rules(site) == [], f"seed {seed}"
         happened.update(site.accidents)
     assert set(happened) == set(ACCIDENTS)
