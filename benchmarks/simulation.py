@@ -17,10 +17,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "simulation"))
 
 from rules import broken_rules
-from simulated_site import Site
+from simulated_site import alpha_site
 from virtual_loop import run_virtual
-
-from wetwell.services.presets import find_scenario, find_station
 
 MEMORY = Path("/dev/shm")  # noqa: S108 -- each site has a folder of its own there
 
@@ -29,16 +27,8 @@ def lived(task: tuple[int, int, float, int]) -> tuple[int, list[str], Counter[st
     """Seed, broken rules and accidents of a site."""
     seed, stations, days, period_s = task
     logging.disable(logging.CRITICAL)
-    alpha = find_station("alpha")
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
-        site = Site(
-            seed=seed,
-            stations=[alpha.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
-            scenario=find_scenario("paper"),
-            seconds=round(days * 86_400.0),
-            period_s=period_s,
-            folder=Path(folder),
-        )
+        site = alpha_site(seed, stations, days, period_s, Path(folder))
         run_virtual(site.live())
         return seed, broken_rules(site), Counter(site.accidents)
 

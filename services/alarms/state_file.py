@@ -1,15 +1,15 @@
 """The state of the alarms on disk: written whole, with a version; what cannot be read is put aside and told."""
 
-import contextlib
 import logging
 from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
+from wetwell.protocols.errors import RecordingError, first_fault
 from wetwell.protocols.whole_file import whole_file
 from wetwell.services.alarms.book import BookState
+from wetwell.services.kept_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)
 
@@ -52,20 +52,14 @@ class StateFile:
         """
         if self._path is None:
             return None
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            data = self._path.read_bytes()
-        except FileNotFoundError:
+        data = read_kept(self._path, "alarms.state_dir")
+        if data is None:
             return None
-        except OSError as error:
-            raise ConfigError(f"alarms.state_dir: {self._path}: {error.strerror or error}") from error
         try:
             return SiteState.model_validate_json(data)
         except ValidationError as error:
-            aside = self._path.with_suffix(".refused")
-            with contextlib.suppress(OSError):
-                self._path.replace(aside)
-            log.warning("%s: %s; kept as %s, the alarms begin anew", self._path.name, first_fault(error), aside.name)
+            aside = put_aside(self._path)
+            log.warning("%s: %s; kept as %s, the alarms begin anew", self._path.name, first_fault(error), aside)
             return None
 
     def save(self, state: SiteState) -> None:

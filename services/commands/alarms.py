@@ -75,18 +75,23 @@ def report(zenoh: ZenohOption = None, config: ConfigOption = None, as_json: Json
         typer.echo(report_lines(answer))
 
 
-@app.command()
-def acknowledge(
-    alarm: AlarmArgument,
-    station: StationName,
-    by: ByOption,
-    reason: ReasonOption = "",
-    zenoh: ZenohOption = None,
-    config: ConfigOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Say that an alarm was seen."""
-    _act("acknowledge", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+def _add_act(act: str, text: str) -> None:
+    """Add the command of an act that needs no more than an alarm and a name."""
+
+    @app.command(act.replace("_", "-"), help=text)
+    def command(
+        alarm: AlarmArgument,
+        station: StationName,
+        by: ByOption,
+        reason: ReasonOption = "",
+        zenoh: ZenohOption = None,
+        config: ConfigOption = None,
+        as_json: JsonOption = False,
+    ) -> None:
+        _act(act, (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+
+
+_add_act("acknowledge", "Say that an alarm was seen.")
 
 
 @app.command()
@@ -104,46 +109,9 @@ def shelve(
     _act("shelve", (station, alarm, by, reason), minutes, settings_of(config, zenoh), as_json=as_json)
 
 
-@app.command()
-def unshelve(
-    alarm: AlarmArgument,
-    station: StationName,
-    by: ByOption,
-    reason: ReasonOption = "",
-    zenoh: ZenohOption = None,
-    config: ConfigOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Take an alarm from the shelf before its time."""
-    _act("unshelve", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
-
-
-@app.command("out-of-service")
-def out_of_service(
-    alarm: AlarmArgument,
-    station: StationName,
-    by: ByOption,
-    reason: ReasonOption = "",
-    zenoh: ZenohOption = None,
-    config: ConfigOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Take an alarm out of service, for maintenance, until it is put in again."""
-    _act("out_of_service", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
-
-
-@app.command("in-service")
-def in_service(
-    alarm: AlarmArgument,
-    station: StationName,
-    by: ByOption,
-    reason: ReasonOption = "",
-    zenoh: ZenohOption = None,
-    config: ConfigOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Put an alarm into service again."""
-    _act("in_service", (station, alarm, by, reason), None, settings_of(config, zenoh), as_json=as_json)
+_add_act("unshelve", "Take an alarm from the shelf before its time.")
+_add_act("out_of_service", "Take an alarm out of service, for maintenance, until it is put in again.")
+_add_act("in_service", "Put an alarm into service again.")
 
 
 def _act(

@@ -89,9 +89,9 @@ def settings_of(
 def with_data(settings: Settings, data: Path | None, otherwise: Path) -> Settings:
     """Settings whose daemons keep all they know in `data`, or, where nothing says where, in `otherwise`."""
     folder = data or otherwise
-    changes: dict[str, Table] = {}
     if data is not None or settings.historian == HistorianSettings():
-        changes["historian"] = settings.historian.model_copy(update={"folder": folder, "url": None})
+        settings = with_history(settings, folder)
+    changes: dict[str, Table] = {}
     for section in ("detector", "alarms"):
         table = getattr(settings, section)
         if data is not None or table.state_dir is None:

@@ -1,6 +1,5 @@
 """The state of a station's judge on disk: written whole, read back at the start."""
 
-import contextlib
 import json
 import logging
 from collections.abc import Mapping, Sequence
@@ -9,9 +8,10 @@ from pathlib import Path
 
 from wetwell.detector.pipeline import Detector
 from wetwell.detector.snapshot import SnapshotError
-from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages import Verdict
 from wetwell.protocols.whole_file import whole_file
+from wetwell.services.kept_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)
 
@@ -48,21 +48,14 @@ class Checkpoint:
         """
         if self._path is None:
             return None
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            data = self._path.read_bytes()
-        except FileNotFoundError:
+        data = read_kept(self._path, "detector.state_dir")
+        if data is None:
             return None
-        except OSError as error:
-            raise ConfigError(f"detector.state_dir: {self._path}: {error.strerror or error}") from error
         try:
             told, snapshot = _parted(data)
             detector.restore(snapshot)
         except SnapshotError as error:
-            aside = self._path.with_suffix(".refused")
-            with contextlib.suppress(OSError):
-                self._path.replace(aside)
-            log.warning("%s; kept as %s, learning starts again", error, aside.name)
+            log.warning("%s; kept as %s, learning starts again", error, put_aside(self._path))
             return None
         return told
 

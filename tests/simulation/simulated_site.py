@@ -33,6 +33,7 @@ from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.historian.store import Batch, StoreError
+from wetwell.services.presets import find_scenario, find_station
 from wetwell.services.settings import AlarmSettings, DetectorSettings, HealthSettings, Settings
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -267,6 +268,19 @@ class Site:
             ):
                 patches.enter_context(mock.patch(target, replacement))
             yield
+
+
+def alpha_site(seed: int, stations: int, days: float, period_s: int, folder: Path) -> Site:
+    """Site of stations like the built-in one, with the paper's faults."""
+    alpha = find_station("alpha")
+    return Site(
+        seed=seed,
+        stations=[alpha.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
+        scenario=find_scenario("paper"),
+        seconds=round(days * 86_400.0),
+        period_s=period_s,
+        folder=folder,
+    )
 
 
 async def _each(subscription: Any, note: Callable[[bytes], None]) -> None:

@@ -11,10 +11,8 @@ from pathlib import Path
 
 import pytest
 from rules import broken_rules, fingerprint
-from simulated_site import ACCIDENTS, Site
+from simulated_site import ACCIDENTS, Site, alpha_site
 from virtual_loop import run_virtual
-
-from wetwell.services.presets import find_scenario
 
 
 @pytest.fixture
@@ -28,15 +26,8 @@ def folder(tmp_path: Path) -> Iterator[Path]:
         yield Path(name)
 
 
-def lived(alpha, folder: Path, seed: int, stations: int, days: float, period_s: int) -> Site:
-    site = Site(
-        seed=seed,
-        stations=[alpha.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
-        scenario=find_scenario("paper"),
-        seconds=round(days * 86_400.0),
-        period_s=period_s,
-        folder=folder,
-    )
+def lived(folder: Path, seed: int, stations: int, days: float, period_s: int) -> Site:
+    site = alpha_site(seed, stations, days, period_s, folder)
     run_virtual(site.live())
     return site
 
@@ -47,19 +38,19 @@ def quiet(caplog):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_site_that_is_asked_each_ten_seconds_tells_and_keeps_all_whatever_befalls_it(alpha, folder, seed):
-    assert broken_rules(lived(alpha, folder, seed, stations=2, days=1.0, period_s=10)) == []
+def test_a_site_that_is_asked_each_ten_seconds_tells_and_keeps_all_whatever_befalls_it(folder, seed):
+    assert broken_rules(lived(folder, seed, stations=2, days=1.0, period_s=10)) == []
 
 
-def test_a_seed_gives_the_same_events_again(alpha, folder):
-    sites = [lived(alpha, folder / name, 9, stations=1, days=0.5, period_s=60) for name in ("first", "second")]
+def test_a_seed_gives_the_same_events_again(folder):
+    sites = [lived(folder / name, 9, stations=1, days=0.5, period_s=60) for name in ("first", "second")]
     assert fingerprint(sites[0]) == fingerprint(sites[1])
 
 
-def test_many_seeds_see_every_accident(alpha, folder):
+def test_many_seeds_see_every_accident(folder):
     happened: Counter[str] = Counter()
     for seed in range(100, 105):
-        site = lived(alpha, folder / str(seed), seed, stations=5, days=2.0, period_s=60)
+        site = lived(folder / str(seed), seed, stations=5, days=2.0, period_s=60)
         assert broken_rules(site) == [], f"seed {seed}"
         happened.update(site.accidents)
     assert set(happened) == set(ACCIDENTS)
