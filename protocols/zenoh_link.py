@@ -11,6 +11,7 @@ import logging
 import random
 import re
 import threading
+from collections.abc import Iterator
 from datetime import timedelta
 from typing import Any, Literal, Self
 
@@ -61,7 +62,7 @@ class ZenohPublisher:
             If the bus is closed.
         """
         self._last = payload
-        try:
+        try:  # not `_refusal`: this is once a message
             self._publisher.put(payload)
         except zenoh.ZError as error:
             raise LinkError(f"cannot publish on '{self._key}': {_reason(error)}") from error
@@ -140,10 +141,8 @@ class ZenohBus:
         """
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
-        try:
+        with _refusal("publish on", key):
             publisher = ZenohPublisher(self._session, key, history)
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot publish on '{key}': {_reason(error)}") from error
         self._declared.append(publisher)
         return publisher
 
@@ -166,13 +165,11 @@ class ZenohBus:
                 mailbox.put(sample.payload.to_bytes())
 
         if not recover and not history:
-            try:
+            with _refusal("subscribe to", key):
                 self._declared.append(self._session.declare_subscriber(key, deliver))
-            except zenoh.ZError as error:
-                raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
             return mailbox
         kept = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history) if history else None
-        try:
+        with _refusal("subscribe to", key):
             subscriber = zenoh.ext.declare_advanced_subscriber(
                 self._session,
                 key,
@@ -180,8 +177,6 @@ class ZenohBus:
                 history=kept,
                 recovery=_recovery(with_history=history > 0),
             )
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot subscribe to '{key}': {_reason(error)}") from error
         self._declared.append(subscriber)
         return mailbox
 
@@ -198,10 +193,8 @@ class ZenohBus:
         def deliver(query: zenoh.Query) -> None:
             mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
 
-        try:
+        with _refusal("answer", key):
             self._declared.append(self._session.declare_queryable(key, deliver))
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot answer '{key}': {_reason(error)}") from error
         return mailbox
 
     async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
@@ -222,7 +215,7 @@ class ZenohBus:
             with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits
                 loop.call_soon_threadsafe(ended.set)
 
-        try:
+        with _refusal("ask", key):
             self._session.get(
                 key,
                 zenoh.handlers.Callback(take, end),
@@ -231,8 +224,6 @@ class ZenohBus:
                 target=zenoh.QueryTarget.ALL,
                 timeout=timeout_s,
             )
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot ask '{key}': {_reason(error)}") from error
         await ended.wait()
         return answers
 
@@ -249,10 +240,8 @@ class ZenohBus:
         def deliver(sample: zenoh.Sample) -> None:
             mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
 
-        try:
+        with _refusal("watch", key):
             self._declared.append(self._session.liveliness().declare_subscriber(key, deliver, history=True))
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot watch '{key}': {_reason(error)}") from error
         return mailbox
 
     def announce(self, key: str) -> None:
@@ -263,10 +252,8 @@ class ZenohBus:
         LinkError
             If the key is not a key expression or the bus is closed.
         """
-        try:
+        with _refusal("announce", key):
             self._declared.append(self._session.liveliness().declare_token(key))
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot announce '{key}': {_reason(error)}") from error
 
     @property
     def is_connected(self) -> bool:
@@ -402,6 +389,15 @@ def _config(mode: Literal["router", "client"], endpoint: str, access: ZenohAcces
         except zenoh.ZError:  # its text may hold a password
             raise ConfigError(f"zenoh refuses the settings of {name}") from None
     return config
+
+
+@contextlib.contextmanager
+def _refusal(act: str, key: str) -> Iterator[None]:
+    """Turn what Zenoh refuses into a `LinkError` that names the act and the key."""
+    try:
+        yield
+    except zenoh.ZError as error:
+        raise LinkError(f"cannot {act} '{key}': {_reason(error)}") from error
 
 
 def _reason(error: zenoh.ZError) -> str:
