@@ -20,7 +20,7 @@ from wetwell.detector.baselines import detector_class
 from wetwell.detector.baselines.run_detector import RunDetector
 from wetwell.detector.f_distribution import log_f_survival
 from wetwell.detector.nominal import Nominal, nominal_of
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.detector.scoring import ScoredRun, confusion, f1, precision_and_recall, scored_runs, without_truth
 from wetwell.detector.tangent import tangent_residuals
 from wetwell.protocols.messages import State

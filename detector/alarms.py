@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
-from wetwell.detector.runs import WARM_UP_S
+from wetwell.detector.open_runs import WARM_UP_S
 from wetwell.detector.scoring import FAULTS, LEARNING_S, learning_end_ns, severity_column, step_s, truth_of
 from wetwell.protocols.messages import State, Verdict
 from wetwell.protocols.recording import Recording

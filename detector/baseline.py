@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.detector.robust import NORMAL_MEDIAN, median
-from wetwell.detector.runs import SEGMENT_SAMPLES, Segments
+from wetwell.detector.run import SEGMENT_SAMPLES, Segments
 from wetwell.protocols.jit import compiled
 
 Floats = npt.NDArray[np.float64]

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from wetwell.detector.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_VALUES
 from wetwell.detector.dispatch import advice
 from wetwell.detector.gate import seconds_between
+from wetwell.detector.open_runs import WARM_UP_S
 from wetwell.detector.robust import NORMAL_MEDIAN, median
-from wetwell.detector.runs import SEGMENT_S, SEGMENT_SAMPLES, WARM_UP_S
+from wetwell.detector.run import SEGMENT_S, SEGMENT_SAMPLES
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 

@@ -62,6 +62,11 @@ def decide(weighed: Weighed, head_m: float) -> tuple[State, str | None]:
     return ("normal", remark) if p[NORMAL] + meter * (1.0 - beyond) > 0.5 else ("unknown", remark)
 
 
+def onset_component(state: State) -> int | None:
+    """Component of the shift in which the onset of a fault shows; None without a fault."""
+    return {"pump_fault": PUMP, "system_fault": SYSTEM, "pump_and_system_fault": PUMP}.get(state)
+
+
 def _sized(best: int, weighed: Weighed) -> tuple[State, str | None]:
     """State and remark of a fault that is certain, by how large it is."""
     moved = np.array([best in (PUMP_FAULT, BOTH), best in (SYSTEM_FAULT, BOTH)])

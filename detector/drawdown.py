@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from wetwell.detector.block import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.detector.gate import seconds_between
-from wetwell.detector.runs import is_break
+from wetwell.detector.open_runs import is_break
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 

@@ -10,7 +10,7 @@ from wetwell.detector.f_test import FTest
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.observation import COMPONENTS, Observation
 from wetwell.detector.residuals import Array
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.detector.tangent import attribution_index, tangent_residuals
 
 MIN_SAMPLES = 10

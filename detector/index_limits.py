@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.detector.baseline import Baseline
 from wetwell.detector.evidence import index_figures
 from wetwell.detector.robust import quantiles
-from wetwell.detector.runs import Segments
+from wetwell.detector.run import Segments
 from wetwell.detector.tangent import attribution_index
 
 RUNS = 50

@@ -16,8 +16,8 @@ from wetwell.detector.drawdown import draw_down
 from wetwell.detector.gate import let_through
 from wetwell.detector.meter_watch import watch_meters
 from wetwell.detector.nominal import Table
+from wetwell.detector.open_runs import collect, note_gap, note_running, steady_rows
 from wetwell.detector.rolling_f_test import FIGURES, LEAST_SAMPLES, LOG_P, solve, take
-from wetwell.detector.runs import collect, note_gap, note_running, steady_rows
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 

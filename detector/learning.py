@@ -9,7 +9,7 @@ import numpy.typing as npt
 from wetwell.detector.baseline import FLOOR_SHARE, MIN_RUNS, MIN_SEGMENTS, Baseline, Curve, learn
 from wetwell.detector.meter_faults import flow_meter_direction
 from wetwell.detector.robust import step_variance
-from wetwell.detector.runs import Segments
+from wetwell.detector.run import Segments
 
 Floats = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from wetwell.detector.block import FIRST_PUMP, FLOW, LEVEL, PUMP_VALUES
 from wetwell.detector.robust import NORMAL_MEDIAN, median
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.stamps import NS_PER_S
 

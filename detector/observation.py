@@ -10,7 +10,7 @@ import numpy.typing as npt
 from wetwell.detector.baseline import MIN_RUNS, Baseline, Curve
 from wetwell.detector.meter_faults import flow_meter_direction, head_sensor_direction
 from wetwell.detector.robust import NORMAL_MEDIAN, median, step_variance
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 
 Floats = npt.NDArray[np.float64]
 

@@ -12,22 +12,20 @@ from wetwell.detector.baseline import Baseline
 from wetwell.detector.belief import SystemBelief, joint_prior, remember
 from wetwell.detector.blind_watch import new_blinds
 from wetwell.detector.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES, Block, LiveBlock
-from wetwell.detector.decision import decide
+from wetwell.detector.decision import decide, onset_component
 from wetwell.detector.dispatch import Costs, advice, expected_costs
 from wetwell.detector.drawdown import new_phases
 from wetwell.detector.evidence import f_test_figures, run_evidence, shift_evidence
 from wetwell.detector.gate import Gate
 from wetwell.detector.kernel import BEGIN, DONE, ENDED, FULL, GATHERED, GOES_ON, LOOK, advance
 from wetwell.detector.learning import sibling_objection
-from wetwell.detector.meter_watch import new_meters, noisy_meters, stuck_names
+from wetwell.detector.meter_watch import new_meters, stuck_names
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.observation import PUMP, SYSTEM, observe
+from wetwell.detector.observation import observe
+from wetwell.detector.open_runs import NO_FLOW_SHARE
 from wetwell.detector.posterior import (
     BOTH,
     FAULTS,
-    FLOW_METER,
-    HEAD_SENSOR,
-    NORMAL,
     PUMP_FAULT,
     SYSTEM_FAULT,
     Weighed,
@@ -37,19 +35,17 @@ from wetwell.detector.posterior import (
 from wetwell.detector.pump_record import ROLLING_SAMPLES, Knowledge, PumpRecord
 from wetwell.detector.robust import median
 from wetwell.detector.rolling_f_test import RollingFTest
-from wetwell.detector.runs import NEEDED, NO_FLOW_SHARE, Run, RunTracker
+from wetwell.detector.run import NEEDED, Run
+from wetwell.detector.runs import RunTracker
 from wetwell.detector.severity import severity
 from wetwell.detector.snapshot import decode_snapshot, encode_snapshot
+from wetwell.detector.wrong_meters import doubtful_meters, in_words, silencing_meters
 from wetwell.protocols.messages import State, Verdict
 from wetwell.protocols.readings import Readings
 
 EARLY_PROBABILITY = 0.999
 EARLY_SEGMENTS = 2
 NOISE_WEIGHT = 0.05
-WRONG = ("stuck", "dead", "lost", "noisy")
-"""What a meter can be without any doubt."""
-DEAD_LOG_RATIO = -1.5
-"""A flow meter that shows less than a fifth of what leaves the wet well, against health, is dead."""
 _ARRAYS = ("gate", "pumps", "pace", "rows", "phases", "meters", "blinds", "windows", "moments", "counts")
 
 
@@ -238,7 +234,7 @@ class Detector:
             evidence["missing"] = sorted(run.missing)
         if not len(run.segments):
             return self._unjudged(run, time_ns, evidence)
-        wrong = self._wrong_meters(run.pump, stuck, log_ratio)
+        wrong = silencing_meters(run.pump, pump.known, stuck, log_ratio)
         if wrong:
             return self._blame_meter(run, time_ns, evidence | wrong)
         if pump.known is None:
@@ -253,16 +249,16 @@ class Detector:
         remember(weighed.probability, pump.belief, self._system)
         state, remark = decide(weighed, float(median(run.head_m)))
         pump.recent.append((sum(run.window_ns) // 2, weighed.shift_m))
-        wrong = self._doubtful_meters(run, pump.known, stuck)
+        wrong = doubtful_meters(run, pump.known, stuck)
         evidence |= wrong
         if wrong and state not in FAULTS:
-            state, remark = "sensor_fault", _in_words(wrong)
-        pump.take_state(state, run.window_ns, _component(state))
+            state, remark = "sensor_fault", in_words(wrong)
+        pump.take_state(state, run.window_ns, onset_component(state))
         evidence["index"] = pump.limits.figures(run.segments, pump.known.baseline, rng)
         if state == "normal":
             pump.known = replace(pump.known, baseline=_with_noise(pump.known.baseline, run, self._nominal))
             pump.limits.add(run.segments, pump.known.baseline)
-        probability = _named(weighed)
+        probability = weighed.by_state()
         if state == "sensor_fault" and wrong:
             probability |= {"normal": 0.0, "sensor_fault": probability["normal"] + probability["sensor_fault"]}
         evidence |= self._consequences(run, weighed, probability, state, remark)
@@ -281,30 +277,10 @@ class Detector:
             evidence |= pump.blind.evidence(int(self._blinds["running"][run.pump]))
         return self._verdict(run.pump, time_ns, run.window_ns, {pump.state: 1.0}, evidence)
 
-    def _wrong_meters(self, index: int, stuck: list[str], log_ratio: float) -> dict[str, list[str]]:
-        """Meters of a run that say nothing of the pump: stuck, or dead while the wet well draws down."""
-        known = self._pumps[index].known
-        if any(name.endswith(("flow_m3h", "head_m")) for name in stuck):
-            return {"stuck": stuck}
-        if known is not None and log_ratio - known.drawdown.mean < DEAD_LOG_RATIO:
-            return {"dead": [f"pump{index + 1}_flow_m3h"]}
-        return {}
-
-    @staticmethod
-    def _doubtful_meters(run: Run, known: Knowledge, stuck: list[str]) -> dict[str, list[str]]:
-        """Meters that are wrong, while the run can be judged all the same."""
-        is_level_lost = "level_m" in run.missing and math.isfinite(known.baseline.level_m)
-        wrong = {
-            "noisy": sorted(noisy_meters(run, known.noise)),
-            "stuck": stuck,
-            "lost": ["level_m"] if is_level_lost else [],
-        }
-        return {how: names for how, names in wrong.items() if names}
-
     def _blame_meter(self, run: Run, time_ns: int, evidence: dict[str, Any]) -> Verdict:
         """Verdict on a run whose meter is wrong without doubt."""
         self._pumps[run.pump].take_state("sensor_fault", run.window_ns, None)
-        evidence["advice"] = advice("sensor_fault", _in_words(evidence))
+        evidence["advice"] = advice("sensor_fault", in_words(evidence))
         return self._verdict(run.pump, time_ns, run.window_ns, {"sensor_fault": 1.0}, evidence)
 
     def _look_early(self, index: int, time_ns: int) -> list[Verdict]:
@@ -333,12 +309,12 @@ class Detector:
             return []
         rng = np.random.default_rng(abs(run.window_ns[0]) + run.pump)
         pump.recent.append((sum(run.window_ns) // 2, weighed.shift_m))
-        pump.take_state(state, run.window_ns, _component(state))
+        pump.take_state(state, run.window_ns, onset_component(state))
         pump.recent.pop()
         evidence |= run_evidence(run, self._nominal, rng)
         evidence["index"] = pump.limits.figures(run.segments, baseline, rng)
-        evidence |= self._consequences(run, weighed, _named(weighed), state, remark)
-        return [self._verdict(index, time_ns, run.window_ns, _named(weighed), evidence)]
+        evidence |= self._consequences(run, weighed, weighed.by_state(), state, remark)
+        return [self._verdict(index, time_ns, run.window_ns, weighed.by_state(), evidence)]
 
     def _learn(self, run: Run, log_ratio: float, time_ns: int) -> None:
         pump = self._pumps[run.pump]
@@ -346,7 +322,7 @@ class Detector:
         baseline = pump.learn(run, log_ratio, self._seen_s, curve, self._nominal.friction_h2_m5)
         if baseline is None or pump.learning is None:
             return
-        offsets_m = [_pump_offset_m(other) for other in self._pumps]
+        offsets_m = [other.offset_m for other in self._pumps]
         doubt = sibling_objection(run.pump, offsets_m, self._nominal.curves)
         if doubt is None:
             pump.settle(baseline, time_ns, self._seen_s)
@@ -422,30 +398,3 @@ def _blind(lacking: list[str]) -> str:
 
 def _with_noise(baseline: Baseline, run: Run, nominal: Nominal) -> Baseline:
     return baseline.with_noise_of(run.segments, NOISE_WEIGHT, nominal.curves[run.pump][0])
-
-
-def _pump_offset_m(pump: PumpRecord) -> float | None:
-    """r_p of a pump, learnt or being learnt. [m]."""
-    if pump.known is not None:
-        return float(pump.known.baseline.offset_m[0])
-    return pump.learning.offset_m if pump.learning is not None else None
-
-
-def _in_words(wrong: Mapping[str, Any]) -> str:
-    return ", ".join(f"{' and '.join(wrong[how])} {how}" for how in WRONG if how in wrong)
-
-
-def _component(state: State) -> int | None:
-    """Component of the shift in which the onset of a fault shows; None without a fault."""
-    return {"pump_fault": PUMP, "system_fault": SYSTEM, "pump_and_system_fault": PUMP}.get(state)
-
-
-def _named(weighed: Weighed) -> dict[State, float]:
-    p = weighed.probability
-    return {
-        "normal": float(p[NORMAL]),
-        "pump_fault": float(p[PUMP_FAULT]),
-        "system_fault": float(p[SYSTEM_FAULT]),
-        "pump_and_system_fault": float(p[BOTH]),
-        "sensor_fault": float(p[FLOW_METER] + p[HEAD_SENSOR]),
-    }

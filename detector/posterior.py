@@ -84,6 +84,12 @@ class Weighed:
     flow_deviation: float
     head_deviation_m: float
 
+    def by_state(self) -> dict[State, float]:
+        """Probability of each state, both meters together, as a message carries it."""
+        p = self.probability
+        named = {state: float(p[NORMAL + place]) for place, state in enumerate(STATES)}
+        return named | {"sensor_fault": float(p[FLOW_METER] + p[HEAD_SENSOR])}
+
 
 def _ways(
     observation: Observation, scales: Scales, known: npt.NDArray[np.bool_]

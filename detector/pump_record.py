@@ -15,7 +15,7 @@ from wetwell.detector.learning import Learning
 from wetwell.detector.meter_watch import healthy_noise, reading_noise
 from wetwell.detector.observation import Check, learn_check, log_power
 from wetwell.detector.onset import onset_s
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.messages import State
 from wetwell.protocols.stamps import NS_PER_S
 
@@ -87,6 +87,13 @@ class PumpRecord:
     log_powers: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
     noises: deque[Floats] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
     recent: deque[tuple[int, Floats]] = field(default_factory=lambda: deque(maxlen=RECENT_RUNS))
+
+    @property
+    def offset_m(self) -> float | None:
+        """r_p of the pump, learnt or being learnt; None while there is nothing to tell it from. [m]."""
+        if self.known is not None:
+            return float(self.known.baseline.offset_m[0])
+        return self.learning.offset_m if self.learning is not None else None
 
     def learn(
         self, run: Run, log_ratio: float, seen_s: float, curve: Curve, friction_h2_m5: float

@@ -21,7 +21,7 @@ from wetwell.detector.learning import Learning
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.observation import Check
 from wetwell.detector.pump_record import Knowledge, PumpRecord
-from wetwell.detector.runs import Segments
+from wetwell.detector.run import Segments
 from wetwell.detector.snapshot_upgrade import UPGRADES
 from wetwell.protocols.errors import WetwellError
 

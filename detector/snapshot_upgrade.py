@@ -10,7 +10,7 @@ from wetwell.detector.cusum import Cusum
 from wetwell.detector.gate import COUNTS, STATE
 from wetwell.detector.meter_watch import METERS, new_meters
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import new_pumps
+from wetwell.detector.open_runs import new_pumps
 
 SEGMENT_SAMPLES = 25
 """Of all segments of form 1."""

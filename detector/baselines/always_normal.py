@@ -1,7 +1,7 @@
 """No method at all: what a score is worth."""
 
 from wetwell.detector.baselines.run_detector import RunDetector
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.messages import State
 
 

@@ -5,7 +5,7 @@ from statsmodels.stats.diagnostic import breaks_cusumolsresid
 
 from wetwell.detector.baselines.run_detector import ALPHA, Floats, RunDetector, state_of
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.messages import State
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.detector.baselines.run_detector import Floats, RunDetector
 from wetwell.detector.bootstrap import block_bootstrap_interval
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.detector.tangent import attribution_index
 from wetwell.protocols.messages import State
 

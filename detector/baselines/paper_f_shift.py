@@ -5,7 +5,7 @@ import numpy as np
 from wetwell.detector.baselines.run_detector import ALPHA, Floats, RunDetector, state_of
 from wetwell.detector.f_distribution import log_f_survival
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.messages import State
 
 

@@ -4,7 +4,7 @@ import math
 
 from wetwell.detector.baselines.run_detector import RunDetector
 from wetwell.detector.curve_drift import pump_curve_f_test, system_curve_f_test
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.messages import State
 
 LOG_ALPHA = math.log(0.05)

@@ -2,7 +2,7 @@
 
 from wetwell.detector.baselines.index_method import IndexMethod
 from wetwell.detector.baselines.run_detector import Floats
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.detector.tangent import tangent_residuals
 
 

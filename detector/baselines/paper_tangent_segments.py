@@ -5,7 +5,7 @@ import numpy as np
 from wetwell.detector.baselines.index_method import IndexMethod
 from wetwell.detector.baselines.run_detector import Floats
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import SEGMENT_SAMPLES, Run
+from wetwell.detector.run import SEGMENT_SAMPLES, Run
 from wetwell.detector.tangent import normalise, pump_slope, segment_means, system_slope
 
 

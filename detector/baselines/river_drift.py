@@ -7,7 +7,7 @@ from river.drift import ADWIN, PageHinkley
 
 from wetwell.detector.baselines.run_detector import Floats, RunDetector, state_of
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import Run
+from wetwell.detector.run import Run
 from wetwell.protocols.messages import State
 
 AWAY_SIGMAS = 3.0

@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from wetwell.detector.gate import Gate
 from wetwell.detector.nominal import Nominal
-from wetwell.detector.runs import NEEDED, SEGMENT_SAMPLES, Run, RunTracker
+from wetwell.detector.run import NEEDED, SEGMENT_SAMPLES, Run
+from wetwell.detector.runs import RunTracker
 from wetwell.protocols.messages import State, Verdict
 from wetwell.protocols.readings import Readings
 from wetwell.protocols.stamps import NS_PER_S

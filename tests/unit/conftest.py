@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.detector.runs import SEGMENT_SAMPLES, Run, Segments
+from wetwell.detector.run import SEGMENT_SAMPLES, Run, Segments
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.simulator.scenario import Scenario

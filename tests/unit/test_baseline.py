@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.baseline import FLOOR_SHARE, LEVEL_SLOPE, SLOPE_SHARE, learn
 from wetwell.detector.residuals import level_residuals
-from wetwell.detector.runs import SEGMENT_SAMPLES, Segments
+from wetwell.detector.run import SEGMENT_SAMPLES, Segments
 
 CURVE = (36.0, -0.02333, -1.3333e-4)
 FRICTION_H2_M5 = 6.0e-4

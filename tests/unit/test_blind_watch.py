@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.blind_watch import REFERENCE_SEGMENTS, BlindWatch, gather, new_blinds
 from wetwell.detector.gate import Frame, PumpFrame
-from wetwell.detector.runs import PUMP
+from wetwell.detector.open_runs import PUMP
 from wetwell.protocols.stamps import NS_PER_S
 
 NAN = math.nan

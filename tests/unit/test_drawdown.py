@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.drawdown import DEAD_RATIO, draw_down, new_phases
 from wetwell.detector.gate import Frame, PumpFrame
-from wetwell.detector.runs import PUMP, new_pace, note_gap
+from wetwell.detector.open_runs import PUMP, new_pace, note_gap
 from wetwell.protocols.stamps import NS_PER_S
 
 AREA_M2 = 8.0

@@ -15,7 +15,7 @@ from wetwell.detector.meter_watch import (
     stuck_names,
     watch_meters,
 )
-from wetwell.detector.runs import PUMP
+from wetwell.detector.open_runs import PUMP
 from wetwell.protocols.stamps import NS_PER_S
 
 NAN = math.nan

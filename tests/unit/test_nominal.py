@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from wetwell.detector.nominal import Nominal, duty_flows
-from wetwell.detector.runs import new_pumps
+from wetwell.detector.open_runs import new_pumps
 
 STATIC_M, FRICTION = 2.0, 6.0e-4
 

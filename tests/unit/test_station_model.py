@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wetwell.detector.nominal import duty_flows, nominal_of
+from wetwell.detector.open_runs import new_pumps
 from wetwell.detector.pipeline import Detector
-from wetwell.detector.runs import new_pumps
 from wetwell.detector.station_model import station_model
 from wetwell.protocols.keys import model_key
 from wetwell.protocols.memory_link import MemoryBus
