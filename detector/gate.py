@@ -17,6 +17,7 @@ from wetwell.detector.block import (
     POWER,
     PUMP_VALUES,
     RUNNING,
+    Block,
     LiveBlock,
 )
 from wetwell.detector.nominal import Nominal
@@ -121,14 +122,19 @@ class Gate:
 
     def update(self, sample: Readings) -> Frame | None:
         """Frame of a sample, or None where it is dropped."""
-        time_ns, seq, values, pumps, is_bad = self._live.fill(sample)
-        if not let_through(self.state[0], self.ranges, time_ns[0], seq[0], values[0], pumps, is_bad, self.frame):
+        return self.update_row(self._live.fill(sample), 0)
+
+    def update_row(self, block: Block, row: int) -> Frame | None:
+        """Frame of a row of a block, or None where it is dropped."""
+        state, now_ns = self.state[0], block.time_ns[row]
+        told = (now_ns, block.seq[row], block.values[row], block.pumps, block.is_bad)
+        if not let_through(state, self.ranges, *told, self.frame):
             return None
         level_m, inflow_m3h, *rest = self.frame.tolist()
         readings = (rest[first : first + PUMP_VALUES] for first in range(0, len(rest), PUMP_VALUES))
         return Frame(
-            sample.time,
-            float(self.state["gap_s"][0]),
+            int(now_ns),
+            float(state["gap_s"]),
             level_m,
             inflow_m3h,
             tuple(PumpFrame(f, q, h, p, None if math.isnan(on) else on > 0.0) for f, q, h, p, on in readings),

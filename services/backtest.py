@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
-from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
 from wetwell.detector.backtest import Outcome, outcome, summary
 from wetwell.detector.baselines import DETECTORS, detector_class
+from wetwell.detector.block import blocks
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.scoring import LEARNING_S, in_order_of_time, without_truth
 from wetwell.protocols.errors import ConfigError, RecordingError
@@ -26,8 +26,6 @@ from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
 SCHEMA = "wetwell.backtest/1"
-CHUNK = 3600
-"""Samples that one detector takes before the next one does."""
 
 
 class Source(Protocol):
@@ -222,15 +220,14 @@ def verdicts_on(
     recording: Recording, station: Station, detectors: Sequence[str]
 ) -> dict[str, tuple[list[Verdict], float]]:
     """Verdicts of each detector, and the time that it took; the detectors see no truth column. [s]."""
-    stream = without_truth(recording).rows()
-    judges = {name: detector_class(name)(station.name, nominal_of(station)) for name in detectors}
+    nominal = nominal_of(station)
+    judges = {name: detector_class(name)(station.name, nominal) for name in detectors}
     verdicts: dict[str, list[Verdict]] = {name: [] for name in detectors}
     spent_s = dict.fromkeys(detectors, 0.0)
-    while chunk := list(islice(stream, CHUNK)):
+    for block in blocks(without_truth(recording), nominal.pumps):
         for name, judge_one in judges.items():
             started_s = time.perf_counter()
-            for sample in chunk:
-                verdicts[name].extend(judge_one.update(sample))
+            verdicts[name].extend(judge_one.take(block))
             spent_s[name] += time.perf_counter() - started_s
     for name, judge_one in judges.items():
         verdicts[name].extend(judge_one.finish())

@@ -1,6 +1,6 @@
 """Other detectors, to hold ours against: the paper's two as written, their best plain reading, and outside ones.
 
-Each is one small class with `update` and `finish` as `wetwell.detector.pipeline.Detector` has them. Those on
+Each is one small class with `take` and `finish` as `wetwell.detector.pipeline.Detector` has them. Those on
 statsmodels and river need the extra `baselines` (`pip install wetwell[baselines]`) and are loaded only when asked
 for.
 """
@@ -9,17 +9,17 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Protocol
 
+from wetwell.detector.block import Block
 from wetwell.detector.nominal import Nominal
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages import Verdict
-from wetwell.protocols.readings import Readings
 
 
 class StreamDetector(Protocol):
     """What judges the samples of one station."""
 
-    def update(self, sample: Readings) -> tuple[Verdict, ...]:
-        """Verdicts that a sample brings."""
+    def take(self, block: Block) -> list[Verdict]:
+        """Verdicts that a block of samples brings."""
 
     def finish(self) -> tuple[Verdict, ...]:
         """Verdicts on the runs that are still open."""

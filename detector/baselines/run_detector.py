@@ -5,12 +5,12 @@ from abc import ABC, abstractmethod
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.detector.block import Block
 from wetwell.detector.gate import Gate
 from wetwell.detector.nominal import Nominal
 from wetwell.detector.run import NEEDED, SEGMENT_SAMPLES, Run
 from wetwell.detector.runs import RunTracker
 from wetwell.protocols.messages import State, Verdict
-from wetwell.protocols.readings import Readings
 from wetwell.protocols.stamps import NS_PER_S
 
 Floats = npt.NDArray[np.float64]
@@ -46,14 +46,17 @@ class RunDetector(ABC):
         self._learning: list[list[Run] | None] = [[] for _ in range(nominal.pumps)]
         self._begin_ns: int | None = None
 
-    def update(self, sample: Readings) -> tuple[Verdict, ...]:
-        """Verdicts that a sample brings."""
-        frame = self._gate.update(sample)
-        if frame is None:
-            return ()
-        if self._begin_ns is None:
-            self._begin_ns = frame.time_ns
-        return tuple(self._judge(run, frame.time_ns) for run in self._runs.update(frame))
+    def take(self, block: Block) -> list[Verdict]:
+        """Verdicts that a block of samples brings."""
+        verdicts = []
+        for row in range(len(block.time_ns)):
+            frame = self._gate.update_row(block, row)
+            if frame is None:
+                continue
+            if self._begin_ns is None:
+                self._begin_ns = frame.time_ns
+            verdicts += [self._judge(run, frame.time_ns) for run in self._runs.update(frame)]
+        return verdicts
 
     def finish(self) -> tuple[Verdict, ...]:
         """Verdicts on the runs that are still open at the end of a recording."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wetwell.detector.baselines import DETECTORS, detector_class
+from wetwell.detector.block import blocks
 from wetwell.detector.nominal import nominal_of
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.stamps import NS_PER_S
@@ -101,5 +102,5 @@ def test_the_six_hours_are_those_of_the_stamps(alpha, recording):
     quick_ns = recording.time_ns[0] + (recording.time_ns - recording.time_ns[0]) // 10
     quick = type(recording)(time_ns=quick_ns, columns=recording.columns)
     detector = detector_class("always_normal")(alpha.name, nominal_of(alpha))
-    states = {verdict.state for sample in quick.samples(alpha.name) for verdict in detector.update(sample)}
+    states = {verdict.state for block in blocks(quick, quick.pumps) for verdict in detector.take(block)}
     assert states == {"learning"}
