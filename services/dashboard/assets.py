@@ -30,7 +30,9 @@ class Assets:
     """All files of the page by name; `version` names this set of them."""
 
     def __init__(self) -> None:
-        contents = dict(_walk(files("wetwell.services.dashboard") / "static", ""))
+        services = files("wetwell.services")
+        contents = dict(_walk(services / "dashboard" / "static", ""))
+        contents["css/theme.css"] = (services / "theme.css").read_bytes()
         digest = hashlib.sha256()
         for name, content in sorted(contents.items()):
             digest.update(name.encode() + b"\0" + content)

@@ -3,6 +3,7 @@
 import json
 import re
 import signal
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -51,9 +52,10 @@ def test_a_blockage_turns_the_right_pump_red_and_tells_why(site, open_page, scre
     page = open_page(f"{site.url}/station/alpha?pump=2")
     expect(page.locator('.pump[data-state="pump_fault"] .name')).to_have_text(["Pump 2"], timeout=60_000)
     pump = page.locator('.pump[data-state="pump_fault"]')
-    red = page.locator(":root").evaluate("node => getComputedStyle(node).getPropertyValue('--urgent').trim()")
+    theme = (files("wetwell.services") / "theme.css").read_text(encoding="utf-8")
+    red = re.search(r"--urgent: light-dark\(#(\w{6})", theme)[1]
     colour = pump.locator("circle").evaluate("node => getComputedStyle(node).stroke")
-    assert colour == "rgb({}, {}, {})".format(*(int(red[place : place + 2], 16) for place in (1, 3, 5)))
+    assert colour == f"rgb({int(red[:2], 16)}, {int(red[2:4], 16)}, {int(red[4:], 16)})"
     expect(pump.locator(".condition")).to_have_text("pump fault")
     expect(page.locator("#station-state")).to_have_attribute("data-state", "pump_fault")
     expect(page.locator(".curve.now.fault")).to_have_count(1)

@@ -6,12 +6,6 @@ import numpy as np
 import pytest
 
 from wetwell.services.charts import (
-    BOTTOM,
-    HEIGHT,
-    LEFT,
-    RIGHT,
-    TOP,
-    WIDTH,
     Section,
     Series,
     Span,
@@ -23,6 +17,7 @@ from wetwell.services.charts import (
     scatter,
     table,
 )
+from wetwell.services.charts.svg import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH
 
 SVG = "{http://www.w3.org/2000/svg}"
 HOUR_NS = 3_600_000_000_000
@@ -172,4 +167,4 @@ def test_a_page_is_well_formed_and_fetches_nothing() -> None:
     assert [cell.text for cell in root.iter("td")] == ["–", "1.5", "<b>"]
     assert root.find("body/main/h1").text == "Report <1>"
     assert not re.search(r"<script|<link|<img|url\(|@import|src=|href=", html)
-    assert "prefers-color-scheme:dark" in html
+    assert "--ink: light-dark(" in html

@@ -26,4 +26,11 @@ export function onTheme(listener) {
   return () => listeners.delete(listener);
 }
 
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+/** Colour of this name as a canvas takes it, in the scheme that is shown. */
+export function colour(name) {
+  const { style } = document.documentElement;
+  style.outlineColor = `var(--${name})`;
+  const shown = getComputedStyle(document.documentElement).outlineColor;
+  style.outlineColor = "";
+  return shown;
+}
