@@ -137,6 +137,8 @@ def figures(configuration: Configuration, seeds: range, detectors: list[str], pr
     """Figures of each detector on one row."""
     sources = [configuration.kind(configuration.station, configuration.scenario, seed) for seed in seeds]
     result = run_backtest(sources, detectors, processes, configuration.learning_s)
+    if result["failed"]:
+        sys.exit(f"not scored: {result['failed']}")
     return {"learning_h": result["learning_h"], "detectors": result["detectors"]}
 
 

@@ -1,5 +1,6 @@
 """Verdicts of several detectors on any number of recordings, scored against truth that no detector sees."""
 
+import contextlib
 import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,6 +9,8 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
+
+from pydantic import TypeAdapter
 
 from wetwell.detector.backtest import Outcome, outcome, summary
 from wetwell.detector.baselines import DETECTORS, detector_class
@@ -21,11 +24,14 @@ from wetwell.protocols.station import Station, load_station
 from wetwell.protocols.whole_file import whole_file
 from wetwell.services.backtest_page import backtest_page
 from wetwell.services.dataset import MANIFEST, read_manifest
-from wetwell.services.parallel import work_through
+from wetwell.services.journal import Journal, fingerprint, open_journal
+from wetwell.services.parallel import Failure, refuse_if_all, work_through
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
 SCHEMA = "wetwell.backtest/1"
+JOURNAL = "backtest.part.jsonl"
+OUTCOMES = TypeAdapter(dict[str, Outcome], config={"ser_json_inf_nan": "constants"})
 
 
 class Source(Protocol):
@@ -42,22 +48,28 @@ class Source(Protocol):
     def load(self) -> Recording:
         """The recording, with truth columns."""
 
+    def identity(self) -> object:
+        """What JSON can hold that changes when the recording does."""
+
 
 @dataclass(frozen=True, slots=True)
 class RecordingFile:
-    """A recording on disk."""
+    """A recording on disk; `name` is its path as it was given."""
 
     station: Station
     path: Path
-
-    @property
-    def name(self) -> str:
-        """Path of the file."""
-        return str(self.path)
+    name: str
 
     def load(self) -> Recording:
         """Read the file."""
         return read_recording(self.path)
+
+    def identity(self) -> object:
+        """Place, size and time of change."""
+        with contextlib.suppress(OSError):
+            stat = self.path.stat()
+            return [str(self.path), stat.st_size, stat.st_mtime_ns]
+        return str(self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +93,10 @@ class SimulatedRecording:
         except ValueError as error:
             raise ConfigError(str(error)) from error
         return simulation.advance(int(self.scenario.duration_s) if self.length_s is None else self.length_s)
+
+    def identity(self) -> object:
+        """All that decides what is simulated."""
+        return [self.scenario.model_dump(mode="json"), self.seed, self.length_s]
 
 
 def detector_names(text: str) -> list[str]:
@@ -119,66 +135,121 @@ def sources_of(
     RecordingError
         If the folder holds no dataset.
     """
-    sources: list[Source] = [RecordingFile(station, path) for path in recordings]
+    sources: list[Source] = [_recording_file(station, path) for path in recordings]
     sources += [SimulatedRecording(station, plan, seed, length_s) for plan in scenarios for seed in seeds]
     if dataset is not None:
         items = read_manifest(dataset / MANIFEST)["items"]
         sources += [
-            RecordingFile(load_station(dataset / item["station_file"]), dataset / item["file"]) for item in items
+            _recording_file(load_station(dataset / item["station_file"]), dataset / item["file"]) for item in items
         ]
     if not sources:
         raise ConfigError("backtest: give at least one --recording, --scenario or --dataset")
     return sources
 
 
+def _recording_file(station: Station, path: Path) -> RecordingFile:
+    return RecordingFile(station, path.absolute(), str(path))
+
+
 def run_backtest(
-    sources: Sequence[Source], detectors: Sequence[str], workers: int, learning_s: float = LEARNING_S
+    sources: Sequence[Source],
+    detectors: Sequence[str],
+    workers: int,
+    learning_s: float = LEARNING_S,
+    *,
+    scheduler: str | None = None,
+    journal: Journal | None = None,
 ) -> dict[str, Any]:
     """Judge and score all recordings in parallel, with a progress bar on standard error.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+    detectors : sequence of str
+    workers : int
+    learning_s : float
+        Not scored. [s]
+    scheduler : str, optional
+        As in `work_through`.
+    journal : Journal, optional
+        Recordings that it has are not judged again.
 
     Returns
     -------
     result : dict
-        As in `backtest.json`: what was judged, and the figures of each detector.
+        As in `backtest.json`: what was judged, the figures of each detector, and the recordings that could not be
+        made, read or scored, which are in no figure.
 
     Raises
     ------
     WetwellError
-        If a recording cannot be made, read or scored; one line.
+        If none could; one line.
     """
-    work = partial(_judge_numbered, detectors=detectors, learning_s=learning_s)
-    done = dict(work_through(work, enumerate(sources), len(sources), workers, "backtest"))
+    how = [version("wetwell"), list(detectors), learning_s]
+    keys = [fingerprint(how, source.station.model_dump(mode="json"), source.identity()) for source in sources]
+    kept = {line["key"]: line["outcomes"] for line in journal.lines} if journal else {}
+    done = {number: OUTCOMES.validate_python(kept[key]) for number, key in enumerate(keys) if key in kept}
+    if journal:
+        journal.begin({"key": keys[number], "outcomes": kept[keys[number]]} for number in done)
+    left = [number for number in range(len(sources)) if number not in done]
+    failures: dict[int, Failure] = {}
+    work = partial(judge, detectors=detectors, learning_s=learning_s)
+    tasks = [sources[number] for number in left]
+    for place, judged in work_through(work, tasks, len(left), workers, "backtest", scheduler):
+        if isinstance(judged, Failure):
+            failures[left[place]] = judged
+            continue
+        done[left[place]] = judged
+        if journal:
+            journal.add({"key": keys[left[place]], "outcomes": OUTCOMES.dump_python(judged, mode="json")})
+    refuse_if_all(list(failures.values()), len(sources))
     return {
         "schema": SCHEMA,
         "version": version("wetwell"),
         "learning_h": learning_s / 3600.0,
-        "recordings": [source.name for source in sources],
-        "detectors": {name: summary([done[number][name] for number in range(len(sources))]) for name in detectors},
+        "recordings": [sources[number].name for number in sorted(done)],
+        "failed": [
+            {"recording": sources[number].name, "error": failures[number].error} for number in sorted(failures)
+        ],
+        "detectors": {name: summary([done[number][name] for number in sorted(done)]) for name in detectors},
     }
 
 
-def write_backtest(result: Mapping[str, Any], folder: Path) -> None:
-    """Write `backtest.json` and `backtest.html`, each whole or not at all.
+def write_backtest(
+    sources: Sequence[Source],
+    detectors: Sequence[str],
+    folder: Path,
+    workers: int,
+    learning_s: float = LEARNING_S,
+    scheduler: str | None = None,
+) -> dict[str, Any]:
+    """Run a backtest, or what is missing of it, and write `backtest.json` and `backtest.html`.
 
     Raises
     ------
     RecordingError
         If the folder or a file cannot be written.
+    WetwellError
+        If no recording can be scored.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    with whole_file(folder / "backtest.json") as file:
-        file.write(json.dumps(result, indent=2, allow_nan=False).encode() + b"\n")
-    with whole_file(folder / "backtest.html") as file:
-        file.write(backtest_page(result).encode())
+    with open_journal(folder / JOURNAL, "backtest") as journal:
+        result = run_backtest(sources, detectors, workers, learning_s, scheduler=scheduler, journal=journal)
+        for name, text in (
+            ("backtest.json", json.dumps(result, indent=2, allow_nan=False) + "\n"),
+            ("backtest.html", backtest_page(result)),
+        ):
+            with whole_file(folder / name) as file:
+                file.write(text.encode())
+        if not result["failed"]:
+            (folder / JOURNAL).unlink()
+    return result
 
 
 def overview(result: Mapping[str, Any]) -> dict[str, object]:
     """One line a detector, for the terminal."""
     return {
         "recordings": len(result["recordings"]),
+        "failed": result["failed"],
         "detectors": [
             {
                 "detector": name,
@@ -232,13 +303,6 @@ def verdicts_on(
     for name, judge_one in judges.items():
         verdicts[name].extend(judge_one.finish())
     return {name: (verdicts[name], spent_s[name]) for name in detectors}
-
-
-def _judge_numbered(
-    task: tuple[int, Source], detectors: Sequence[str], learning_s: float
-) -> tuple[int, dict[str, Outcome]]:
-    number, source = task
-    return number, judge(source, detectors, learning_s)
 
 
 def _digits(value: float | None) -> float | None:

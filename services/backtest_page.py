@@ -18,8 +18,14 @@ def backtest_page(result: Figures) -> str:
             Section("Faults", _faults(detectors)),
             *(Section(name, _detector(name, figures)) for name, figures in detectors.items()),
             Section("Recordings", table(["recording"], [[name] for name in result["recordings"]])),
+            *_failed(result),
         ],
     )
+
+
+def _failed(result: Figures) -> list[Section]:
+    rows = [[one["recording"], one["error"]] for one in result["failed"]]
+    return [Section("Not scored", table(["recording", "error"], rows))] if rows else []
 
 
 def _overview(result: Figures) -> str:

@@ -4,12 +4,10 @@ Each item is three files: the recording, its station file, its scenario file. `m
 their checksums, and appears when all are there; until then `manifest.part.jsonl` remembers which are done.
 """
 
-import contextlib
-import fcntl
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -22,7 +20,8 @@ from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.station import Station, Table
 from wetwell.protocols.whole_file import whole_file
 from wetwell.services.batch import write_simulated
-from wetwell.services.parallel import work_through
+from wetwell.services.journal import Journal, open_journal
+from wetwell.services.parallel import Failure, refuse_if_all, work_through
 from wetwell.simulator.dataset import Item, item_of, labels
 from wetwell.simulator.simulation import Simulation
 
@@ -67,56 +66,62 @@ class Plan:
         }
 
 
-def make_dataset(plan: Plan, folder: Path, workers: int) -> dict[str, object]:
+def make_dataset(plan: Plan, folder: Path, workers: int, scheduler: str | None = None) -> dict[str, object]:
     """Make a set, or what is missing of it, with a progress bar on standard error.
 
     Returns
     -------
     summary : dict
-        Items, how many were there already, items by class, rows.
+        Items, how many were there already, items by class, rows, and those that failed, with their errors. With a
+        failed item there is no manifest yet; the next run makes what is missing.
 
     Raises
     ------
     ConfigError
-        If the folder holds another set, another run works in it, or no item can be sampled.
+        If the folder holds another set, or another run works in it.
     RecordingError
-        If a file cannot be written.
+        If the folder cannot be written.
+    WetwellError
+        If no item can be made.
     KeyboardInterrupt
         On Ctrl-C; what is whole stays.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    with _journal(folder) as journal:
-        known = _known_entries(plan, folder)
-        for partial in folder.glob(".*.part"):
-            partial.unlink(missing_ok=True)
-        journal.seek(0)
-        journal.truncate()
-        for line in (plan.header, *known.values()):
-            journal.write(_line(line))
-        journal.flush()
+    with open_journal(folder / JOURNAL, "dataset") as journal:
+        known = _known_entries(plan, folder, journal)
+        for half in folder.glob(".*.part"):
+            half.unlink(missing_ok=True)
+        journal.begin([plan.header, *known.values()])
         entries: dict[int, Entry] = {}
+        failures: dict[int, Failure] = {}
         kept = 0
-        for entry, was_kept in _made(plan, folder, workers, known):
-            entries[entry["number"]] = entry
+        tasks = ((number, known.get(number)) for number in range(plan.count))
+        work = partial(_make, plan, folder.absolute())
+        for number, made in work_through(work, tasks, plan.count, workers, "dataset", scheduler):
+            if isinstance(made, Failure):
+                failures[number] = made
+                continue
+            entry, was_kept = made
+            entries[number] = entry
             kept += was_kept
             if not was_kept:
-                journal.write(_line(entry))
-                journal.flush()
-        items = [entries[number] for number in range(plan.count)]
-        classes = Counter(item["class"] for item in items)
-        manifest = plan.header | {
-            "count": plan.count,
-            "classes": {label: classes[label] for label in labels() if classes[label]},
-            "items": items,
-        }
-        with whole_file(folder / MANIFEST) as file:
-            file.write(json.dumps(manifest, indent=1).encode() + b"\n")
-        (folder / JOURNAL).unlink()
-    rows = sum(item["rows"] for item in items)
-    return {"dataset": str(folder), "items": len(items), "kept": kept, "rows": rows, "classes": manifest["classes"]}
+                journal.add(entry)
+        refuse_if_all(list(failures.values()), plan.count)
+        items = [entries[number] for number in sorted(entries)]
+        counts = Counter(item["class"] for item in items)
+        classes = {label: counts[label] for label in labels() if counts[label]}
+        if not failures:
+            manifest = plan.header | {"count": plan.count, "classes": classes, "items": items}
+            with whole_file(folder / MANIFEST) as file:
+                file.write(json.dumps(manifest, indent=1).encode() + b"\n")
+            (folder / JOURNAL).unlink()
+    return {
+        "dataset": str(folder),
+        "items": len(items),
+        "kept": kept,
+        "rows": sum(item["rows"] for item in items),
+        "classes": classes,
+        "failed": [{"item": number, "error": failures[number].error} for number in sorted(failures)],
+    }
 
 
 def check_dataset(folder: Path) -> dict[str, object]:
@@ -160,28 +165,9 @@ def _plain(table: Table) -> dict[str, Any]:
     return plain
 
 
-def _line(value: dict[str, Any]) -> str:
-    return json.dumps(value) + "\n"
-
-
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-@contextlib.contextmanager
-def _journal(folder: Path) -> Iterator[Any]:
-    """The journal, locked against a second run."""
-    path = folder / JOURNAL
-    try:
-        with path.open("a+", encoding="utf-8") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise ConfigError(f"{folder}: another run makes this dataset") from None
-            yield file
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
@@ -207,7 +193,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
     return manifest
 
 
-def _known_entries(plan: Plan, folder: Path) -> dict[int, Entry]:
+def _known_entries(plan: Plan, folder: Path, journal: Journal) -> dict[int, Entry]:
     """Entries of an earlier run by number, if it was of this plan and version.
 
     Raises
@@ -220,10 +206,7 @@ def _known_entries(plan: Plan, folder: Path) -> dict[int, Entry]:
         manifest = read_manifest(folder / MANIFEST)
         if _is_same(manifest, plan, folder):
             known |= {item["number"]: item for item in manifest["items"]}
-    lines = []
-    for text in (folder / JOURNAL).read_text(encoding="utf-8").splitlines():
-        with contextlib.suppress(ValueError):  # the last line of a run that was killed
-            lines.append(json.loads(text))
+    lines = journal.lines
     if lines and _is_same(lines[0], plan, folder):
         known |= {item["number"]: item for item in lines[1:]}
     return known
@@ -234,12 +217,6 @@ def _is_same(header: dict[str, Any], plan: Plan, folder: Path) -> bool:
         if key != "version" and header.get(key) != value:
             raise ConfigError(f"{folder}: holds a dataset with another {key.replace('_', ' ')}; take another folder")
     return bool(header["version"] == plan.header["version"])
-
-
-def _made(plan: Plan, folder: Path, workers: int, known: dict[int, Entry]) -> Iterator[tuple[Entry, bool]]:
-    """Yield each entry and whether it was there already, in the order in which they get done."""
-    tasks = ((number, known.get(number)) for number in range(plan.count))
-    return work_through(partial(_make, plan, folder), tasks, plan.count, workers, "dataset")
 
 
 def _make(plan: Plan, folder: Path, task: tuple[int, Entry | None]) -> tuple[Entry, bool]:

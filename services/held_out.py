@@ -12,6 +12,7 @@ import numpy as np
 
 from wetwell.protocols.recording import Recording, read_recording, write_recording
 from wetwell.protocols.whole_file import whole_file
+from wetwell.services.executors import let_interrupts
 from wetwell.services.swmm_plant import swmm_passage_of
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.heldout import gap, shrinkage, whitened
@@ -67,13 +68,14 @@ def _replayed(command: Sequence[str], station: Path, recording: Path, room: Path
     out = (room or recording.parent) / f"replayed-{station.parent.name}-{recording.stem}.parquet"
     arguments = ["--station", str(station), "--recording", str(recording), "--out", str(out)]
     try:
-        done = subprocess.run(  # noqa: S603 - the command is the user's own
-            [*command, *arguments],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=_TIMEOUT_S,
-            check=False,
-        )
+        with let_interrupts():
+            done = subprocess.run(  # noqa: S603 - the command is the user's own
+                [*command, *arguments],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=_TIMEOUT_S,
+                check=False,
+            )
     except (OSError, subprocess.TimeoutExpired):
         return None
     return read_recording(out) if done.returncode == 0 and out.is_file() else None

@@ -5,7 +5,6 @@ The folder of a trial holds `plan.json`; `published/case-…/` with station file
 Whatever is whole is kept by the next run with the same plan.
 """
 
-import contextlib
 import json
 import secrets
 import shlex
@@ -13,8 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -25,13 +23,13 @@ from typing import Any
 import numpy as np
 import tomli_w
 from pydantic import ValidationError
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
 from wetwell.protocols.recording import write_recording
 from wetwell.protocols.whole_file import whole_file
+from wetwell.services.executors import let_interrupts
 from wetwell.services.held_out import held_out_summary, hold_out
+from wetwell.services.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.swmm_plant import run_swmm
 from wetwell.services.trial_page import trial_page
 from wetwell.sim2real.trial.answer import Answer, answer_of
@@ -53,6 +51,9 @@ STATION_FILE, RECORDING_FILE, SEAL_FILE, REPORT_FILE = (
     "seal.sha256",
     "report.json",
 )
+
+Job = tuple[TrialCase, str]
+"""A case, and the folder of the diagnosis that is meant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,49 +125,73 @@ def parse_kinds(text: str) -> tuple[CaseKind, ...]:
     return tuple(kind for kind in KINDS if kind in named)
 
 
-def run_trial(plan: TrialPlan, folder: Path, workers: int) -> dict[str, Any]:
+def run_trial(plan: TrialPlan, folder: Path, workers: int, scheduler: str | None = None) -> dict[str, Any]:
     """Run a trial, or what is missing of it, with a progress bar on standard error.
 
     Returns
     -------
     result : dict
-        What `trial.json` holds, without the single cases.
+        What `trial.json` holds, without the single cases. A case that could not be made, diagnosed or replayed is in
+        no score; `failed` names it, and the next run tries it again.
 
     Raises
     ------
     ConfigError
         If the folder holds another trial.
     RecordingError
-        If a file cannot be written, or a sealed file is not what was published.
+        If a sealed file is not what was published.
+    WetwellError
+        If no case can be made or diagnosed.
     """
+    folder = folder.absolute()
     _take_folder(plan, folder)
-    with _progress() as progress:
-        cases = [plan.case(number) for number in range(plan.count)]
-        _each(progress, "cases", workers, [partial(publish, case, folder) for case in cases])
-        jobs = [(case, REPORTS) for case in cases]
-        if plan.has_recalibration:
-            jobs += [(case, RECALIBRATED) for case in cases if case.kind in {"single", "pair"}]
-        _each(progress, "diagnoses", workers, [partial(_diagnose, plan, case, which, folder) for case, which in jobs])
-        named = [case for case in cases if case.without and _told_effect(folder / REPORTS / case.name)]
-        jobs = [(case, WHOLE_LIBRARY) for case in named]
-        _each(
-            progress, "equivalents", workers, [partial(_diagnose, plan, case, which, folder) for case, which in jobs]
-        )
-        if plan.replay:
-            unseen = [
-                partial(hold_out, case, folder / "published" / case.name, folder / REPORTS / case.name, plan.replay)
-                for case in cases
-                if case.kind in {"single", "pair"}
-            ]
-            _each(progress, "unseen recordings", workers, unseen)
-    return score_trial(plan, folder)
+    failed: dict[str, Failure] = {}
+
+    def each(title: str, work: Callable[[Job], None], jobs: Iterable[Job]) -> None:
+        left = [job for job in jobs if job[0].name not in failed]
+        done = work_through(work, left, len(left), min(workers, max(len(left), 1)), title, scheduler)
+        found = {left[number][0].name: result for number, result in done if isinstance(result, Failure)}
+        refuse_if_all(list(found.values()), len(left))
+        failed.update(found)
+
+    cases = [plan.case(number) for number in range(plan.count)]
+    deviating = [case for case in cases if case.kind in {"single", "pair"}]
+    new = [(case, REPORTS) for case in cases if not _is_published(case, folder)]
+    each("cases", partial(_publish, folder), new)
+    jobs = [(case, REPORTS) for case in cases]
+    if plan.has_recalibration:
+        jobs += [(case, RECALIBRATED) for case in deviating]
+    diagnosis = partial(_diagnose, plan, folder)
+    each("diagnoses", diagnosis, [job for job in jobs if not _is_diagnosed(job, folder)])
+    named = [(case, WHOLE_LIBRARY) for case in cases if case.without and _told_effect(folder / REPORTS / case.name)]
+    each("equivalents", diagnosis, [job for job in named if not _is_diagnosed(job, folder)])
+    if plan.replay:
+        each("unseen recordings", partial(_hold_out, plan, folder), [(case, REPORTS) for case in deviating])
+    return score_trial(plan, folder, failed)
+
+
+def _is_published(case: TrialCase, folder: Path) -> bool:
+    sealed = folder / "sealed" / f"{case.name}.json"
+    return (folder / "published" / case.name / SEAL_FILE).is_file() and sealed.is_file()
+
+
+def _is_diagnosed(job: Job, folder: Path) -> bool:
+    case, which = job
+    return (folder / which / case.name / REPORT_FILE).is_file()
+
+
+def _publish(folder: Path, job: Job) -> None:
+    publish(job[0], folder)
+
+
+def _hold_out(plan: TrialPlan, folder: Path, job: Job) -> None:
+    case, which = job
+    hold_out(case, folder / "published" / case.name, folder / which / case.name, plan.replay)
 
 
 def publish(case: TrialCase, folder: Path) -> None:
     """Write station file and recording of a case, its labels under seal, and the hash of the seal."""
     published, sealed = folder / "published" / case.name, folder / "sealed" / f"{case.name}.json"
-    if (published / SEAL_FILE).is_file() and sealed.is_file():
-        return
     published.mkdir(parents=True, exist_ok=True)
     sealed.parent.mkdir(parents=True, exist_ok=True)
     run = truth_plant.run if case.plant == "fine" else run_swmm
@@ -221,9 +246,9 @@ def open_case(name: str, folder: Path) -> Label:
     )
 
 
-def score_trial(plan: TrialPlan, folder: Path) -> dict[str, Any]:
-    """Open all seals, score the reports, write `trial.json` and `trial.html`."""
-    names = [f"case-{number:04}" for number in range(plan.count)]
+def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) -> dict[str, Any]:
+    """Open all seals but those of the cases that failed, score the reports, write `trial.json` and `trial.html`."""
+    names = [name for number in range(plan.count) if (name := f"case-{number:04}") not in failed]
     pairs = [(open_case(name, folder), _answer(folder / REPORTS / name)) for name in names]
     scores = [score_case(label, answer, _answer(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
     rows, columns, counts = confusion(scores)
@@ -240,6 +265,7 @@ def score_trial(plan: TrialPlan, folder: Path) -> dict[str, Any]:
     result = plan.header | {
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "count": plan.count,
+        "failed": [{"case": name, "error": failed[name].error} for name in sorted(failed)],
         "all": summary(scores),
         "kinds_scored": _grouped(scores, lambda score: score.label.kind),
         "plants_scored": _grouped(scores, lambda score: score.label.plant),
@@ -265,7 +291,12 @@ def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
         | {name: f"{scores[name]['value']:.2f}" if scores[name] else "-" for name in names}
         for kind, scores in (result["kinds_scored"] | {"all": result["all"]}).items()
     ]
-    return {"page": str(folder / "trial.html"), "failed": result["all"]["failed"], "scores": rows}
+    return {
+        "page": str(folder / "trial.html"),
+        "without an answer": result["all"]["failed"],
+        "failed": result["failed"],
+        "scores": rows,
+    }
 
 
 def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, Any]:
@@ -278,11 +309,10 @@ def _told_effect(reports: Path) -> bool:
     return answer is not None and answer.verdict == "effect"
 
 
-def _diagnose(plan: TrialPlan, case: TrialCase, which: str, folder: Path) -> None:
+def _diagnose(plan: TrialPlan, folder: Path, job: Job) -> None:
     """Diagnose a case in a process that is given copies of its two published files and nothing else."""
+    case, which = job
     reports = folder / which / case.name
-    if (reports / REPORT_FILE).is_file():
-        return
     published = folder / "published" / case.name
     options = [part for name in case.without for part in ("--without", name) if which == REPORTS]
     if which == RECALIBRATED:
@@ -293,15 +323,16 @@ def _diagnose(plan: TrialPlan, case: TrialCase, which: str, folder: Path) -> Non
             shutil.copy(published / name, given / name)
         arguments = ["--station", STATION_FILE, "--recording", RECORDING_FILE, "--out", out.name, *options]
         try:
-            done = subprocess.run(  # noqa: S603 - the command is the user's own
-                [*plan.command, *arguments],
-                cwd=given,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                timeout=plan.timeout_s,
-                check=False,
-            )
+            with let_interrupts():
+                done = subprocess.run(  # noqa: S603 - the command is the user's own
+                    [*plan.command, *arguments],
+                    cwd=given,
+                    stdin=subprocess.DEVNULL,
+                    capture_output=True,
+                    text=True,
+                    timeout=plan.timeout_s,
+                    check=False,
+                )
             failure = "" if done.returncode == 0 else f"exit code {done.returncode}: {done.stderr.strip()[-2000:]}"
         except subprocess.TimeoutExpired:
             failure = f"no answer within {plan.timeout_s:g} s"
@@ -351,23 +382,3 @@ def _take_folder(plan: TrialPlan, folder: Path) -> None:
 def _write_json(path: Path, value: Any) -> None:
     with whole_file(path) as file:
         file.write(json.dumps(value, indent=1).encode() + b"\n")
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Progress]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        yield progress
-
-
-def _each(progress: Progress, title: str, workers: int, jobs: Sequence[Callable[[], None]]) -> None:
-    """Do all jobs, some at once; the first error ends it."""
-    task = progress.add_task(title, total=len(jobs))
-    with ThreadPoolExecutor(workers) as pool:
-        futures = [pool.submit(job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                progress.advance(task)
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)

@@ -1,16 +1,20 @@
 """The gap between simulation and reality."""
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.options import (
     JsonOption,
     RecordingOption,
+    SchedulerOption,
     SeedOption,
     StationOption,
     positive,
+    print_batch,
     print_result,
 )
 
@@ -28,6 +32,7 @@ def gap_trial(
     ] = "single,pair,none,open,leave_one_out",
     days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
     workers: Annotated[int, typer.Option(min=1, help="Diagnoses at once.")] = 1,
+    scheduler: SchedulerOption = None,
     recalibration: Annotated[
         bool, typer.Option("--recalibration", help="Diagnose each case once more by recalibration only.")
     ] = False,
@@ -42,8 +47,10 @@ def gap_trial(
     """Check the diagnosis on sealed recordings of other plants; run again to resume."""
     import shlex
 
+    from wetwell.services.executors import check_scheduler
     from wetwell.services.trial import DIAGNOSE, REPLAY, TrialPlan, brief, parse_kinds, run_trial
 
+    check_scheduler(scheduler)
     plan = TrialPlan(
         seed=seed,
         count=cases,
@@ -54,14 +61,26 @@ def gap_trial(
         replay=REPLAY if unseen else (),
         has_recalibration=recalibration,
     )
-    result = run_trial(plan, out, workers)
-    print_result(result if as_json else brief(result, out), as_json=as_json)
+    result = run_trial(plan, out, workers, scheduler)
+    print_batch(result if as_json else brief(result, out), as_json=as_json)
 
 
 @app.command("diagnose")
 def gap_diagnose(
-    recording: RecordingOption,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for report and station file.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", metavar="DIR", help="For report and station file; with several recordings a folder each in it."
+        ),
+    ],
+    recording: Annotated[
+        list[Path] | None,
+        typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet; may be given again."),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option("--recordings", metavar="TABLE", help="CSV file with columns station_file and recording."),
+    ] = None,
     station: StationOption = "alpha",
     without: Annotated[
         list[str] | None, typer.Option("--without", metavar="NAME", help="Leave this effect out; may be given again.")
@@ -69,17 +88,34 @@ def gap_diagnose(
     only: Annotated[
         list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
     ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes for several recordings; default: as many as cores.")
+    ] = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Say where a recording departs from the simulator, which effect causes it, and how far that closes the gap."""
-    from wetwell.services.gap import diagnose_file
+    from wetwell.services.executors import check_scheduler
     from wetwell.services.gap_terminal import gap_lines, progress_bar
     from wetwell.services.presets import find_station
 
+    given = recording or []
+    if not given and table is None:
+        raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
+    check_scheduler(scheduler)
+    if len(given) > 1 or table is not None or scheduler is not None:
+        from wetwell.services.diagnoses import cases_of, diagnose_all
+
+        cases = cases_of(station, given, table)
+        processes = min(workers or os.cpu_count() or 1, max(len(cases), 1))
+        result = diagnose_all(cases, out, processes, scheduler, only=only, without=without or ())
+        return print_batch(result, as_json=as_json)
+    from wetwell.services.gap import diagnose_file
+
     plant = find_station(station)
     with progress_bar("diagnosis") as progress:
-        report = diagnose_file(plant, recording, out, only=only, without=without or (), progress=progress)
-    typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
+        report = diagnose_file(plant, given[0], out, only=only, without=without or (), progress=progress)
+    return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
 
 
 @app.command("replay")

@@ -6,7 +6,14 @@ from typing import Annotated
 
 import typer
 
-from wetwell.services.commands.options import JsonOption, StationOption, positive, print_result
+from wetwell.services.commands.options import (
+    JsonOption,
+    SchedulerOption,
+    StationOption,
+    positive,
+    print_batch,
+    print_result,
+)
 
 app = typer.Typer()
 
@@ -53,18 +60,21 @@ def backtest(
         float, typer.Option("--learning-h", min=0.0, help="Runs that end in these first hours are not scored.")
     ] = 6.0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Score verdicts against truth: ours, the paper's two methods, their best readings and outside detectors."""
-    from wetwell.services.backtest import detector_names, overview, run_backtest, sources_of, write_backtest
+    """Score verdicts against truth: ours, the paper's two methods and others; run again to resume."""
+    from wetwell.services.backtest import detector_names, overview, sources_of, write_backtest
+    from wetwell.services.executors import check_scheduler
     from wetwell.services.presets import find_scenario, find_station
 
+    check_scheduler(scheduler)
     names = detector_names(detectors)
     length_s = None if days is None else max(round(positive(days, "--days") * 86_400.0), 1)
     plans = [find_scenario(name) for name in scenario or []]
     sources = sources_of(
         find_station(station), recording or [], plans, range(first_seed, first_seed + seeds), length_s, dataset
     )
-    result = run_backtest(sources, names, min(workers or os.cpu_count() or 1, len(sources)), learning_h * 3600.0)
-    write_backtest(result, out)
-    print_result(result if as_json else overview(result), as_json=as_json)
+    processes = min(workers or os.cpu_count() or 1, len(sources))
+    result = write_backtest(sources, names, out, processes, learning_h * 3600.0, scheduler)
+    print_batch(result if as_json else overview(result), as_json=as_json)

@@ -43,6 +43,12 @@ RecordingOption = Annotated[Path, typer.Option("--recording", metavar="FILE", he
 PreparationOption = Annotated[
     Path | None, typer.Option("--preparation", metavar="FILE", help="TOML file: scale, offset, max_gap_s.")
 ]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler", metavar="ADDRESS|local", help="Dask scheduler, tcp://HOST:8786; default: processes here."
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -160,3 +166,10 @@ def print_result(result: dict[str, object], *, as_json: bool) -> None:
     from wetwell.services.terminal import as_lines
 
     typer.echo(to_json(result) if as_json else as_lines(result))
+
+
+def print_batch(result: dict[str, object], *, as_json: bool) -> None:
+    """Print the result of a batch; exit code 1 if something of it has failed."""
+    print_result(result, as_json=as_json)
+    if result["failed"]:
+        raise typer.Exit(1)

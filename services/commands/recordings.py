@@ -12,10 +12,12 @@ from wetwell.services.commands.options import (
     PreparationOption,
     RecordingOption,
     ScenarioOption,
+    SchedulerOption,
     SeedOption,
     StationOption,
     plant_of,
     positive,
+    print_batch,
     print_result,
 )
 
@@ -58,6 +60,7 @@ def dataset(
         Literal["parquet", "csv.gz"], typer.Option("--format", help="Form of the recordings.")
     ] = "parquet",
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    scheduler: SchedulerOption = None,
     check: Annotated[
         Path | None, typer.Option("--check", metavar="DIR", help="Make nothing: verify the checksums of a dataset.")
     ] = None,
@@ -65,16 +68,18 @@ def dataset(
 ) -> None:
     """Make a balanced, labelled set of recordings over sampled stations and faults; run again to resume."""
     from wetwell.services.dataset import check_dataset, make_dataset, plan_of
+    from wetwell.services.executors import check_scheduler
     from wetwell.services.presets import find_station
 
     if (out is None) == (check is None):
         raise ConfigError("dataset: give either --out DIR or --check DIR")
     if check is not None:
         return print_result(check_dataset(check), as_json=as_json)
+    check_scheduler(scheduler)
     bases = [find_station(name) for name in station or ["alpha"]]
     plan = plan_of(bases, seed, count, positive(days, "--days"), form)
     processes = min(workers or os.cpu_count() or 1, count)
-    return print_result(make_dataset(plan, cast("Path", out), processes), as_json=as_json)
+    return print_batch(make_dataset(plan, cast("Path", out), processes, scheduler), as_json=as_json)
 
 
 @app.command()

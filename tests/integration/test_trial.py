@@ -24,7 +24,7 @@ def run_fake(mode, folder, monkeypatch, **changes):
     monkeypatch.setenv("FAKE_MODE", mode)
     monkeypatch.setenv("FAKE_FOLDER", str(folder))
     plan = trial.TrialPlan(**{"seed": 3, "count": COUNT, "seconds": 3600, "command": FAKE} | changes)
-    return plan, trial.run_trial(plan, folder, workers=2)
+    return plan, trial.run_trial(plan, folder, workers=1)
 
 
 @pytest.fixture(scope="module")
