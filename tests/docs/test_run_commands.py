@@ -1,7 +1,8 @@
-"""Commands of tutorials and how-tos, really run in the order of the page, in a folder of its own."""
+"""Commands of README and docs, really run in the order of the page, each page in a folder of its own."""
 
 import os
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -10,72 +11,128 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from walks import LEFT_OUT_PAGES, WALKS, Walk
 
-DOCS = Path(__file__).parents[2] / "docs"
-PAGES = ["add-a-station.md", "tutorial-connect-a-plc.md"]
-BACKGROUND = "wetwell plc "
-"""Runs while the rest of its page does."""
-NOT_RUN = {
-    "wetwell up": "runs for ever; tests/end_to_end/test_processes.py runs it",
-    "wetwell router": "runs for ever; tests/integration/test_zenoh_link.py opens the same router",
-    "wetwell gateway --plc": "runs for ever; tests/end_to_end/test_gateway.py",
-    "wetwell detector --station": "runs for ever; tests/end_to_end/test_processes.py",
-    "wetwell dashboard": "runs for ever; tests/integration/test_dashboard.py",
-    "wetwell doctor": "needs a running site; tests/end_to_end/test_doctor.py",
-    "wetwell detect ": "long on a first start, which compiles; tests/unit/test_cli.py",
-    "wetwell simulate ": "long on a first start, which compiles; tests/unit/test_cli.py",
-}
+ROOT = Path(__file__).parents[2]
+PORTS = ("7447", "8080", "5020", "9100")
+"""Of the bus, the control-room page, the PLC and the figures; a walk has its own."""
+PATIENCE_S = 240
 
 
-def commands(page: str) -> Iterator[str]:
+def commands(page: Path) -> list[str]:
     """Commands of the shell blocks of a page, each with the text that it reads."""
-    text = (DOCS / page).read_text(encoding="utf-8")
-    for block in re.findall(r"^```sh\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL):
-        yield from (found[0] for found in re.finditer(r"^.*<<'(\w+)'\n(?:.*\n)*?\1$|^.+$", block, flags=re.MULTILINE))
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_commands_of_a_page_run(page: str, tmp_path: Path) -> None:
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    (folder / "wetwell").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m wetwell.services "$@"\n')
-    (folder / "wetwell").chmod(0o755)
-    environment = os.environ | {"PATH": f"{folder}:{os.environ['PATH']}"}
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    lines = [line.replace("5020", str(port)) for line in commands(page)]
-    script = "\n".join(line for line in lines if not line.startswith((BACKGROUND, *NOT_RUN)))
-    started = [
-        subprocess.Popen(["/bin/sh", "-c", f"exec {line}"], cwd=tmp_path, env=environment)
-        for line in lines
-        if line.startswith(BACKGROUND)
+    blocks = re.findall(r"^( *)```sh\n(.*?)^ *```", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    texts = [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in blocks]
+    return [
+        found[0] for text in texts for found in re.finditer(r"^.*<<'(\w+)'\n(?:.*\n)*?\1$|^.+$", text, re.MULTILINE)
     ]
+
+
+def pages_with_commands() -> Iterator[str]:
+    """Pages of README and docs that have shell blocks."""
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        if commands(page):
+            yield page.relative_to(ROOT).as_posix()
+
+
+def test_every_page_with_commands_is_walked_or_left_out_for_a_reason() -> None:
+    walked = [page for walk in WALKS for page in walk.pages]
+    assert sorted([*walked, *LEFT_OUT_PAGES]) == sorted(pages_with_commands())
+
+
+def test_what_is_said_of_a_walk_is_in_its_pages() -> None:
+    for walk in WALKS:
+        lines = [f"{line}\n" for page in walk.pages for line in commands(ROOT / page)]
+        for beginning in (*walk.services, *walk.patient, *walk.left_out):
+            assert any(line.startswith(beginning) for line in lines), beginning
+        for text in walk.changed:
+            assert any(text in line for line in lines), text
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("walk", WALKS, ids=lambda walk: walk.pages[0].removeprefix("docs/"))
+def test_commands_run(walk: Walk, tmp_path: Path) -> None:
+    ports = free_ports()
+    environment = environment_of(tmp_path, ports)
+    lines = [line for page in walk.pages for line in commands(ROOT / page)]
+    lines = [line for line in lines if not f"{line}\n".startswith(tuple(walk.left_out))]
+    started: list[tuple[subprocess.Popen[bytes], Path]] = []
     try:
-        if started:
-            wait_for(port)
+        if walk.given:
+            run(walk.given, tmp_path, environment)
+        for line in (*walk.before, *lines):
+            run_line = line
+            for text, other in (*walk.changed.items(), *ports.items()):
+                run_line = run_line.replace(text, other)
+            if line.startswith((*walk.before, *walk.services)):
+                said = tmp_path / f"service-{len(started)}.log"
+                with said.open("wb") as log:
+                    command = ["/bin/sh", "-c", f"exec {run_line}"]
+                    process = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=log, stderr=log)
+                started.append((process, said))
+            else:
+                code = next((code for beginning, code in walk.codes.items() if line.startswith(beginning)), 0)
+                run(run_line, tmp_path, environment, code, PATIENCE_S if line.startswith(walk.patient) else 0.0)
+        for process, said in started:
+            wait_for_a_word(process, said)
+    finally:
+        for process, _ in reversed(started):
+            process.send_signal(signal.SIGINT)
+        codes = [process.wait(60) for process, _ in started]
+    assert codes == [0] * len(started), [said.read_text() for _, said in started]
+
+
+def wait_for_a_word(process: subprocess.Popen[bytes], said: Path) -> None:
+    """Wait until a service has told that it is there."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not said.stat().st_size:
+        assert process.poll() is None, process.args
+        assert time.monotonic() < deadline, process.args
+        time.sleep(0.1)
+    assert process.poll() is None, said.read_text()
+
+
+def free_ports() -> dict[str, str]:
+    """A free port for each of the usual ones."""
+    probes = [socket.create_server(("127.0.0.1", 0)) for _ in PORTS]
+    free = [str(probe.getsockname()[1]) for probe in probes]
+    for probe in probes:
+        probe.close()
+    return dict(zip(PORTS, free, strict=True))
+
+
+def environment_of(folder: Path, ports: dict[str, str]) -> dict[str, str]:
+    """Environment in which `wetwell` and `python` are those of the test, and services take its ports."""
+    bus, page, plc, _ = ports.values()
+    binaries = folder / "bin"
+    binaries.mkdir()
+    (binaries / "wetwell").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m wetwell.services "$@"\n')
+    (binaries / "python").write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    for binary in binaries.iterdir():
+        binary.chmod(0o755)
+    return os.environ | {
+        "PATH": f"{binaries}:{os.environ['PATH']}",
+        "ROOT": str(ROOT),
+        "WETWELL_ZENOH__ENDPOINT": f"tcp/127.0.0.1:{bus}",
+        "WETWELL_DASHBOARD__PORT": page,
+        "WETWELL_MODBUS__PORT": plc,
+    }
+
+
+def run(line: str, folder: Path, environment: dict[str, str], code: int = 0, patience_s: float = 0.0) -> None:
+    """Run a line of a page; where it may be too early, until it succeeds."""
+    deadline = time.monotonic() + patience_s
+    while True:
         done = subprocess.run(
-            ["/bin/sh", "-e", "-c", script],
-            cwd=tmp_path,
+            ["/bin/sh", "-e", "-c", line],
+            cwd=folder,
             env=environment,
             capture_output=True,
             text=True,
-            timeout=100,
+            timeout=300,
             check=False,
         )
-    finally:
-        for process in started:
-            process.terminate()
-            process.wait(20)
-    assert script
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
-def wait_for(port: int) -> None:
-    """Wait until somebody listens."""
-    for _ in range(300):
-        with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", port)) == 0:
-                return
-        time.sleep(0.1)
-    raise TimeoutError(f"nobody listens on port {port}")
+        if done.returncode == code:
+            return
+        assert time.monotonic() < deadline, f"{line}\n{done.stdout}{done.stderr}"
+        time.sleep(0.5)

@@ -1,0 +1,125 @@
+"""How the commands of each page are run: what it takes for granted, what goes on meanwhile, what is left out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+STATION = 'cp "$ROOT"/simulator/stations/alpha.toml my-station.toml'
+TAKEN_AS_A_FIELD_WOULD = """\
+wetwell simulate --station my-station.toml --scenario nominal --days 1 --seed 3 --out field.parquet
+python - <<'PYTHON'
+from wetwell.protocols.recording import read_recording, write_recording
+from dataclasses import replace
+from pathlib import Path
+taken = read_recording(Path("field.parquet"))
+columns = dict(taken.columns)
+columns["pump1_flow_m3h"] = columns["pump1_flow_m3h"] / 3.6
+write_recording(replace(taken, columns=columns, truth={}), Path("field.csv"))
+PYTHON"""
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Pages whose commands are run one after the other, in one folder.
+
+    Attributes
+    ----------
+    pages : tuple of str
+        Under the root of the project.
+    given : str
+        Shell lines before the first command: files that the pages take for granted.
+    before : tuple of str
+        Services that the pages take for granted.
+    services : tuple of str
+        Beginnings of commands that go on until the end of the walk.
+    patient : tuple of str
+        Beginnings of commands that are tried until they succeed, since they ask for what is yet to come.
+    changed : mapping
+        Texts that are replaced, so that the walk is short or stays in its folder.
+    left_out : mapping
+        Beginnings of commands that are not run, with the reason.
+    codes : mapping
+        Exit codes of commands that do not end with 0, by their beginnings.
+    """
+
+    pages: tuple[str, ...]
+    given: str = ""
+    before: tuple[str, ...] = ()
+    services: tuple[str, ...] = ()
+    patient: tuple[str, ...] = ()
+    changed: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    codes: Mapping[str, int] = field(default_factory=dict)
+
+
+WALKS = (
+    Walk(("docs/add-a-station.md",), services=("wetwell up",)),
+    Walk(
+        ("docs/tutorial-connect-a-plc.md",),
+        services=("wetwell plc", "wetwell router", "wetwell gateway --plc", "wetwell detector", "wetwell dashboard"),
+        patient=("wetwell gateway read", "wetwell doctor"),
+        codes={"wetwell doctor": 1},  # without historian and alarms it warns
+    ),
+    Walk(
+        ("docs/tutorial-first-fault.md", "docs/alarms.md", "docs/grafana.md", "docs/operations.md"),
+        given=STATION,
+        services=("wetwell up --data first",),
+        patient=("wetwell alarms acknowledge", "wetwell history", "wetwell doctor", "curl"),
+        changed={"wetwell up --data first": "env WETWELL_HEALTH__HTTP=127.0.0.1:9100 wetwell up --data first"},
+        left_out={
+            "export PATH": "the path of the test leads to wetwell",
+            "wetwell alarms --station": "`wetwell up` has started the daemon",
+            'wetwell alarms acknowledge pump2.pump_fault --station alpha --by "A. Miller"\n': "done by the tutorial",
+            "WETWELL_HEALTH__HTTP=127.0.0.1:9100 wetwell": "`wetwell up` of this walk has it",
+            "docker": "needs a container engine",
+            "systemctl": "changes the machine; tests/checks/test_operations.py checks the units",
+        },
+    ),
+    Walk(
+        ("docs/dashboard.md",),
+        before=("wetwell router",),
+        services=("wetwell dashboard",),
+        left_out={"WETWELL_SECURITY__TOKENS_FILE": "opens a port to the network; test_dashboard.py"},
+    ),
+    Walk(("docs/gateway.md",), before=("wetwell plc",), patient=("wetwell gateway read",)),
+    Walk(
+        ("docs/fleet.md",),
+        given="""mkdir -p stations && cp "$ROOT"/simulator/stations/alpha.toml stations/
+wetwell dataset --out set --count 2 --days 0.5
+wetwell simulate --station alpha --days 1 --seed 5 --out a.parquet
+printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
+        before=("wetwell router",),
+        services=("wetwell fleet --stations stations --shards",),
+        changed={"--out report --scheduler tcp://192.0.2.10:8786": "--out report --scheduler local"},
+        left_out={
+            "wetwell fleet --stations stations.csv": "needs a cluster; tests/integration/test_fleet.py starts one",
+            "WETWELL_DETECTOR__STATE_DIR=state wetwell detector release": "needs a quarantined station; "
+            "tests/unit/test_quarantine.py",
+        },
+    ),
+    Walk(("docs/gap.md",)),
+    Walk(
+        ("docs/field-data.md",),
+        given=f"""{STATION}
+sed -n '/^# preparation.toml/,/^```/p' "$ROOT"/docs/field-data.md | sed '$d' > preparation.toml
+{TAKEN_AS_A_FIELD_WOULD}""",
+    ),
+    Walk(
+        ("docs/backtest.md",),
+        given=f"""{STATION}
+wetwell simulate --station my-station.toml --days 0.5 --seed 3 --out a.parquet
+wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz""",
+        changed={"--seeds 4": "--seeds 1", "--count 100": "--count 2 --days 0.5"},
+    ),
+    Walk(("docs/datasets.md",), changed={"--count 10": "--count 3"}),
+    Walk(("docs/security.md",), changed={"/etc/wetwell/": ""}),
+    Walk(
+        ("docs/deploy.md",),
+        given='cp -r "$ROOT"/docker .',
+        left_out={
+            "make image": "needs a container engine",
+            "docker": "needs a container engine",
+            "BUILDAH_ISOLATION": "needs a container engine",
+        },
+    ),
+)
+LEFT_OUT_PAGES = {"README.md": "make test runs this test; make up is `wetwell up`, which a walk runs"}
