@@ -89,6 +89,26 @@ def _dask(workers: int, scheduler: str) -> Iterator[Pool]:
 
 
 @contextlib.contextmanager
+def noted_interrupts() -> Iterator[Callable[[], bool]]:
+    """Note Ctrl-C instead of raising it wherever the program is, such as within the locks of a pool.
+
+    Yields
+    ------
+    is_interrupted : callable
+        Whether there was one. Outside of the main thread signals are as they were, and none is noted.
+    """
+    noted: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    before = signal.signal(signal.SIGINT, lambda number, _: noted.append(number))
+    try:
+        yield lambda: bool(noted)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
 def held_interrupts() -> Iterator[None]:
     """Start processes that Ctrl-C does not reach: it is this process's alone."""
     with _masked(signal.SIG_BLOCK):

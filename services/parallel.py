@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from wetwell.protocols.errors import LinkError, WetwellError
-from wetwell.services.executors import held_interrupts, pool_of
+from wetwell.services.executors import held_interrupts, noted_interrupts, pool_of
 
 log = logging.getLogger(__name__)
 
@@ -21,6 +21,8 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _AHEAD = 4  # tasks in the queue for each worker
+LOOK_S = 0.5
+"""How often Ctrl-C is looked for while nothing gets done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +121,10 @@ def _until_killed(
 ) -> Generator[tuple[int, Result | Failure], None, list[tuple[int, Task]]]:
     """Work until all is done; or until a process of this machine was killed, and say what was not done then."""
     waiting: dict[Future[Result | Failure], tuple[int, Task]] = {}
-    with pool_of(workers, scheduler) as (pool, size):
+    with noted_interrupts() as is_interrupted, pool_of(workers, scheduler) as (pool, size):
         while True:
+            if is_interrupted():
+                raise KeyboardInterrupt
             with held_interrupts():  # processes that are started here inherit it
                 for number, task in islice(left, max(_AHEAD * size() - len(waiting), 0)):
                     try:
@@ -129,7 +133,7 @@ def _until_killed(
                         return [*waiting.values(), (number, task)]
             if not waiting:
                 return []
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+            for future in wait(waiting, LOOK_S, return_when=FIRST_COMPLETED).done:
                 try:
                     result = future.result()
                 except BrokenProcessPool:

@@ -108,7 +108,11 @@ sed -n '/^# preparation.toml/,/^```/p' "$ROOT"/docs/field-data.md | sed '$d' > p
         given=f"""{STATION}
 wetwell simulate --station my-station.toml --days 0.5 --seed 3 --out a.parquet
 wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz""",
-        changed={"--seeds 4": "--seeds 1", "--count 100": "--count 2 --days 0.5"},
+        changed={
+            "--seeds 4": "--seeds 1 --detectors wetwell",
+            "--count 100": "--count 2 --days 0.5",
+            "--detectors all": "--detectors wetwell,paper_f_test",
+        },
     ),
     Walk(("docs/datasets.md",), changed={"--count 10": "--count 3"}),
     Walk(("docs/security.md",), changed={"/etc/wetwell/": ""}),

@@ -47,6 +47,7 @@ def test_a_seed_gives_the_same_events_again(folder):
     assert fingerprint(sites[0]) == fingerprint(sites[1])
 
 
+@pytest.mark.timeout(900)  # 90 s on two quiet cores
 def test_many_seeds_see_every_accident(folder):
     happened: Counter[str] = Counter()
     for seed in range(100, 105):
