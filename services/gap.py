@@ -1,6 +1,8 @@
 """Diagnose recordings in files: reads and writes, nothing else."""
 
+import os
 from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,9 @@ from wetwell.sim2real.replay import Replay
 from wetwell.sim2real.traces import PUMP_SIGNALS, traces_of
 from wetwell.sim2real.validation import Validation, validate
 from wetwell.simulator.effects import EFFECTS, effects_of
+
+THREADS = min(os.cpu_count() or 1, 4)
+"""The replay is compiled and holds no lock, so that threads try effects side by side."""
 
 
 def diagnose_file(
@@ -44,7 +49,8 @@ def diagnose_file(
             raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
     rows, preparation = prepared(recording, None)
     try:
-        diagnosis = diagnose(rows, station, only=only, without=without, progress=progress)
+        with ThreadPoolExecutor(THREADS) as pool:
+            diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
         closed_loop = _closed_loop(rows, station, diagnosis.station)
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error

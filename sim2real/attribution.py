@@ -1,7 +1,8 @@
 """Which effects of the library explain the gap: fitted on half of the cycles, ranked on the other half."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,8 @@ from wetwell.sim2real.sureness import is_sure
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+"""Applies a function to items, in order, as `map` does: perhaps side by side."""
 
 VISIBLE = 0.2
 """Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
@@ -27,6 +30,17 @@ LEAST_GAIN = 200.0
 """Drop of the sum of squares that a right model may make by chance."""
 PRICE = 0.006
 """Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""
+EXCUSED_S = 2
+"""Transients in ramps that a right model may be late or early by, and more, when it comes to what is left."""
+KEPT = 1.0 / 3.0
+"""Share of its gap that a signal may keep under the accepted effects."""
+WORTH = 1.5
+"""Mean square of a cell beyond noise, in units of it, for which a further effect is looked for in any case."""
+MIN_BINS = 12
+QUIET = 0.3
+"""Mean square of a signal beyond noise, in units of it, under which the signal shows no gap."""
+UNDONE_SHARE = 0.25
+"""Share of the whole gap that one effect may make in quiet signals for another to undo."""
 MOST_EFFECTS = 3
 PROBES = (0.02,)
 """Strengths, as shares of the range, by which a further effect is judged before it is fitted."""
@@ -40,6 +54,8 @@ NOISY_SHARE = 0.06
 """The same where the cycles do not agree which is better."""
 MOST_EQUIVALENT = 2
 """Effects beside the one found: a larger class tells nobody anything."""
+BETTER = 0.01
+"""Share of what a member gains by which another has to gain more to take its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -63,12 +79,15 @@ class Ranked:
 class Attribution:
     """Outcome: the plain residuals, the accepted fit (None: no effect), single candidates by score, held-out rows.
 
-    In the order of the accepted candidates: `equivalent` are the effects that explain as much in the place of each,
-    `ends` those of the 95 % interval of each of their places.
+    `left` are the residuals under the accepted effects; where values of each second cannot show one of these, or
+    none is accepted, with short transients in ramps excused. In the order of the accepted candidates: `equivalent`
+    are the effects that explain as much in the place of each, `ends` those of the 95 % interval of each of their
+    places.
     """
 
     plain: Floats
     accepted: Fit | None
+    left: Floats
     equivalent: tuple[tuple[str, ...], ...]
     ends: Floats
     singles: tuple[Ranked, ...]
@@ -97,6 +116,8 @@ class Attributor:
     candidates : sequence of Candidate
     progress : callable
         Gets the share of the work that is done, 0 to 1.
+    each : callable
+        Tries candidates, perhaps side by side: the replay holds no lock.
     """
 
     def __init__(
@@ -105,11 +126,15 @@ class Attributor:
         misfit: Misfit,
         candidates: Sequence[Candidate],
         progress: Callable[[float], None] = lambda _: None,
+        each: Each = map,
     ) -> None:
+        self._each = each
         self._misfit = misfit
         self._candidates = tuple(candidates)
         self._progress = progress
-        self.plain = soft(misfit.residuals(replay.run()))
+        prediction = replay.run()
+        self._plant = prediction.plant
+        self.plain = soft(misfit.residuals(prediction))
         self.fitted, self.held = halves(misfit.bins, replay.traces.pumps)
         self._fitter = Fitter(replay, misfit, self.fitted)
         self._rivals: dict[frozenset[str], list[Ranked]] = {}
@@ -128,6 +153,7 @@ class Attributor:
         return Attribution(
             plain=self.plain,
             accepted=accepted,
+            left=self._left(accepted),
             equivalent=equivalent,
             ends=np.zeros((0, 2)) if accepted is None else intervals_of(self._fitter, accepted, self._misfit.bins),
             singles=tuple(singles),
@@ -138,17 +164,22 @@ class Attributor:
     def _singles(self) -> list[Ranked]:
         before = self._fitter.cost(self.plain)
         firsts = []
-        for k, candidate in enumerate(self._candidates):
-            fit = self._fitter.first(candidate, self._ladders(candidate))
+        tried = self._each(
+            lambda candidate: self._fitter.first(candidate, self._ladders(candidate)), self._candidates
+        )
+        for k, fit in enumerate(tried):
             if fit is not None:
                 firsts.append(fit)
             self._progress(0.3 * (k + 1) / len(self._candidates))
         most = max((before - self._fitter.cost(fit.residuals) for fit in firsts), default=0.0)
         ranked = []
-        for k, fit in enumerate(firsts):
+
+        def refined(fit: Fit) -> Fit:
             gain = before - self._fitter.cost(fit.residuals)
-            refined = self._fitter.refine(fit) if gain > PROMISING * most and gain > 0.0 else fit
-            ranked.append(self._rank(self.plain, refined))
+            return self._fitter.refine(fit) if gain > PROMISING * most and gain > 0.0 else fit
+
+        for k, fit in enumerate(self._each(refined, firsts)):
+            ranked.append(self._rank(self.plain, fit))
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
         return _priced(ranked, _plainest)
 
@@ -158,35 +189,50 @@ class Attributor:
     def _extend(self, best: Ranked, singles: Sequence[Ranked]) -> Ranked:
         current, first_gain = best, best.gain
         for _ in range(MOST_EFFECTS - 1):
-            left = current.fit.residuals**2 - self._misfit.bins.floor
-            if float(left[self.held].sum()) < JOIN_SHARE * first_gain:
+            left = self._left(current.fit)
+            is_open = self._open(left)
+            if float((left**2 - self._misfit.bins.floor)[self.held].sum()) < JOIN_SHARE * first_gain and not is_open:
                 break  # no further effect could gain enough
             others = self._joined(current, _names(singles))
             if not others:
                 break
             tried = others[0]
             extra = self._rank(current.fit.residuals, tried.fit)
-            if extra.gain < JOIN_SHARE * first_gain or not self._is_real(current.fit.residuals, extra, CLEAR):
+            is_enough = extra.gain >= JOIN_SHARE * first_gain or self._open(self._left(tried.fit)) < is_open
+            if not is_enough or not self._is_real(current.fit.residuals, extra, CLEAR):
                 break
             current = self._swapped(tried, singles)
         return current
+
+    def _left(self, fit: Fit | None) -> Floats:
+        """Residuals under a fit; with short transients in ramps excused unless all of it can be seen."""
+        effects = () if fit is None else fit.effects
+        is_seen = bool(effects) and all(effect.is_seen(self._plant) for effect in effects)
+        return self._fitter.left(effects, 0 if is_seen else EXCUSED_S)
+
+    def _open(self, left: Floats) -> set[int]:
+        """Signals that keep more than a third of their gap, and a gap that is worth a name."""
+        bins = self._misfit.bins
+        floor, signal = bins.floor[self.held], bins.signal[self.held]
+        excess = left[self.held] ** 2 - floor
+        group = signal * len(REGIMES) + bins.regime[self.held]
+        counts = np.bincount(group, minlength=len(SIGNALS) * len(REGIMES))
+        means = np.bincount(group, excess, counts.size) / np.maximum(counts, 1)
+        is_worth = np.any(((counts >= MIN_BINS) & (means > WORTH)).reshape(len(SIGNALS), -1), axis=1)
+        now = np.bincount(signal, excess, len(SIGNALS))
+        was = np.bincount(signal, self.plain[self.held] ** 2 - floor, len(SIGNALS))
+        return set(np.flatnonzero(is_worth & (now > KEPT * was)).tolist())
 
     def _reduced(self, current: Ranked) -> Ranked:
         """Without the members that the others can stand in for."""
         count = len(current.fit.candidates)
         for place in range(count if count > 1 else 0):
-            kept = [k for k in range(count) if k != place]
-            fit = Fit(
-                candidates=tuple(current.fit.candidates[k] for k in kept),
-                places=tuple(current.fit.places[k] for k in kept),
-                residuals=current.fit.residuals,
-            )
-            residuals = self._fitter.residuals(fit.candidates, fit.places)
-            if residuals is None:
+            start = self._but(current.fit, place)
+            if start is None:
                 continue
-            start = Fit(candidates=fit.candidates, places=fit.places, residuals=residuals)
             fewer = self._rank(self.plain, self._fitter.refine(start))
-            if fewer.gain > (1.0 - JOIN_SHARE) * current.gain:
+            is_open = self._open(self._left(fewer.fit)) > self._open(self._left(current.fit))
+            if fewer.gain > (1.0 - JOIN_SHARE) * current.gain and not is_open:
                 return self._reduced(fewer)
         return current
 
@@ -194,21 +240,42 @@ class Attributor:
         """Fits of the current effects with one more, best first."""
         others = {c.component for c in current.fit.candidates} if len(current.fit.names) > 1 else set()
         free = [c for c in candidates if c.name not in current.fit.names and c.component not in others]
-        free.sort(key=lambda candidate: -self._promise(candidate, current.fit))
-        firsts = []
-        for candidate in free[:LIKELY]:
-            fit = self._fitter.first(candidate, self._ladders(candidate), others=current.fit)
-            if fit is not None:
-                firsts.append(fit)
-        firsts.sort(key=lambda fit: self._fitter.cost(fit.residuals))
-        refined = [self._rank(self.plain, self._fitter.refine(fit)) for fit in firsts[:4]]
-        return _priced(refined, _plainest)
+        promises = list(self._each(lambda candidate: self._promise(candidate, current.fit), free))
+        likely = [free[k] for k in np.argsort(-np.array(promises), kind="stable")[:LIKELY]]
+        tried = self._each(
+            lambda candidate: self._fitter.first(candidate, self._ladders(candidate), others=current.fit), likely
+        )
+        firsts = sorted((fit for fit in tried if fit is not None), key=lambda fit: self._fitter.cost(fit.residuals))
+        refined = self._each(self._fitter.refine, firsts[:4])
+        ranked = _priced([self._rank(self.plain, fit) for fit in refined], _plainest, self._gain(current.fit))
+        while ranked and self._is_contrived(ranked[0].fit):
+            del ranked[0]
+        return ranked
+
+    def _is_contrived(self, fit: Fit) -> bool:
+        """Whether an effect makes a gap in signals that show none, which the others undo."""
+        signal = self._misfit.bins.signal[self.held]
+
+        def by_signal(residuals: Floats) -> Floats:
+            excess = (residuals**2 - self._misfit.bins.floor)[self.held]
+            return np.bincount(signal, excess, len(SIGNALS)).astype(np.float64)
+
+        plain = by_signal(self.plain)
+        is_quiet = plain < QUIET * np.bincount(signal, minlength=len(SIGNALS))
+        for place in range(len(fit.names)):
+            fewer = self._but(fit, place)
+            if fewer is None:
+                continue
+            undone = (by_signal(fewer.residuals) - plain)[is_quiet]
+            if float(np.maximum(undone, 0.0).sum()) > UNDONE_SHARE * float(np.maximum(plain, 0.0).sum()):
+                return True
+        return False
 
     def _ordered(self, final: Ranked) -> Ranked:
         """The same with the effect first without which most is lost."""
         fit = final.fit
-        left = {name: self._gain_of(fit, [other for other in fit.names if other != name]) for name in fit.names}
-        order = sorted(range(len(fit.names)), key=lambda k: left[fit.names[k]])
+        left = [self._gain(self._but(fit, place)) for place in range(len(fit.names))]
+        order = sorted(range(len(fit.names)), key=lambda k: left[k])
         ordered = Fit(
             candidates=tuple(fit.candidates[k] for k in order),
             places=tuple(fit.places[k] for k in order),
@@ -223,18 +290,20 @@ class Attributor:
         for place, name in enumerate(names):
             kept = names[:place] + names[place + 1 :]
             rivals = self._rivals.get(frozenset(kept), ()) if kept else singles
-            least = final.gain - self._gain_of(final.fit, kept)
+            least = final.gain - self._gain(self._but(final.fit, place))
             own = [rival.fit.names[-1] for rival in rivals if _is_equal(final, rival, least)]
             found.append(tuple(one for one in own if one != name)[:MOST_EQUIVALENT])
         return tuple(found)
 
-    def _gain_of(self, fit: Fit, kept: Sequence[str]) -> float:
-        """Gain of some effects of a fit without the others, where they stand."""
-        pairs = [pair for pair in zip(fit.candidates, fit.places, strict=True) if pair[0].name in kept]
-        residuals = self._fitter.residuals([pair[0] for pair in pairs], [pair[1] for pair in pairs])
-        if residuals is None:
-            return 0.0
-        return max(float(np.sum((self.plain**2 - residuals**2)[self.held])), 0.0)
+    def _but(self, fit: Fit, place: int) -> Fit | None:
+        """A fit without one of its effects, the others where they stand."""
+        kept = [k for k in range(len(fit.candidates)) if k != place]
+        candidates, places = tuple(fit.candidates[k] for k in kept), tuple(fit.places[k] for k in kept)
+        residuals = self._fitter.residuals(candidates, places)
+        return None if residuals is None else Fit(candidates=candidates, places=places, residuals=residuals)
+
+    def _gain(self, fit: Fit | None) -> float:
+        return 0.0 if fit is None else max(float(np.sum((self.plain**2 - fit.residuals**2)[self.held])), 0.0)
 
     def _promise(self, candidate: Candidate, current: Fit) -> float:
         """Drop of the sum of squares that one trial of each strength promises, as if all were linear in it."""
@@ -251,15 +320,13 @@ class Attributor:
     def _swapped(self, current: Ranked, singles: Sequence[Ranked]) -> Ranked:
         """Each member in turn against every other candidate, the rest kept: greedy choices are taken back."""
         for place in range(len(current.fit.candidates)):
-            kept = [k for k in range(len(current.fit.candidates)) if k != place]
-            base = Fit(
-                candidates=tuple(current.fit.candidates[k] for k in kept),
-                places=tuple(current.fit.places[k] for k in kept),
-                residuals=current.fit.residuals,
-            )
+            base = self._but(current.fit, place)
+            if base is None:
+                continue
             others = self._joined(Ranked(fit=base, gain=0.0, score=0.0, by_cycle=np.zeros(1)), _names(singles))
             self._rivals[frozenset(base.names)] = others
-            if others and others[0].score > current.score * (1.0 + 0.01):
+            known = self._gain(base)
+            if others and others[0].score - known > (current.score - known) * (1.0 + BETTER):
                 current = others[0]
         return current
 
@@ -296,9 +363,12 @@ def _plainest(fit: Fit) -> int:
     return fit.free
 
 
-def _priced(ranked: list[Ranked], count: Callable[[Fit], int]) -> list[Ranked]:
-    """Ranked by gain less the price of the free parameters; the best variant of each combination of names."""
-    most = max((r.gain for r in ranked), default=0.0)
+def _priced(ranked: list[Ranked], count: Callable[[Fit], int], known: float = 0.0) -> list[Ranked]:
+    """Ranked by gain less the price of the free parameters; the best variant of each combination of names.
+
+    The price is a share of what the best one gains over what is `known`.
+    """
+    most = max((r.gain - known for r in ranked), default=0.0)
     priced = [
         Ranked(fit=r.fit, gain=r.gain, score=r.gain - PRICE * most * count(r.fit), by_cycle=r.by_cycle)
         for r in ranked

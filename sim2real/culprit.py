@@ -5,6 +5,7 @@ import numpy.typing as npt
 
 from wetwell.sim2real.bins import FLOW, HEAD, LEVEL, POWER, SIGNALS, START_LEVEL, STOP_LEVEL, TELEMETRY, Bins
 from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP
+from wetwell.sim2real.replay import LEVEL_TIME_S
 from wetwell.simulator.effects.effect import Component
 from wetwell.simulator.plant import PlantParameters
 
@@ -16,6 +17,10 @@ STRAIGHT = 0.8
 GROWN = 3.0
 """Gap in the last third of a recording over that in the first."""
 NEAR_S = 60
+LASTING = 0.3
+"""Share of the square of an imbalance that is still there a minute later; of a sensor that wanders, hardly any."""
+ONE_SIDED = 5.0
+"""Gap in starts over that in stops from which the check valve opens late: inertia shows in both."""
 SWINGING = 0.4
 ALONE = 0.7
 """Share of the gap from which it is in one kind of signal alone."""
@@ -53,7 +58,7 @@ def culprit(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameter
     ramp = level & ((bins.regime == START_RAMP) | (bins.regime == STOP_RAMP))
     calm = level & ((bins.regime == IDLE) | (bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
     in_ramps, in_calm = (float(np.mean(excess[rows])) if rows.any() else 0.0 for rows in (ramp, calm))
-    return "level_sensor" if in_ramps > 3.0 * in_calm else "sump"
+    return "level_sensor" if in_ramps > 3.0 * in_calm or _wanders(residuals, bins, calm) else "sump"
 
 
 def _drifts(residuals: Floats, bins: Bins) -> bool:
@@ -64,6 +69,25 @@ def _drifts(residuals: Floats, bins: Bins) -> bool:
     order = np.argsort(bins.second[rows], kind="stable")
     means = np.array([part.mean() for part in np.array_split(residuals[rows][order], BLOCKS)])
     return bool(np.corrcoef(means, np.arange(BLOCKS))[0, 1] ** 2 > STRAIGHT)
+
+
+def _wanders(residuals: Floats, bins: Bins, calm: npt.NDArray[np.bool_]) -> bool:
+    """Whether the level departs and comes back at random: a balance that does not close goes one way for minutes.
+
+    What would have to flow in beside the balance, by the observer's equation, against itself a minute and more later.
+    """
+    rows = np.flatnonzero(calm)
+    rows = rows[np.argsort(bins.second[rows], kind="stable")]
+    error_m, second = residuals[rows] * bins.deviation[rows], bins.second[rows]
+    slope = np.diff(error_m) / np.maximum(np.diff(second), 1) + (error_m[1:] + error_m[:-1]) / 2.0 / LEVEL_TIME_S
+    is_next = (np.diff(second) <= NEAR_S) & (np.diff(bins.regime[rows]) == 0)
+    together = is_next[:-2] & is_next[1:-1] & is_next[2:]
+    if together.sum() < BLOCKS:
+        return False
+    noise_m2 = bins.floor[rows] * bins.deviation[rows] ** 2
+    noise = (noise_m2[1:] + noise_m2[:-1]) / np.maximum(np.diff(second), 1) ** 2
+    square = float(np.mean((slope**2 - noise)[:-2][together]))
+    return float(np.mean((slope[:-2] * slope[2:])[together])) < LASTING * square
 
 
 def _runs_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
@@ -133,5 +157,8 @@ def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParame
         for name, (x, y) in directions.items()
     }
     best = max(found, key=lambda name: found[name])
+    if best == "rising_main" and not is_steady:
+        starts, stops = (float(excess[bins.regime == ramp].sum()) for ramp in (START_RAMP, STOP_RAMP))
+        return "pump" if starts > ONE_SIDED * max(stops, 0.0) else best
     is_drive = best == "pump" and (not is_steady or _hunts(residuals, bins, flow))
     return "drive" if is_drive else best

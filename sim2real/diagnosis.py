@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.station import EffectTable, Station
-from wetwell.sim2real.attribution import Attribution, Attributor
+from wetwell.sim2real.attribution import KEPT, MIN_BINS, Attribution, Attributor, Each
 from wetwell.sim2real.bins import LEVEL, SIGNALS, Bins
 from wetwell.sim2real.candidates import Freedom, candidates_of
 from wetwell.sim2real.culprit import culprit
@@ -28,12 +28,8 @@ from wetwell.simulator.effects.effect import Component, Effect
 Floats = npt.NDArray[np.float64]
 
 Verdict = Literal["effect", "none", "unknown"]
-KEPT = 1.0 / 3.0
-"""Share of its gap that a signal may keep under the accepted effects."""
 KEPT_OF_ONE_FORM = 0.1
 """The same of a signal in one regime, where no accepted effect could have another form that explains the rest."""
-HARDLY = 0.3
-"""Share of the whole gap that is left when the effects found so far hardly matter."""
 SEEN = 0.6
 """Repeating mean square of a signal in one regime, in units of noise, from which it is a gap."""
 KEPT_OF_CALM = 0.02
@@ -43,7 +39,20 @@ CLEAR = 1.0
 LARGE = 4.0
 """Mean square of half of the cycles, in units of noise, that no noise has."""
 CALM = {IDLE, STEADY, MULTI_PUMP}
-MIN_BINS = 12
+LEFT = 1.5
+"""Mean square beyond noise, in units of it, from which a cell is not closed by the accepted effects."""
+LEFT_OF_CALM = (0.06, 0.4)
+"""Share of its gap from which that speaks against them while nothing is switched: of fixed and of free forms."""
+LEFT_OF_RAMP = 0.2
+"""The same in ramps, which have many forms."""
+CARRYING = 0.1
+"""Share of the whole gap from which a cell is what the effects were accepted for."""
+MADE = 2.0
+"""Growth of the mean square of a cell that only wrong effects bring about, in units of noise."""
+MADE_SHARE = 0.03
+"""The same as a share of the whole gap."""
+SLOW_S = 1800
+"""Time over which fast swings of a supply are forgotten."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,6 +113,7 @@ def diagnose(
     without: Iterable[str] = (),
     seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
+    each: Each = map,
 ) -> Diagnosis:
     """Diagnose the gap between a station and its recording.
 
@@ -119,6 +129,8 @@ def diagnose(
         Of the bootstrap.
     progress : callable
         Gets the share of the work that is done.
+    each : callable
+        As `map`; that of a pool of threads tries effects side by side.
 
     Raises
     ------
@@ -133,7 +145,7 @@ def diagnose(
     plain = replay.run()
     check_plausible(traces, station, regimes, plain)
     misfit = Misfit(traces, station, regimes, plain)
-    found = Attributor(replay, misfit, candidates, progress).search()
+    found = Attributor(replay, misfit, candidates, progress, each).search()
     bins, pumps = misfit.bins, traces.pumps
     rng = np.random.default_rng(seed)
     if shrinkage_of(found.plain, found.plain, bins, found.held, rng).before < FLOOR + NOTHING:
@@ -144,15 +156,15 @@ def diagnose(
     after = before if accepted is None else _repeating_gap(after_residuals, bins, found, pumps)
     verdict: Verdict = "none" if accepted is None else "effect"
     told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it
-    if _is_unexplained(before, after, after_residuals, bins, found, told):
+    if _is_unexplained(before, after, after_residuals, bins, found, told) or _is_unclosed(bins, found, told):
         verdict = "unknown"
+    elif accepted is not None and not any(effect.is_seen(plain.plant) for effect in accepted.effects):
+        verdict = "none"
     causes = _causes(found)
     where: tuple[Place, ...] = ()
     if verdict == "unknown":
-        explains_little = float(after.sum()) > HARDLY * float(before.sum())
-        residuals = found.plain if explains_little else after_residuals
-        left = np.where(found.held, residuals**2 - bins.floor, 0.0)
-        where = _places(residuals, left, bins, found, culprit(left, residuals, bins, plain.plant), rng)
+        excess = np.where(found.held, found.plain**2 - bins.floor, 0.0)
+        where = _places(found.plain, excess, bins, found, culprit(excess, found.plain, bins, plain.plant), rng)
     elif verdict == "effect":
         where = _places(found.plain, before, bins, found, causes[0].component, rng)
     effects = accepted.effects if accepted is not None and verdict == "effect" else ()
@@ -221,6 +233,51 @@ def _is_unexplained(
         if is_left and left > KEPT * was:
             return True
     return False
+
+
+def _is_unclosed(bins: Bins, found: Attribution, told: set[int]) -> bool:
+    """Whether accepted effects leave or make a gap in a cell that no form of them does, though it may not repeat."""
+    if found.accepted is None:
+        return False
+    excess, plain_excess = found.left**2 - bins.floor, found.plain**2 - bins.floor
+    total = float(np.maximum(plain_excess[found.held], 0.0).sum())
+    swinging = _swinging(bins, found)
+    limit = LEFT_OF_CALM[found.accepted.effects[0].is_shaped]
+    for signal in sorted(told):
+        for regime in range(len(REGIMES)):
+            cell = found.held & (bins.signal == signal) & (bins.regime == regime)
+            count = int(cell.sum())
+            if count < MIN_BINS or not _is_left(excess[cell], bins.cycle[cell]):
+                continue
+            left, was = float(excess[cell].sum()), float(plain_excess[cell].sum())
+            if left - was > max(MADE * count, MADE_SHARE * total):
+                return True
+            if signal in swinging:
+                slow = _slow_square(found.left[cell], bins.second[cell], bins.cycle[cell])
+                if slow > LEFT and slow * count > LEFT_OF_CALM[0] * was:
+                    return True
+            elif was > CARRYING * total and left > (limit if regime in CALM else LEFT_OF_RAMP) * was:
+                return True
+    return False
+
+
+def _is_left(excess: Floats, cycle: npt.NDArray[np.int64]) -> bool:
+    """Whether what is beyond noise is large on average, whichever cycles there are."""
+    of_cycle = np.unique(cycle, return_inverse=True)[1]
+    sums, counts = np.bincount(of_cycle, excess), np.bincount(of_cycle)
+    mean = float(excess.mean())
+    error = float(np.sqrt(np.sum((sums - mean * counts) ** 2))) / excess.size
+    return mean > LEFT and mean - 2.0 * error > 0.5 * LEFT
+
+
+def _slow_square(residuals: Floats, second: npt.NDArray[np.int64], cycle: npt.NDArray[np.int64]) -> float:
+    """Mean product of the means of cycles that are `SLOW_S` apart: what of the square is slower than that."""
+    of_cycle = np.unique(cycle, return_inverse=True)[1]
+    counts = np.bincount(of_cycle)
+    means, times_s = np.bincount(of_cycle, residuals) / counts, np.bincount(of_cycle, second) / counts
+    later = np.searchsorted(times_s, times_s + SLOW_S)
+    known = later < means.size
+    return float(np.mean(means[known] * means[later[known]])) if known.any() else 0.0
 
 
 def _swinging(bins: Bins, found: Attribution) -> set[int]:

@@ -34,7 +34,7 @@ class EventMisfit:
     slope_m_s: Floats
     pattern: Pattern | None
 
-    def residuals(self, prediction: Prediction) -> Floats:
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
         """(events,) level that the controller saw, minus its threshold, over the standard deviation."""
         plant = prediction.plant
         late_s = float(plant.sensors.delay_s[LEVEL]) - plant.control_delay_s

@@ -59,16 +59,18 @@ class Fitter:
         self._replay = replay
         self._misfit = misfit
         self.rows = rows
-        self.evaluations = 0
 
     def residuals(self, candidates: Sequence[Candidate], places: Sequence[Floats]) -> Floats | None:
         """(bins,) soft residuals, None where the effects cannot work together on this station."""
-        self.evaluations += 1
         try:
             prediction = self._replay.run([c.effect(place) for c, place in zip(candidates, places, strict=True)])
         except ValueError:
             return None
         return soft(self._misfit.residuals(prediction))
+
+    def left(self, effects: Sequence[Effect], excused_s: int) -> Floats:
+        """(bins,) soft residuals under effects, with short transients in ramps excused."""
+        return soft(self._misfit.residuals(self._replay.run(effects), excused_s))
 
     def cost(self, residuals: Floats | None) -> float:
         """Sum of squares over the bins that are fitted."""

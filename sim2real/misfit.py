@@ -25,7 +25,7 @@ class _Part(Protocol):
     @property
     def bins(self) -> Bins: ...
 
-    def residuals(self, prediction: Prediction) -> Floats: ...
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats: ...
 
 
 class Misfit:
@@ -40,9 +40,9 @@ class Misfit:
             self._parts.append(event_misfit(traces, station, regimes, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 
-    def residuals(self, prediction: Prediction) -> Floats:
-        """(bins,) residuals in units of noise."""
-        return np.concatenate([part.residuals(prediction) for part in self._parts])
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:
+        """(bins,) residuals in units of noise; with transients in ramps excused that are over within some seconds."""
+        return np.concatenate([part.residuals(prediction, excused_s) for part in self._parts])
 
 
 def soft(residuals: Floats) -> Floats:

@@ -23,14 +23,16 @@ FIRST = 5
 """Values of the level from which the observer begins."""
 UNKNOWN_INFLOW_TIME_S = 300.0
 """The same where the inflow has to be followed too."""
+KEPT_RUNS = 3
+"""Runs that are kept: what only the telemetry or the controller does differently is not computed again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
     """What the sensors would read, without noise: level (n,), signals of pumps (pumps, n).
 
-    The arrays are the replay's own: its next run overwrites them. `plant` holds the parameters that they come from,
-    for what is read off events and telemetry.
+    The arrays are to be read only: several predictions may share them. `plant` holds the parameters that they come
+    from, for what is read off events and telemetry.
     """
 
     level_m: Floats
@@ -38,8 +40,17 @@ class Prediction:
     plant: PlantParameters
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """What the kernel was given, and what it made of it."""
+
+    key: tuple[object, ...]
+    level_m: Floats
+    reading: Floats
+
+
 class Replay:
-    """A recording and a station, ready to be replayed under any effects.
+    """A recording and a station, ready to be replayed under any effects, also side by side.
 
     Parameters
     ----------
@@ -56,8 +67,7 @@ class Replay:
         self.own = tuple(own)
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
         self._forcing = healthy_forcing(inflow_m3h, traces.pumps)
-        self._level_m = np.empty(traces.seconds)
-        self._reading = np.empty((len(PUMP_SIGNALS), traces.pumps, traces.seconds))
+        self._kept: tuple[_Run, ...] = ()
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
         first = traces.level_m[known[:FIRST]]  # a single value may be wrong
@@ -75,14 +85,37 @@ class Replay:
         plant = plant_parameters(self.station)
         for effect in acting:
             plant = effect.modify(plant)
-        forcing = self._forced(acting, plant)
+        run = self._run(acting, plant)
+        level_m, reading = run.level_m, run.reading
+        signals = {
+            name: later(reading[k], _delay_s(plant, name))
+            for k, name in enumerate(PUMP_SIGNALS)
+            if name in self.traces.signals
+        }
+        delay_s = float(plant.sensors.delay_s[LEVEL])
+        return Prediction(level_m=later(level_m, delay_s), signals=signals, plant=plant)
+
+    def _run(self, acting: Sequence[Effect], plant: PlantParameters) -> _Run:
+        """Run of the kernel; one that is kept, where the plant differs from its plant in nothing that it reads."""
         traces, pumps = self.traces, self.traces.pumps
         packed_station, pump, sensor = pack(plant)
+        packed_station[at.CONTROL_DELAY] = 0.0
+        is_held = plant.sensors.deadband[LEVEL] > 0.0
+        frequency_delay_s = _delay_s(plant, "frequency_hz")
+        forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
+        read = sensor[[at.GAIN, at.OFFSET, at.FOLLOWED, at.CUTOFF]]
+        delays_s = (frequency_delay_s, float(sensor[at.DELAY, LEVEL]), float(sensor[at.DELAY, INFLOW]))
+        arrays = (packed_station, pump, plant.profile, read)
+        key = (*(array.tobytes() for array in arrays), is_held, delays_s, forces)
+        for run in self._kept:
+            if run.key == key:
+                return run
+        level_m = np.empty(traces.seconds)
+        reading = np.empty((len(PUMP_SIGNALS), pumps, traces.seconds))
         station_state = np.zeros(at.STATION_STATES)
         station_state[at.VOLUME] = volume_at_level_m3(max(self._first_level_m, 0.0), plant.profile)
         pump_state = np.zeros((at.PUMP_STATES, pumps))
         pump_state[at.AIR] = plant.air_head_m
-        level_m, reading = self._level_m, self._reading
         if traces.inflow_m3h is None:
             gains = 1.4 / UNKNOWN_INFLOW_TIME_S, 1.0 / UNKNOWN_INFLOW_TIME_S**2
         else:
@@ -96,25 +129,20 @@ class Replay:
             pump_state,
             np.zeros((pumps, 3)),
             np.zeros((len(PUMP_SIGNALS), pumps)),
-            *forcing.arrays[:2],
-            np.ascontiguousarray(self._earlier(traces.frequency_hz, plant, "frequency_hz")),
-            self._told_level_m if plant.sensors.deadband[LEVEL] > 0.0 else traces.level_m,
+            *self._forced(forces, plant).arrays[:2],
+            np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
+            self._told_level_m if is_held else traces.level_m,
             *gains,
             np.zeros((len(PUMP_SIGNALS), pumps, 1)),
             level_m,
             reading,
         )
-        signals = {
-            name: later(reading[k], _delay_s(plant, name))
-            for k, name in enumerate(PUMP_SIGNALS)
-            if name in traces.signals
-        }
-        delay_s = float(plant.sensors.delay_s[LEVEL])
-        return Prediction(level_m=later(level_m, delay_s), signals=signals, plant=plant)
+        run = _Run(key=key, level_m=level_m, reading=reading)
+        self._kept = (*self._kept[1 - KEPT_RUNS :], run)
+        return run
 
-    def _forced(self, effects: Sequence[Effect], plant: PlantParameters) -> Forcing:
-        """Forcing of the recording; a copy where an effect works into it."""
-        writing = [effect for effect in effects if type(effect).force is not Effect.force]
+    def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
+        """Forcing of the recording; a copy where effects are `writing` into it."""
         delay_s = float(plant.sensors.delay_s[INFLOW])
         if not writing and delay_s == 0.0:
             return self._forcing
@@ -122,10 +150,6 @@ class Replay:
         for effect in writing:
             effect.force(forcing, self.traces.time_s)
         return forcing
-
-    @staticmethod
-    def _earlier(values: Floats, plant: PlantParameters, name: Quantity) -> Floats:
-        return later(values, -_delay_s(plant, name))
 
 
 def later(values: Floats, delay_s: float) -> Floats:

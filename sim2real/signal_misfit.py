@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from wetwell.protocols.station import Station
 from wetwell.sim2real.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
@@ -47,13 +48,20 @@ class SignalMisfit:
     is_repeated: npt.NDArray[np.bool_]
     pattern: Pattern | None
 
-    def residuals(self, prediction: Prediction) -> Floats:
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:
         """(bins,) means of recorded minus predicted, over their standard deviation.
 
-        Where the telemetry holds or rounds values, only what that cannot explain counts.
+        Where the telemetry holds or rounds values, only what that cannot explain counts; in ramps, only what differs
+        from all that is predicted within `excused_s`.
         """
         values = prediction.level_m if self.pump == NO_PUMP else prediction.signals[self.name][self.pump]
         error = self.recorded - values[self.seconds.second]
+        if excused_s > 0:
+            low, high = (
+                near(values, 2 * excused_s + 1)[self.seconds.second] for near in (minimum_filter1d, maximum_filter1d)
+            )
+            is_ramp = np.isin(self.bins.regime, (START_RAMP, STOP_RAMP))[self.seconds.bin]
+            error = np.where(is_ramp, self.recorded - np.clip(self.recorded, low, high), error)
         sensors, channel = prediction.plant.sensors, _channel(prediction.plant, self.name, self.pump)
         if self.pattern is not None:
             held = min(sensors.deadband[channel], self.pattern.deadband) * self.is_repeated

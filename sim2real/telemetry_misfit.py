@@ -7,12 +7,13 @@ import numpy.typing as npt
 
 from wetwell.protocols.station import Sensors, Station
 from wetwell.sim2real.bins import NO_PUMP, TELEMETRY, Bins
-from wetwell.sim2real.regimes import STEADY, Regimes
+from wetwell.sim2real.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.replay import Prediction
 from wetwell.sim2real.traces import Traces
 from wetwell.simulator.channels import Quantity, channels_of
 
 Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 MIN_MOVES = 30
 HELD_SHARE = 0.15
@@ -21,6 +22,12 @@ DEAD_ZONE = 0.35
 """Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
 EDGE = 1.5
 """Ratio of the sizes that one move in five and one in ten (or ten and twenty) do not reach; 2 for noise."""
+FEW = 0.005
+"""Share of moves that may be smaller than the deadband: values that were lost, or sent twice."""
+OFTEN_S = 60
+"""A value that is held for less was not sent because its time was up."""
+UNSURE = (0.03, 0.4)
+"""Share by which a deadband may be missed: seen in noise or slow moves, and in the steps of ramps alone."""
 LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
 STRENGTH = 12.0
@@ -29,11 +36,15 @@ STRENGTH = 12.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pattern:
-    """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither."""
+    """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither.
+
+    `unsure` is the share by which that may be missed.
+    """
 
     quantity: Quantity
     deadband: float = 0.0
     quantum: float = 0.0
+    unsure: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +55,7 @@ class TelemetryMisfit:
     patterns: tuple[Pattern, ...]
     cycles: int
 
-    def residuals(self, prediction: Prediction) -> Floats:
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
         """(patterns * cycles,) nothing where the plant holds or rounds the channel so, else `STRENGTH`."""
         sensors, pumps = prediction.plant.sensors, prediction.plant.nominal_frequency_hz.size
         left = []
@@ -52,14 +63,14 @@ class TelemetryMisfit:
             channel = channels_of(pattern.quantity, pumps)[0]
             acting = float(sensors.deadband[channel] if pattern.deadband > 0.0 else sensors.quantum[channel])
             seen = max(pattern.deadband, pattern.quantum)
-            left.append(STRENGTH * min(abs(acting / seen - 1.0) / 0.3, 1.0))
+            left.append(STRENGTH * min(max(abs(acting / seen - 1.0) - pattern.unsure, 0.0) / 0.3, 1.0))
         return np.repeat(np.array(left), self.cycles)
 
 
 def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> TelemetryMisfit:
     """Patterns of all channels that carry noise; a recording without noise shows none."""
     cycle, first = np.unique(regimes.cycle, return_index=True)
-    patterns = tuple(_patterns(traces, station.sensors))
+    patterns = tuple(_patterns(traces, station.sensors, regimes))
     count = len(patterns)
     return TelemetryMisfit(
         bins=Bins(
@@ -77,7 +88,7 @@ def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> Tele
     )
 
 
-def _patterns(traces: Traces, sensors: Sensors) -> list[Pattern]:
+def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Pattern]:
     running = traces.frequency_hz > 0.0
     found = []
     series: list[tuple[Quantity, list[Floats]]] = [("level_m", [traces.level_m])]
@@ -94,6 +105,7 @@ def _patterns(traces: Traces, sensors: Sensors) -> list[Pattern]:
         "power_kw": sensors.power_noise,
     }
     for quantity, parts in series:
+        is_ramp = np.isin(regimes.of_pumps, (START_RAMP, STOP_RAMP)) & (quantity in traces.signals)
         if noise[quantity] <= 0.0:
             continue
         moves = np.concatenate([np.diff(part) for part in parts])
@@ -108,8 +120,24 @@ def _patterns(traces: Traces, sensors: Sensors) -> list[Pattern]:
         few, smallest, more, middle = (float(q) for q in np.quantile(jumps, [0.05, 0.1, 0.2, 0.5]))
         has_edge = smallest > DEAD_ZONE * middle or smallest < EDGE * few or more < EDGE * smallest
         if 1.0 - jumps.size / moves.size > HELD_SHARE and has_edge and smallest > 2.5 * quantum:
-            found.append(Pattern(quantity=quantity, deadband=smallest))
+            found.append(_held(quantity, parts, is_ramp, smallest))
     return found
+
+
+def _held(quantity: Quantity, parts: list[Floats], is_ramp: Flags, otherwise: float) -> Pattern:
+    """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon."""
+    soon: list[Floats] = []
+    calm = 0
+    for part, ramp in zip(parts, is_ramp, strict=False):
+        moves = np.diff(part)
+        at_s = np.flatnonzero(np.isfinite(moves) & (moves != 0.0))
+        at_s = at_s[1:][np.diff(at_s) < OFTEN_S]
+        soon.append(np.abs(moves[at_s]))
+        calm += int(np.sum(~ramp[at_s]))
+    jumps = np.concatenate(soon)
+    if jumps.size < MIN_MOVES:
+        return Pattern(quantity=quantity, deadband=otherwise, unsure=UNSURE[1])
+    return Pattern(quantity=quantity, deadband=float(np.quantile(jumps, FEW)), unsure=UNSURE[int(calm < MIN_MOVES)])
 
 
 def _lattice(values: Floats) -> float:

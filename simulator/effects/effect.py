@@ -49,6 +49,10 @@ class Effect(Table):
         """Parameters of the plant under this effect."""
         return parameters
 
+    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - most do not depend on the plant
+        """Whether values of each second can show it on this plant; not what is over within a second."""
+        return True
+
     def force(self, forcing: Forcing, time_s: Floats) -> None:
         """Work into the forcing of a block that begins at `time_s[0]`; for what changes with time."""
 

@@ -3,8 +3,12 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
+
 from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.plant import PlantParameters
+
+SHORTEST_S = 1.0
 
 
 class WaterInertia(Effect):
@@ -33,3 +37,10 @@ class WaterInertia(Effect):
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Give the water its inertia."""
         return replace(parameters, inertia_s2_m2=parameters.inertia_s2_m2 + self.inertia_s2_m2)
+
+    def is_seen(self, parameters: PlantParameters) -> bool:
+        """Whether the time constant I Q / H of a pump at its duty point is a second or more."""
+        flow_m3h = parameters.rated_flow_m3h
+        c0, c1, c2 = parameters.curves.T
+        head_m = c0 + (c1 + c2 * flow_m3h) * flow_m3h
+        return bool(np.any(self.inertia_s2_m2 * flow_m3h / 3600.0 >= SHORTEST_S * head_m))

@@ -63,6 +63,19 @@ def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     assert report.where[0].component == "flow_meter"
 
 
+def test_inertia_that_is_over_within_a_second_is_no_gap(alpha):
+    report = report_of(diagnose(record(alpha, [{"name": "water_inertia", "inertia_s2_m2": 250.0}]), alpha))
+    assert (report.verdict, report.effects) == ("none", ())
+    assert report.gap.before > 1.1
+
+
+def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):
+    recording = record(alpha, [{"name": "control_delay", "delay_s": 20.0}])
+    report = report_of(diagnose(recording, alpha, without=["control_delay"]))
+    assert report.verdict == "unknown"
+    assert report.where[0].component == "controller"
+
+
 @pytest.mark.parametrize("missing", ["inflow_m3h", "power_kw", "head_m"])
 def test_it_works_without_a_channel(alpha, missing):
     recording = record(alpha, [{"name": "friction_bias", "factor": 1.3}])

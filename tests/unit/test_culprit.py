@@ -63,3 +63,20 @@ def test_a_level_that_is_ever_later_is_too_low_at_starts_and_too_high_at_stops(a
     turn = bins.second / bins.second.max()
     size = np.select([bins.signal == START_LEVEL, bins.signal == STOP_LEVEL], [sign * 10.0, 10.0], 1.0)
     assert blamed(size * turn, bins, alpha) == component
+
+
+@pytest.mark.parametrize(("lasting", "component"), [(True, "sump"), (False, "level_sensor")])
+def test_a_level_that_wanders_is_its_sensor_and_a_balance_that_stays_open_the_sump(alpha, lasting, component):
+    bins = bins_of([LEVEL], STEADY)
+    rng = np.random.default_rng(3)
+    since_s = bins.second - np.repeat(bins.second[::BINS_PER_RUN], BINS_PER_RUN)
+    open_balance = 6.0 * (1.0 - np.exp(-since_s / 150.0))
+    assert blamed(open_balance if lasting else rng.normal(0.0, 5.0, bins.size), bins, alpha) == component
+
+
+def test_flow_that_comes_late_at_starts_alone_is_the_check_valve(alpha):
+    bins = bins_of([FLOW, HEAD], START_RAMP)
+    plant = plant_parameters(alpha)
+    _, c1, c2 = plant.curves[0]
+    on_curve = (c1 + 2.0 * c2 * float(plant.rated_flow_m3h[0])) / HEAD_DEVIATION
+    assert blamed(np.where(bins.signal == FLOW, -10.0, -10.0 * on_curve), bins, alpha) == "pump"
