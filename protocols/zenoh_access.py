@@ -75,7 +75,7 @@ class ZenohAccess:
             if self.table is not None:
                 by_certificate = self.users_file is None
                 found["access_control"] = self.table.zenoh_rules(by_certificate=by_certificate)
-        elif self.user is not None:
+        if self.user is not None:
             found |= {f"{_PASSWORD}/user": self.user, f"{_PASSWORD}/password": self.password}
         return found
 

@@ -11,7 +11,7 @@ import logging
 import random
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from typing import Any, Literal, Self
 
@@ -264,8 +264,8 @@ class ZenohBus:
             return self._is_router or bool(self._session.info.routers_zid())
 
 
-def open_router(endpoint: str, access: ZenohAccess = OPEN) -> ZenohBus:
-    """Bus to which others connect.
+def open_router(endpoint: str, access: ZenohAccess = OPEN, upstream: Sequence[str] = ()) -> ZenohBus:
+    """Bus to which others connect; with `upstream` a branch of the tree of those routers, looked for until there.
 
     Parameters
     ----------
@@ -273,6 +273,8 @@ def open_router(endpoint: str, access: ZenohAccess = OPEN) -> ZenohBus:
         Where to listen, such as `tcp/127.0.0.1:7447`, or `tls/...` with a certificate.
     access : ZenohAccess
         Who may come, and what they may do.
+    upstream : sequence of str
+        Endpoints of routers that this one connects to.
 
     Raises
     ------
@@ -283,6 +285,9 @@ def open_router(endpoint: str, access: ZenohAccess = OPEN) -> ZenohBus:
     """
     config = _config("router", endpoint, access)
     config.insert_json5("scouting/delay", "0")  # nobody is scouted: do not wait for answers
+    if upstream:
+        config.insert_json5("connect/endpoints", json.dumps(list(upstream)))
+        config.insert_json5("connect/retry", json.dumps(RECONNECT))
     try:
         return ZenohBus(zenoh.open(config), is_router=True)
     except zenoh.ZError as error:

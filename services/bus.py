@@ -40,7 +40,7 @@ def listen(settings: Settings) -> ZenohBus:
         remedy="zenoh.users_file, or a tls/ endpoint with zenoh.tls",
         insecure=settings.security.insecure,
     )
-    return open_router(zenoh.endpoint, access)
+    return open_router(zenoh.endpoint, access, zenoh.upstream)
 
 
 def access_of(zenoh: ZenohSettings) -> ZenohAccess:

@@ -17,6 +17,8 @@ from wetwell.protocols.station import Finite, NonNegative, Positive, Table, load
 from wetwell.protocols.write_permission import LOOPBACK_WRITES
 from wetwell.services.alarms.rules import RuleName
 
+Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
+
 CONFIG_VARIABLE = "WETWELL_CONFIG"
 
 
@@ -33,10 +35,13 @@ class ZenohTlsSettings(Table):
 class ZenohSettings(Table):
     """The bus: where; as whom (`user`); for a router whom it lets in (`users_file`) and to what (`access_control`).
 
+    `upstream`: routers that a router connects to, as a branch of their tree.
+
     A password comes from `password_file`, or from the environment as `WETWELL_ZENOH__PASSWORD`.
     """
 
-    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")] = "tcp/127.0.0.1:7447"
+    endpoint: Endpoint = "tcp/127.0.0.1:7447"
+    upstream: tuple[Endpoint, ...] = ()
     user: str | None = None
     password: SecretStr | None = None
     password_file: Path | None = None
