@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baselines import detector_class
 from wetwell.detector.baselines.run_detector import RunDetector
+from wetwell.detector.block import Block, blocks
 from wetwell.detector.f_distribution import log_f_survival
 from wetwell.detector.nominal import Nominal, nominal_of
 from wetwell.detector.run import Run
@@ -117,9 +118,14 @@ def recordings(station: Station, first_seed: int, count: int) -> Iterator[tuple[
                 return
 
 
+def blocks_of(recording: Recording) -> Iterator[Block]:
+    """The rows that a detector may see."""
+    return blocks(without_truth(recording), recording.pumps)
+
+
 def judged(detector: Any, recording: Recording) -> list[ScoredRun]:
     """Cycles of pump 1 after learning, as a detector tells them."""
-    verdicts = [verdict for row in without_truth(recording).rows() for verdict in detector.update(row)]
+    verdicts = [verdict for block in blocks_of(recording) for verdict in detector.take(block)]
     verdicts += detector.finish()
     return [run for run in scored_runs(verdicts, recording) if run.pump == 1]
 
@@ -152,8 +158,8 @@ def reasons(station: Station, recording: Recording) -> dict[str, Any]:
     """What the noise does to one-second steps, and how far the curves move within a cycle and between cycles."""
     nominal = nominal_of(station)
     keeper = Cycles(station.name, nominal)
-    for row in without_truth(recording).rows():
-        keeper.update(row)
+    for block in blocks_of(recording):
+        keeper.take(block)
     keeper.finish()
     origin_ns = int(recording.time_ns[0])
     figures: dict[str, Any] = {}

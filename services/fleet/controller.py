@@ -46,10 +46,17 @@ async def serve_fleet(settings: Settings, inventory: Path) -> None:
     stations = Inventory(inventory)
     async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
         client = await stack.enter_async_context(_dask(settings))
-        bus = stack.enter_context(await connect(settings))
+        await until(stop, asyncio.create_task(_keep(settings, client, stations), name="fleet.keep"))
+
+
+async def _keep(settings: Settings, client: Client, stations: Inventory) -> None:
+    with await connect(settings) as bus:
         fleet = Fleet(settings, client, bus, stations)
-        await until(stop, asyncio.create_task(fleet.run(), name="fleet.run"))
-        await fleet.end()
+        try:
+            await fleet.run()
+        except asyncio.CancelledError:
+            await fleet.end()
+            raise
 
 
 @contextlib.asynccontextmanager

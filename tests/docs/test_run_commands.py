@@ -76,10 +76,18 @@ def test_commands_run(walk: Walk, tmp_path: Path) -> None:
         for process, said in started:
             wait_for_a_word(process, said)
     finally:
-        for process, _ in reversed(started):
-            process.send_signal(signal.SIGINT)
-        codes = [process.wait(60) for process, _ in started]
+        codes = [code_at_the_end(process) for process, _ in reversed(started)]
     assert codes == [0] * len(started), [said.read_text() for _, said in started]
+
+
+def code_at_the_end(process: subprocess.Popen[bytes]) -> int:
+    """Exit code of a service that Ctrl-C ends."""
+    process.send_signal(signal.SIGINT)
+    try:
+        return process.wait(60)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
 
 
 def wait_for_a_word(process: subprocess.Popen[bytes], said: Path) -> None:
