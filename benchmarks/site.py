@@ -147,7 +147,7 @@ def daemons(folder: Path, endpoint: str) -> Iterator[dict[str, subprocess.Popen[
         "WETWELL_DETECTOR": json.dumps({"state_dir": str(folder / "state")}),
         "WETWELL_ALARMS": json.dumps({"state_dir": str(folder / "alarms")}),
         PARENT_VARIABLE: "1",
-        "WETWELL_LOG": json.dumps({"level": "WARNING"}),
+        "WETWELL_LOG": json.dumps({"level": "ERROR"}),
     }
     started: dict[str, subprocess.Popen[bytes]] = {}
     try:
