@@ -48,7 +48,6 @@ SUMP_AREA_M2 = 2.0
 """A small wet well: about 130 runs a pump and day."""
 HISTORY = 600
 SETTLE_S = 5.0
-ARRIVAL_S = 0.02
 TICK_S = 0.01
 PATIENCE_S = 300.0
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
@@ -104,11 +103,10 @@ def play(endpoint: str, played: list[Played], accelerate: float, out: Path) -> N
 
     async def run() -> None:
         with await connect_client(endpoint) as bus:
-            publishers = []
-            for each in played:  # stations that all come in one moment are a storm of questions for the router
-                publishers.append(bus.publisher(sample_key(each.name), history=HISTORY))
-                await asyncio.sleep(ARRIVAL_S)
-            messages = [each.recording.samples(each.name, each.begin_s) for each in played]
+            publishers = [bus.publisher(sample_key(each.name), history=HISTORY) for each in played]
+            messages = [
+                [sample.encode() for sample in each.recording.samples(each.name, each.begin_s)] for each in played
+            ]
             sent_s = np.full((len(played[0].recording), len(played)), np.nan)
             await asyncio.sleep(SETTLE_S)
             start_s, count, late_s = time.monotonic(), 0, 0.0
@@ -116,9 +114,8 @@ def play(endpoint: str, played: list[Played], accelerate: float, out: Path) -> N
                 due = min(int((time.monotonic() - start_s) * accelerate * len(played)) + 1, sent_s.size)
                 while count < due:
                     second, station = divmod(count, len(played))
-                    payload = next(messages[station]).encode()
                     sent_s[second, station] = now_s = time.monotonic()
-                    publishers[station].put(payload)
+                    publishers[station].put(messages[station][second])
                     late_s = max(late_s, now_s - start_s - count / (accelerate * len(played)))
                     count += 1
                 await asyncio.sleep(TICK_S)
@@ -150,7 +147,7 @@ def daemons(folder: Path, endpoint: str) -> Iterator[dict[str, subprocess.Popen[
         "WETWELL_DETECTOR": json.dumps({"state_dir": str(folder / "state")}),
         "WETWELL_ALARMS": json.dumps({"state_dir": str(folder / "alarms")}),
         PARENT_VARIABLE: "1",
-        "WETWELL_LOG": json.dumps({"level": "WARNING"}),
+        "WETWELL_LOG": json.dumps({"level": "ERROR"}),
     }
     started: dict[str, subprocess.Popen[bytes]] = {}
     try:
@@ -232,7 +229,7 @@ async def observe(endpoint: str, folder: Path, load: list[Played], accelerate: f
         context = multiprocessing.get_context("spawn")
         player = context.Process(target=play, args=(endpoint, load, accelerate, folder / "sent.npz"), daemon=True)
         player.start()
-        await asyncio.sleep(SETTLE_S + ARRIVAL_S * len(load))
+        await asyncio.sleep(SETTLE_S)
         hearing.append(asyncio.create_task(site.look(period_s)))
         while player.is_alive():
             for name, process in started.items():

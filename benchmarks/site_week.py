@@ -15,7 +15,8 @@ from wetwell.protocols.memory_link import MemoryBus
 from wetwell.services.alarms.keeper import AlarmKeeper
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import Checkpoint
-from wetwell.services.detector.judge import SAMPLE_HISTORY, StationJudge
+from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
+from wetwell.services.detector.judge import StationJudge
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.presets import find_scenario, find_station
@@ -43,6 +44,7 @@ class Week:
         self._judges = [
             StationJudge(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
         ]
+        self._intake = Intake(bus, self._judges)
         self._publishers = [bus.publisher(sample_key(station.name), history=SAMPLE_HISTORY) for station in files]
         self._samples, self._verdicts = bus.subscribe(sample_key("*")), bus.subscribe(verdict_key("*"))
         self._alarms = bus.subscribe(alarm_key("*"))
@@ -51,7 +53,7 @@ class Week:
     async def live(self, days: int) -> list[tuple[float, int]]:
         """Memory of the process in MB and objects of Python, at the end of each hour."""
         tasks = [
-            *(asyncio.create_task(judge.run()) for judge in self._judges),
+            asyncio.create_task(self._intake.run()),
             asyncio.create_task(self._feed(self._samples, self._take_sample)),
             asyncio.create_task(self._feed(self._verdicts, self._take_verdict)),
             asyncio.create_task(

@@ -1,7 +1,7 @@
 """Who may do what on the bus: a table of roles in TOML, and the rules for a Zenoh router that come from it.
 
-A role names what it may publish, read, ask and answer; everything else is denied. Keys of the kind `@adv/...` under a
-key belong to it: there a publisher keeps its last messages for late joiners.
+A role names what it may publish, read, ask and answer; everything else is denied. The key `@tail` under a
+key belongs to it: there a publisher says which message was its last.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.keys import ROOT
+from wetwell.protocols.keys import ROOT, tail_key
 from wetwell.protocols.station import NAME_PATTERN, Table, load_toml
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
@@ -71,7 +71,7 @@ class AccessTable(Table):
         --------
         >>> table = AccessTable(role=(BusRole(name="viewer", read=("wetwell/*/sample",)),))
         >>> [rule["key_exprs"] for rule in table.zenoh_rules(by_certificate=False)["rules"]][0]
-        ['wetwell/*/sample', 'wetwell/*/sample/@adv/**']
+        ['wetwell/*/sample', 'wetwell/*/sample/@tail']
         """
         known_by = "cert_common_names" if by_certificate else "usernames"
         rules = [
@@ -122,5 +122,5 @@ def _rule(name: str, messages: tuple[str, ...], flow: str, keys: tuple[str, ...]
         "messages": list(messages),
         "flows": [flow],
         "permission": "allow",
-        "key_exprs": [*keys, *(f"{key}/@adv/**" for key in keys)],
+        "key_exprs": [*keys, *(tail_key(key) for key in keys)],
     }

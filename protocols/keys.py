@@ -58,3 +58,14 @@ def history_key(station: str) -> str:
 def plan_key(shard: int) -> str:
     """Key of the plan of a shard of the fleet."""
     return f"{ROOT}/{SITE}/plan/{shard}"
+
+
+def tail_key(key: str) -> str:
+    """Key on which the publisher of a key says which message was its last; `*` and `**` do not match its end.
+
+    Examples
+    --------
+    >>> tail_key(sample_key("alpha"))
+    'wetwell/alpha/sample/@tail'
+    """
+    return f"{key}/@tail"

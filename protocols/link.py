@@ -3,10 +3,14 @@
 A key is a Zenoh key expression; in subscriptions `*` stands for one chunk between slashes.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
+
+Keyed = tuple[str, bytes]
+"""A message with its key."""
 
 
 class Publisher(Protocol):
@@ -56,11 +60,14 @@ class Bus(Protocol):
     def subscribe(
         self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
     ) -> Subscription[bytes]:
-        """Subscription to a key expression, beginning with up to `history` kept messages.
+        """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
-        Without `recover`, and without `history`, what is lost on the way stays lost: a tenth of the work, for those
-        who show the newest of very many.
+        The messages of one publisher come in their order, each once; what was lost on the way comes from what its
+        publisher keeps. Without `recover`, and without `history`, it stays lost: for those who show the newest.
         """
+
+    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Subscription[Keyed]:
+        """One subscription to many keys, whose messages come with their keys."""
 
     def answer(self, key: str) -> Subscription[Request]:
         """Questions that are asked on a key from now on; each is to be answered."""

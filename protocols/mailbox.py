@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import threading
 from collections import deque
+from collections.abc import Sequence
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -13,8 +14,8 @@ class Mailbox(Generic[T]):
     """Messages that wait for one asyncio reader; a `Subscription` of every link.
 
     Characteristics: buffered: up to `capacity` messages · when full: drops the oldest and counts it in `dropped` ·
-    threads: `put` from any, `receive` from one task of one loop · a wake-up crosses to the loop only while the reader
-    waits, so a burst costs one.
+    threads: `put` and `extend` from any, `receive` from one task of one loop · a wake-up crosses to the loop only
+    while the reader waits, so a burst costs one.
 
     Parameters
     ----------
@@ -40,17 +41,19 @@ class Mailbox(Generic[T]):
             raise ValueError(f"capacity must be at least 1, got {capacity}")
         self.dropped = 0
         self._capacity = capacity
-        self._messages: deque[T] = deque()
+        self._messages: deque[T] = deque(maxlen=capacity)
         self._reader: asyncio.Future[None] | None = None
         self._lock = threading.Lock()
 
     def put(self, message: T) -> None:
         """Add a message; never waits for the reader."""
+        self.extend((message,))
+
+    def extend(self, messages: Sequence[T]) -> None:
+        """Add messages in their order; never waits for the reader."""
         with self._lock:
-            if len(self._messages) == self._capacity:
-                self._messages.popleft()
-                self.dropped += 1
-            self._messages.append(message)
+            self.dropped += max(0, len(self._messages) + len(messages) - self._capacity)
+            self._messages.extend(messages)
             reader, self._reader = self._reader, None
         if reader is not None:
             with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is left to wake

@@ -5,9 +5,10 @@ import contextlib
 import functools
 import threading
 from collections import deque
+from collections.abc import Callable, Sequence
 from typing import Self
 
-from wetwell.protocols.link import Presence, Request
+from wetwell.protocols.link import Keyed, Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 
 REQUESTS = 1_000
@@ -34,7 +35,7 @@ class MemoryBus:
     def __init__(self) -> None:
         self.alive: set[str] = set()
         self._kept: dict[str, deque[bytes]] = {}
-        self._subscriptions: list[tuple[str, Mailbox[bytes]]] = []
+        self._subscriptions: list[tuple[str, Callable[[str, bytes], None]]] = []
         self._answerers: list[tuple[str, Mailbox[Request]]] = []
         self._watchers: list[tuple[str, Mailbox[Presence]]] = []
         self._lock = threading.Lock()
@@ -69,9 +70,9 @@ class MemoryBus:
         """Send a message on a key that has a publisher."""
         with self._lock:
             self._kept[key].append(payload)
-            for expression, mailbox in self._subscriptions:
+            for expression, take in self._subscriptions:
                 if matches(expression, key):
-                    mailbox.put(payload)
+                    take(key, payload)
 
     def subscribe(
         self,
@@ -84,12 +85,23 @@ class MemoryBus:
         """Subscription to a key expression, beginning with up to `history` kept messages of each key in it."""
         mailbox: Mailbox[bytes] = Mailbox(capacity)
         with self._lock:
-            for kept_key, kept in self._kept.items():
-                if matches(key, kept_key):
-                    for payload in list(kept)[max(0, len(kept) - history) :]:
-                        mailbox.put(payload)
-            self._subscriptions.append((key, mailbox))
+            self._begin(key, history, lambda _, payload: mailbox.put(payload))
         return mailbox
+
+    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
+        """One subscription to many keys, whose messages come with their keys."""
+        mailbox: Mailbox[Keyed] = Mailbox(capacity)
+        with self._lock:
+            for key in keys:
+                self._begin(key, history, lambda kept_key, payload: mailbox.put((kept_key, payload)))
+        return mailbox
+
+    def _begin(self, expression: str, history: int, take: Callable[[str, bytes], None]) -> None:
+        for kept_key, kept in self._kept.items():
+            if matches(expression, kept_key):
+                for payload in list(kept)[max(0, len(kept) - history) :]:
+                    take(kept_key, payload)
+        self._subscriptions.append((expression, take))
 
     def get(self, key: str) -> bytes | None:
         """Last message on a key; None if there was none."""

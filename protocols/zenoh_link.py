@@ -1,76 +1,30 @@
-"""Bus over Zenoh: one process is the router, the others are its clients. The only import of zenoh.
-
-Nothing is found by scouting: a router listens on the endpoint that it is given, a client connects to it.
-"""
+"""Bus over Zenoh: one process is the router, the others are its clients."""
 
 import asyncio
 import concurrent.futures
 import contextlib
-import json
 import logging
 import random
-import re
 import threading
-from collections.abc import Iterator, Sequence
-from datetime import timedelta
-from typing import Any, Literal, Self
+from collections.abc import Sequence
+from typing import Self
 
 import zenoh
-import zenoh.ext
 
-from wetwell.protocols.errors import ConfigError, LinkError
-from wetwell.protocols.link import Presence, Request
+from wetwell.protocols.errors import LinkError
+from wetwell.protocols.link import Keyed, Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 from wetwell.protocols.messages import JSON_ENCODING
 from wetwell.protocols.zenoh_access import OPEN, ZenohAccess
+from wetwell.protocols.zenoh_feed import Feed
+from wetwell.protocols.zenoh_publisher import ZenohPublisher, at_once
+from wetwell.protocols.zenoh_pump import ZenohPump
+from wetwell.protocols.zenoh_session import open_client_session, open_router_session, refusal
 
 logger = logging.getLogger(__name__)
 
-RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
-"""How a client looks for a lost router. Zenoh's own 1 to 4 s would leave a gap of that length."""
-
-LAST_LOSS_S = 1.0
-"""So long after it a message that was lost, and that no other followed, is noticed."""
-
 REQUESTS = 1_000
 """Most questions, or changes of presence, that wait for one reader."""
-
-
-class ZenohPublisher:
-    """Publisher on one key of a `ZenohBus`, with a cache for late joiners and for loss, and an answer to `get`."""
-
-    def __init__(self, session: zenoh.Session, key: str, history: int) -> None:
-        self._key = key
-        self._last: bytes | None = None
-        self._publisher = zenoh.ext.declare_advanced_publisher(
-            session,
-            key,
-            encoding=JSON_ENCODING,
-            congestion_control=zenoh.CongestionControl.DROP,
-            cache=zenoh.ext.CacheConfig(max_samples=history),
-            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=LAST_LOSS_S),
-            publisher_detection=True,
-        )
-        self._queryable = session.declare_queryable(key, self._answer)
-
-    def put(self, payload: bytes) -> None:
-        """Send a message; without a router it is kept in the cache for the time after.
-
-        Raises
-        ------
-        LinkError
-            If the bus is closed.
-        """
-        self._last = payload
-        try:  # not `_refusal`: this is once a message
-            self._publisher.put(payload)
-        except zenoh.ZError as error:
-            raise LinkError(f"cannot publish on '{self._key}': {_reason(error)}") from error
-
-    def _answer(self, query: zenoh.Query) -> None:
-        with query:
-            if self._last is not None:
-                query.reply(self._key, self._last, encoding=JSON_ENCODING)
 
 
 class ZenohRequest:
@@ -93,14 +47,14 @@ class ZenohBus:
 
     Characteristics: buffered: in each subscription, and in each publisher its last `history` messages · when full:
     the oldest is dropped and counted; on the way to a slow subscriber messages are dropped and asked for again from
-    the publisher's history · threads: any may publish · reconnect: a client comes back by itself, usually
-    within 0.5 s of the router; its publishers, subscriptions and what it announced are then as before.
+    the publisher's history · threads: any may publish; one of the bus's own fetches what has come, each 10 ms ·
+    reconnect: a client comes back by itself, usually within 0.5 s of the router; its publishers, subscriptions and
+    what it announced are then as before.
 
-    Messages that were lost, or sent while the router was away, come afterwards as far as the publisher keeps them:
-    with a `history` at once, but after an absence no more than the last `history` of each publisher; without one
-    after `LAST_LOSS_S`, and only of publishers from which something came before. A kept message may come twice:
-    where that matters, drop it by its `seq`. Of many messages in the first milliseconds after `publisher` or
-    `subscribe` the beginning can be lost for good.
+    The messages of one publisher come in their order, each once. What was lost, or sent while the router was away,
+    comes afterwards as far as the publisher keeps it; later messages of it wait until then, at most some seconds. The
+    last one of a publisher that falls silent is missed after a second. Without a `history` a subscription begins with
+    the first message that reaches it.
 
     Parameters
     ----------
@@ -114,8 +68,10 @@ class ZenohBus:
         self._session = session
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
+        self._pump = ZenohPump(session, is_router=is_router)
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
+        self._exit.callback(self._pump.stop)
         self._lock = threading.Lock()  # zenoh refuses to be asked while another thread closes the session
 
     def __enter__(self) -> Self:
@@ -141,9 +97,9 @@ class ZenohBus:
         """
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
-        with _refusal("publish on", key):
-            publisher = ZenohPublisher(self._session, key, history)
-        self._declared.append(publisher)
+        with refusal("publish on", key):
+            publisher = ZenohPublisher(self._session, key, history, self._pump.waiting)
+        self._pump.publish(publisher)
         return publisher
 
     def subscribe(
@@ -160,24 +116,24 @@ class ZenohBus:
         """
         mailbox: Mailbox[bytes] = Mailbox(capacity)
 
-        def deliver(sample: zenoh.Sample) -> None:
-            if sample.kind == zenoh.SampleKind.PUT:
-                mailbox.put(sample.payload.to_bytes())
+        def take(messages: list[Keyed]) -> None:
+            mailbox.extend([payload for _, payload in messages])
 
-        if not recover and not history:
-            with _refusal("subscribe to", key):
-                self._declared.append(self._session.declare_subscriber(key, deliver))
-            return mailbox
-        kept = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=history) if history else None
-        with _refusal("subscribe to", key):
-            subscriber = zenoh.ext.declare_advanced_subscriber(
-                self._session,
-                key,
-                deliver,
-                history=kept,
-                recovery=_recovery(with_history=history > 0),
-            )
-        self._declared.append(subscriber)
+        with refusal("subscribe to", key):
+            self._pump.follow(Feed(self._session, [key], history, take, recover=recover))
+        return mailbox
+
+    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
+        """One subscription to many keys, whose messages come with their keys.
+
+        Raises
+        ------
+        LinkError
+            If a key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Keyed] = Mailbox(capacity)
+        with refusal("subscribe to", ", ".join(keys[:3])):
+            self._pump.follow(Feed(self._session, keys, history, mailbox.extend, recover=True))
         return mailbox
 
     def answer(self, key: str) -> Mailbox[Request]:
@@ -193,8 +149,8 @@ class ZenohBus:
         def deliver(query: zenoh.Query) -> None:
             mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
 
-        with _refusal("answer", key):
-            self._declared.append(self._session.declare_queryable(key, deliver))
+        with refusal("answer", key):
+            self._declared.append(self._session.declare_queryable(key, at_once(deliver)))
         return mailbox
 
     async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
@@ -215,10 +171,10 @@ class ZenohBus:
             with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits
                 loop.call_soon_threadsafe(ended.set)
 
-        with _refusal("ask", key):
+        with refusal("ask", key):
             self._session.get(
                 key,
-                zenoh.handlers.Callback(take, end),
+                zenoh.handlers.Callback(take, end, indirect=False),
                 payload=payload,
                 encoding=JSON_ENCODING,
                 target=zenoh.QueryTarget.ALL,
@@ -240,8 +196,8 @@ class ZenohBus:
         def deliver(sample: zenoh.Sample) -> None:
             mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
 
-        with _refusal("watch", key):
-            self._declared.append(self._session.liveliness().declare_subscriber(key, deliver, history=True))
+        with refusal("watch", key):
+            self._declared.append(self._session.liveliness().declare_subscriber(key, at_once(deliver), history=True))
         return mailbox
 
     def announce(self, key: str) -> None:
@@ -252,7 +208,7 @@ class ZenohBus:
         LinkError
             If the key is not a key expression or the bus is closed.
         """
-        with _refusal("announce", key):
+        with refusal("announce", key):
             self._declared.append(self._session.liveliness().declare_token(key))
 
     @property
@@ -283,15 +239,7 @@ def open_router(endpoint: str, access: ZenohAccess = OPEN, upstream: Sequence[st
     LinkError
         If the endpoint cannot be listened on, most often because another program does.
     """
-    config = _config("router", endpoint, access)
-    config.insert_json5("scouting/delay", "0")  # nobody is scouted: do not wait for answers
-    if upstream:
-        config.insert_json5("connect/endpoints", json.dumps(list(upstream)))
-        config.insert_json5("connect/retry", json.dumps(RECONNECT))
-    try:
-        return ZenohBus(zenoh.open(config), is_router=True)
-    except zenoh.ZError as error:
-        raise LinkError(f"cannot listen on {endpoint}: {_reason(error)}") from error
+    return ZenohBus(open_router_session(endpoint, access, upstream), is_router=True)
 
 
 def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0) -> ZenohBus:
@@ -304,14 +252,7 @@ def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float =
     LinkError
         If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
     """
-    config = _config("client", endpoint, access)
-    config.insert_json5("connect/timeout_ms", str(max(1, round(timeout_s * 1000))))
-    config.insert_json5("connect/retry", json.dumps(RECONNECT))
-    try:
-        return ZenohBus(zenoh.open(config), is_router=False)
-    except zenoh.ZError as error:
-        doubt = f"it is away or refuses {access.shown}" if access.shown else "wrong credentials look the same"
-        raise LinkError(f"no router reached at {endpoint} within {timeout_s:g} s ({doubt})") from error
+    return ZenohBus(open_client_session(endpoint, access, timeout_s), is_router=False)
 
 
 async def connect_client(
@@ -361,53 +302,3 @@ async def _open_in_thread(endpoint: str, access: ZenohAccess, timeout_s: float) 
 def _close_late(opening: concurrent.futures.Future[ZenohBus]) -> None:
     if not opening.cancelled() and opening.exception() is None:
         opening.result().close()
-
-
-def _recovery(*, with_history: bool) -> zenoh.ext.RecoveryConfig:
-    """How a subscription notices that the last message was lost: by heartbeats, or by asking the known publishers.
-
-    A heartbeat of a publisher that is not known yet brings all that it keeps: not wanted without history.
-    """
-    if with_history:
-        return zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None)
-    period: Any = timedelta(seconds=LAST_LOSS_S)  # zenoh's stub says float, zenoh 1.10 takes only this
-    return zenoh.ext.RecoveryConfig(heartbeat=None, periodic_queries=period)
-
-
-def _config(mode: Literal["router", "client"], endpoint: str, access: ZenohAccess) -> zenoh.Config:
-    config = zenoh.Config()
-    settings: dict[str, Any] = {
-        "mode": mode,
-        "listen/endpoints": [endpoint] if mode == "router" else [],
-        "connect/endpoints": [endpoint] if mode == "client" else [],
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-    }
-    try:
-        for name, value in settings.items():
-            config.insert_json5(name, json.dumps(value))
-    except zenoh.ZError as error:
-        raise ConfigError(f"endpoint must be of the form tcp/ADDRESS:PORT, got '{endpoint}'") from error
-    for name, value in access.settings(mode, endpoint).items():
-        try:
-            config.insert_json5(name, json.dumps(value))
-        except zenoh.ZError:  # its text may hold a password
-            raise ConfigError(f"zenoh refuses the settings of {name}") from None
-    return config
-
-
-@contextlib.contextmanager
-def _refusal(act: str, key: str) -> Iterator[None]:
-    """Turn what Zenoh refuses into a `LinkError` that names the act and the key."""
-    try:
-        yield
-    except zenoh.ZError as error:
-        raise LinkError(f"cannot {act} '{key}': {_reason(error)}") from error
-
-
-def _reason(error: zenoh.ZError) -> str:
-    """What a Zenoh error says, in one line, without places in its source."""
-    system = re.search(r"[^:\[]+(?= \(os error \d+\))", str(error))
-    if system:
-        return system.group().strip().lower()
-    return " ".join(re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).split())

@@ -100,7 +100,7 @@ class LogReader:
         if user is not None:
             self._users[user["session"]] = user["user"]
         if denial is not None:
-            name, key = self._users.get(denial["session"], denial["session"]), denial["key"].partition("/@adv/")[0]
+            name, key = self._users.get(denial["session"], denial["session"]), denial["key"].partition("/@tail")[0]
             act = denial["act"].lower().replace("liveliness token", "announce itself")
             self._denied[thread] = f"'{name}' may not {act} on {key}: dropped"
         elif " is authorized to " in said:

@@ -47,8 +47,8 @@ async def _run(settings: Settings, listener: socket.socket) -> None:
     app = dashboard_app(desk, tokens_file, is_local=is_local)
     async with web_server(app, listener, desk.hub):
         log.info("page on http://%s:%d", *listener.getsockname()[:2])
-        with await connect(settings) as bus, await connect(settings) as sample_bus:
-            feed, desk.bus = Feed(bus, sample_bus, desk.view, desk.hub), bus
+        with await connect(settings) as bus:
+            feed, desk.bus = Feed(bus, desk.view, desk.hub), bus
             async with asyncio.TaskGroup() as group:
                 group.create_task(
                     report_health(bus, SITE, "dashboard", settings.health.period_s, feed.figures),

@@ -27,19 +27,15 @@ class Feed:
     Parameters
     ----------
     bus : Bus
-        For all but the samples.
-    sample_bus : Bus
-        For the samples. A connection of their own makes them a tenth as dear: Zenoh looks through all publishers that
-        a session knows for each message.
     view : SiteView
     hub : Hub
     """
 
-    def __init__(self, bus: Bus, sample_bus: Bus, view: SiteView, hub: Hub) -> None:
+    def __init__(self, bus: Bus, view: SiteView, hub: Hub) -> None:
         self._view = view
         self._hub = hub
-        self._sample_bus = sample_bus
-        self._samples = sample_bus.subscribe(sample_key("*"), capacity=100_000, recover=False)
+        self._bus = bus
+        self._samples = bus.subscribe(sample_key("*"), capacity=100_000, recover=False)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
             (self._samples, view.take_sample),
             (bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY), view.take_verdict),
@@ -51,7 +47,7 @@ class Feed:
 
     async def run(self) -> None:
         """Take and send for ever, from the last sample of each station on."""
-        for payload in await self._sample_bus.ask(sample_key("*"), timeout_s=FIRST_S):
+        for payload in await self._bus.ask(sample_key("*"), timeout_s=FIRST_S):
             self._view.take_sample(payload)
         async with asyncio.TaskGroup() as group:
             for subscription, take in self._messages:

@@ -10,7 +10,7 @@ from itertools import islice
 from wetwell.detector.dispatch import Costs
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import order_key, sample_key, verdict_key
+from wetwell.protocols.keys import verdict_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Order, Sample, Verdict
 from wetwell.protocols.station import Station
@@ -20,19 +20,18 @@ from wetwell.services.model_publisher import ModelPublisher
 
 log = logging.getLogger(__name__)
 
-SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
 ORDERS = 100
 """Orders that are remembered with their answers, so that one that is sent again is not carried out twice."""
 
 
 class StationJudge:
-    """Feeds the detector of one station from a bus and publishes what it says.
+    """Feeds the detector of one station and publishes what it says.
 
     Parameters
     ----------
     bus : Bus
-        Where samples and orders come from and verdicts go to.
+        Where verdicts and models go to.
     station : Station
         What is judged.
     costs : Costs, optional
@@ -57,8 +56,6 @@ class StationJudge:
         self._quarantine = quarantine or Quarantine(None, "", 1)
         told = None if checkpoint is None else checkpoint.restore(self.detector)
         self.is_restored = told is not None
-        self._orders = bus.subscribe(order_key(station.name))
-        self._samples = bus.subscribe(sample_key(station.name), history=SAMPLE_HISTORY)
         self._publishers = [
             bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
             for pump in range(1, len(station.pump) + 1)
@@ -74,17 +71,13 @@ class StationJudge:
             for verdict in told.verdicts:
                 self._publish(verdict)
 
-    async def run(self) -> None:
-        """Judge for ever. A payload that is no sample is counted and left out."""
-        log.info("station '%s': waiting for samples", self.station)
-        while True:
-            payloads = await self._samples.receive()
-            self._quarantine.enter(self.station)
-            for payload in payloads:
-                self.take_payload(payload)
-            self._quarantine.leave()
-            self._heard_s = time.monotonic()
-            await asyncio.sleep(0)  # let the health figures out between batches
+    def take_payloads(self, payloads: Iterable[bytes]) -> None:
+        """Judge what has come from the bus. A payload that is no sample is counted and left out."""
+        self._quarantine.enter(self.station)
+        for payload in payloads:
+            self.take_payload(payload)
+        self._quarantine.leave()
+        self._heard_s = time.monotonic()
 
     async def take(self, samples: Iterable[Sample]) -> None:
         """Judge samples that come another way, such as from the historian."""
@@ -96,12 +89,6 @@ class StationJudge:
             self._quarantine.leave()
             await asyncio.sleep(0)
 
-    async def obey(self) -> None:
-        """Carry out the orders of operators for ever. One that is none is counted and left out."""
-        while True:
-            for payload in await self._orders.receive():
-                self.take_order(payload)
-
     def keep(self) -> None:
         """Save the state, if it is kept anywhere."""
         if self._checkpoint is not None:
@@ -111,7 +98,7 @@ class StationJudge:
         """Health figures."""
         counts = {name: float(count) for name, count in (self.detector.counts | self._counts).items()}
         age_s = time.monotonic() - self._heard_s
-        return counts | {"dropped": float(self._samples.dropped), "sample_age_s": age_s}
+        return counts | {"sample_age_s": age_s}
 
     def take_payload(self, payload: bytes) -> None:
         """Judge a sample; a payload that is none is counted and left out."""

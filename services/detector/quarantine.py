@@ -2,13 +2,15 @@
 
 import json
 import logging
-import os
+import mmap
 from pathlib import Path
 
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.whole_file import whole_file
 
 log = logging.getLogger(__name__)
+
+NAME_BYTES = 80
 
 
 class Quarantine:
@@ -35,15 +37,17 @@ class Quarantine:
     def __init__(self, folder: Path | None, name: str, tries: int) -> None:
         self._tries = tries
         self._folder = folder
-        self._trace: int | None = None
+        self._trace: mmap.mmap | None = None
         if folder is None:
             return
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._trace = os.open(folder / f"{name}.at", os.O_RDWR | os.O_CREAT, 0o644)
+            with (folder / f"{name}.at").open("a+b") as file:
+                file.truncate(NAME_BYTES)
+                self._trace = mmap.mmap(file.fileno(), NAME_BYTES)  # outlives the process, and costs no system call
         except OSError as error:
             raise ConfigError(f"detector.state_dir: {folder}: {error.strerror or error}") from error
-        culprit = os.pread(self._trace, 256, 0).decode(errors="replace").strip()
+        culprit = self._trace[:].decode(errors="replace").strip(" \0")
         if culprit:
             crashes = self._crashes(culprit) + 1
             self._note(culprit, crashes)
@@ -54,7 +58,7 @@ class Quarantine:
         """End without a trace."""
         if self._trace is not None:
             self.leave()
-            os.close(self._trace)
+            self._trace.close()
             self._trace = None
 
     def holds(self, station: str) -> bool:
@@ -69,12 +73,12 @@ class Quarantine:
     def enter(self, station: str) -> None:
         """Leave the trace that a station is being judged."""
         if self._trace is not None:
-            os.pwrite(self._trace, station.encode().ljust(80), 0)
+            self._trace[:] = station.encode().ljust(NAME_BYTES)
 
     def leave(self) -> None:
         """Take the trace back."""
         if self._trace is not None:
-            os.pwrite(self._trace, b" " * 80, 0)
+            self._trace[:] = b" " * NAME_BYTES
 
     def _crashes(self, station: str) -> int:
         try:

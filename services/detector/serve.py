@@ -2,8 +2,10 @@
 
 import asyncio
 import contextlib
+import gc
 import logging
 from collections.abc import Sequence
+from functools import partial
 
 from wetwell.protocols.keys import status_key
 from wetwell.protocols.link import Bus
@@ -12,8 +14,8 @@ from wetwell.protocols.station import Station
 from wetwell.services.bus import connect
 from wetwell.services.clock import now_ns
 from wetwell.services.daemon import report_health, stop_event, ticks, until
-from wetwell.services.detector.catch_up import missed_samples
 from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.judge import StationJudge
 from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.settings import Settings
@@ -64,10 +66,16 @@ async def judge_all(
             judge = StationJudge(bus, station, kept.costs, Checkpoint(kept.state_dir, station.name), quarantine)
             stack.callback(judge.keep)
             judges.append(judge)
-            group.create_task(_work(bus, judge), name=f"{name}.{judge.station}")
-            group.create_task(judge.obey(), name=f"{name}.{judge.station}.orders")
+        intake = Intake(bus, judges)
+        gc.freeze()  # looking through the states of a thousand stations for garbage takes a quarter of a second
+        stack.callback(gc.unfreeze)
+        log.info("%d stations: waiting for samples", len(judges))
+        group.create_task(intake.run(), name=f"{name}.intake")
+        for judge in judges:
             group.create_task(
-                report_health(bus, judge.station, "detector", settings.health.period_s, judge.figures),
+                report_health(
+                    bus, judge.station, "detector", settings.health.period_s, partial(_figures, judge, intake)
+                ),
                 name=f"{name}.{judge.station}.health",
             )
         group.create_task(_keep(judges, kept.checkpoint_s), name=f"{name}.checkpoint")
@@ -83,12 +91,8 @@ async def _show_left_out(bus: Bus, station: str, period_s: float) -> None:
         publisher.put(status.encode())
 
 
-async def _work(bus: Bus, judge: StationJudge) -> None:
-    """Take what was missed, then what comes; both overlap, and the detector drops what it has had."""
-    if judge.is_restored:
-        async for samples in missed_samples(bus, judge.station, judge.detector.seen_until_ns):
-            await judge.take(samples)
-    await judge.run()
+def _figures(judge: StationJudge, intake: Intake) -> dict[str, float]:
+    return judge.figures() | {"dropped": float(intake.dropped)}
 
 
 async def _keep(judges: Sequence[StationJudge], period_s: float) -> None:

@@ -275,7 +275,7 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
             httpx.AsyncClient(base_url=address, timeout=10) as client,
             web_server(dashboard_app(desk), listener, desk.hub),
         ):
-            feeding = asyncio.create_task(Feed(bus, bus, desk.view, desk.hub).run())
+            feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
             publisher = bus.publisher(sample_key("alpha"))
             async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
                 assert stream.headers["content-type"].startswith("text/event-stream")

@@ -9,6 +9,7 @@ from wetwell.protocols.keys import order_key, sample_key
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import Order, Sample, Verdict
 from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.judge import StationJudge
 from wetwell.services.detector.orders import ordered
 from wetwell.simulator.scenario import Scenario
@@ -33,7 +34,7 @@ async def answers(alpha, payloads: list[bytes], orders: list[Order]) -> list[Ver
     """Answers to orders that follow on the samples."""
     with MemoryBus() as bus:
         judge = StationJudge(bus, alpha)
-        tasks = [asyncio.create_task(judge.run()), asyncio.create_task(judge.obey())]
+        running = asyncio.create_task(Intake(bus, [judge]).run())
         publisher = bus.publisher(sample_key("alpha"))
         for number, payload in enumerate(payloads):
             publisher.put(payload)
@@ -44,8 +45,7 @@ async def answers(alpha, payloads: list[bytes], orders: list[Order]) -> list[Ver
         bus.publisher(order_key("alpha")).put(order("rebaseline", 99, pump=9).encode())
         told = [await asyncio.wait_for(ordered(bus, one), 30.0) for one in orders]
         assert judge.figures()["malformed_orders"] == judge.figures()["foreign_orders"] == 1.0
-        for task in tasks:
-            task.cancel()
+        running.cancel()
         return told
 
 
@@ -90,12 +90,12 @@ def test_an_order_that_was_answered_is_known_after_a_kill(alpha, payloads, tmp_p
         with MemoryBus() as bus:
             first = StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
             await first.take(Sample.decode(payload) for payload in payloads)
-            obeying = asyncio.create_task(first.obey())
+            obeying = asyncio.create_task(Intake(bus, [first]).run())
             answer = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()
         with MemoryBus() as bus:  # nothing of the first one is left but its checkpoint
             second = StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
-            obeying = asyncio.create_task(second.obey())
+            obeying = asyncio.create_task(Intake(bus, [second]).run())
             again = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()
             return answer, again, int(second.figures()["samples"])

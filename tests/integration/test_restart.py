@@ -12,8 +12,8 @@ from wetwell.protocols.keys import history_key, sample_key, verdict_key
 from wetwell.protocols.link import Request, Subscription
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import Sample, Verdict
-from wetwell.services.detector.catch_up import missed_samples
 from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.judge import StationJudge
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
@@ -55,10 +55,7 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
         position = 0
         for cut in [*cuts, len(samples)]:
             judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
-            if judge.is_restored:
-                async for page in missed_samples(bus, "alpha", judge.detector.seen_until_ns):
-                    await judge.take(page)
-            running = asyncio.create_task(judge.run())
+            running = asyncio.create_task(Intake(bus, [judge]).run())
             checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
             for number in range(position, cut):
                 historian.take("samples", samples[number].encode())
@@ -68,6 +65,10 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
                     await asyncio.sleep(0.0)
                 if number + 1 == checkpoint_at:
                     judge.keep()
+            while (  # noqa: ASYNC110 - the last one may end its work, the others are killed anywhere
+                cut == len(samples) and judge.detector.seen_until_ns < samples[-1].time
+            ):
+                await asyncio.sleep(0.0)
             for _ in range(5):
                 await asyncio.sleep(0.0)
             running.cancel()

@@ -1,15 +1,16 @@
 """A bus over a network that delays, cuts, doubles and forgets, in virtual time.
 
-It keeps what Zenoh's advanced publishers and subscribers keep: the messages of one publisher come in order, what was
+It keeps what the bus over Zenoh keeps: the messages of one publisher come in order, what was
 lost on the way comes from the publisher's cache, a late joiner gets the last messages, a cache dies with its process.
 """
 
 import asyncio
 import random
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from wetwell.protocols.link import Presence, Request
+from wetwell.protocols.link import Keyed, Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 from wetwell.protocols.memory_link import matches
 
@@ -86,14 +87,24 @@ class SimulatedBus:
 
     def subscribe(self, key: str, *, history: int = 0, capacity: int = 10_000) -> Mailbox[bytes]:
         """Messages of a key expression, beginning with the last ones that living publishers keep."""
-        subscription = Subscription(key, Mailbox(capacity), self)
+        mailbox: Mailbox[bytes] = Mailbox(capacity)
+        self._begin(Subscription(key, mailbox, self), history)
+        return mailbox
+
+    def _begin(self, subscription: "Subscription", history: int) -> None:
         for bus in self._network.buses:
             for kept_key, cache in sorted(bus._caches.items()):
-                if matches(key, kept_key):
+                if matches(subscription.expression, kept_key):
                     for payload in list(cache)[max(0, len(cache) - history) :]:
                         subscription.send(bus, kept_key, payload, max(self._healed_s, bus._healed_s))
         self._subscriptions.append(subscription)
-        return subscription.mailbox
+
+    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
+        """Messages of many keys, with their keys."""
+        mailbox: Mailbox[Keyed] = Mailbox(capacity)
+        for key in keys:
+            self._begin(Subscription(key, mailbox, self, is_keyed=True), history)
+        return mailbox
 
     def answer(self, key: str) -> Mailbox[Request]:
         """Questions on a key."""
@@ -161,8 +172,9 @@ class SimulatedPublisher:
 class Subscription:
     """What one process wants to hear; the messages of one publisher come in order."""
 
-    def __init__(self, expression: str, mailbox: Mailbox[bytes], owner: SimulatedBus) -> None:
+    def __init__(self, expression: str, mailbox: Mailbox, owner: SimulatedBus, *, is_keyed: bool = False) -> None:
         self.expression = expression
+        self._is_keyed = is_keyed
         self.mailbox = mailbox
         self._owner = owner
         self._last_s: dict[tuple[SimulatedBus, str], float] = {}
@@ -174,9 +186,10 @@ class Subscription:
         due_s = max(due_s, self._last_s.get((sender, key), 0.0) + 1e-6)  # timers of one moment have no order
         self._last_s[sender, key] = due_s
         loop = asyncio.get_running_loop()
-        loop.call_at(due_s, _put, self._owner, self.mailbox, payload)
+        message = (key, payload) if self._is_keyed else payload
+        loop.call_at(due_s, _put, self._owner, self.mailbox, message)
         if network.dice.random() < network.doubles:
-            loop.call_at(due_s, _put, self._owner, self.mailbox, payload)
+            loop.call_at(due_s, _put, self._owner, self.mailbox, message)
 
 
 class SimulatedRequest:
