@@ -53,10 +53,13 @@ async def stop_event() -> AsyncIterator[asyncio.Event]:
             loop.remove_reader(sys.stdin.fileno())
 
 
-async def ticks(period_s: float, stop: asyncio.Event) -> AsyncIterator[float]:
-    """Yield the time since the start, in s, on each multiple of the period until stopped; late ticks are skipped."""
+async def ticks(period_s: float, stop: asyncio.Event, lead_s: float = 0.0) -> AsyncIterator[float]:
+    """Yield the time since the start, in s, on each multiple of the period until stopped; late ticks are skipped.
+
+    With a lead the start was so long ago: many that begin together tick apart from their second tick on.
+    """
     loop = asyncio.get_running_loop()
-    start, n = loop.time(), 0
+    start, n = loop.time() - lead_s, 0
     while not stop.is_set():
         yield loop.time() - start
         n = max(n + 1, int((loop.time() - start) // period_s) + 1)
@@ -89,12 +92,13 @@ async def report_health(
     period_s: float,
     figures: Callable[[], dict[str, float]],
     condition: Callable[[], tuple[ServiceState, str]] = _running,
+    lead_s: float = 0.0,
 ) -> None:
     """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`."""
     bus.announce(alive_key(station, service))
     publisher = bus.publisher(status_key(station, service))
     never = asyncio.Event()
-    async for _ in ticks(period_s, never):
+    async for _ in ticks(period_s, never, lead_s):
         state, reason = condition()
         status = Status(
             time=now_ns(), station=station, service=service, state=state, figures=figures(), reason=reason

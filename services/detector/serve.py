@@ -71,11 +71,11 @@ async def judge_all(
         stack.callback(gc.unfreeze)
         log.info("%d stations: waiting for samples", len(judges))
         group.create_task(intake.run(), name=f"{name}.intake")
-        for judge in judges:
+        period_s = settings.health.period_s
+        for number, judge in enumerate(judges):
+            figures, lead_s = partial(_figures, judge, intake), period_s * number / len(judges)
             group.create_task(
-                report_health(
-                    bus, judge.station, "detector", settings.health.period_s, partial(_figures, judge, intake)
-                ),
+                report_health(bus, judge.station, "detector", period_s, figures, lead_s=lead_s),
                 name=f"{name}.{judge.station}.health",
             )
         group.create_task(_keep(judges, kept.checkpoint_s), name=f"{name}.checkpoint")
