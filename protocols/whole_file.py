@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +22,8 @@ def whole_file(path: Path) -> Iterator[io.BufferedWriter]:
     try:
         with partial.open("wb") as file:
             yield file
+            file.flush()
+            os.fsync(file.fileno())  # or a power failure could leave the name with nothing in it
         partial.replace(path)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from error

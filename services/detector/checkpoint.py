@@ -2,6 +2,7 @@
 
 import json
 import logging
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,8 @@ class Checkpoint:
 
     def __init__(self, folder: Path | None, station: str) -> None:
         self._path = None if folder is None else folder / f"{station}.detector.json"
+        self._lock = threading.Lock()
+        self._encoded = self._written = 0
 
     def restore(self, detector: Detector) -> Told | None:
         """Let the detector go on from the file.
@@ -61,19 +64,31 @@ class Checkpoint:
 
     def save(self, detector: Detector, told: Told) -> None:
         """Write the state; a disk that refuses is told, and the last file stays."""
+        self.write(*self.encode(detector, told))
+
+    def encode(self, detector: Detector, told: Told) -> tuple[int, bytes]:
+        """The state as it is now, numbered, for `write`."""
+        self._encoded += 1
         if self._path is None:
-            return
+            return self._encoded, b""
         head = {
             "schema": SCHEMA,
             "answers": {name: answer.model_dump(mode="json") for name, answer in told.answers.items()},
             "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
         }
-        try:
-            with whole_file(self._path) as file:
-                file.write(json.dumps(head).encode() + b"\n")
-                file.write(detector.snapshot())
-        except RecordingError as error:
-            log.warning("%s", error)
+        return self._encoded, json.dumps(head).encode() + b"\n" + detector.snapshot()
+
+    def write(self, number: int, content: bytes) -> None:
+        """Write what `encode` gave, in any thread; what is older than the file is left out."""
+        with self._lock:
+            if self._path is None or number < self._written:
+                return
+            try:
+                with whole_file(self._path) as file:
+                    file.write(content)
+                self._written = number
+            except RecordingError as error:
+                log.warning("%s", error)
 
 
 def _parted(data: bytes) -> tuple[Told, bytes]:

@@ -92,7 +92,15 @@ class StationJudge:
     def keep(self) -> None:
         """Save the state, if it is kept anywhere."""
         if self._checkpoint is not None:
-            self._checkpoint.save(self.detector, Told(self._answers, list(self._last.values())))
+            self._checkpoint.save(self.detector, self._told())
+
+    async def keep_aside(self) -> None:
+        """Save the state as `keep` does, the disk in a thread of its own."""
+        if self._checkpoint is not None:
+            await asyncio.to_thread(self._checkpoint.write, *self._checkpoint.encode(self.detector, self._told()))
+
+    def _told(self) -> Told:
+        return Told(self._answers, list(self._last.values()))
 
     def figures(self) -> dict[str, float]:
         """Health figures."""

@@ -100,4 +100,4 @@ async def _keep(judges: Sequence[StationJudge], period_s: float) -> None:
     while judges:
         for judge in judges:
             await asyncio.sleep(period_s / len(judges))
-            judge.keep()
+            await judge.keep_aside()

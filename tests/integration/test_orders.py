@@ -8,7 +8,7 @@ from wetwell.detector.learning import LEARNING_S
 from wetwell.protocols.keys import order_key, sample_key
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import Order, Sample, Verdict
-from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.judge import StationJudge
 from wetwell.services.detector.orders import ordered
@@ -76,6 +76,17 @@ def test_a_checkpoint_is_taken_up_and_a_damaged_one_is_put_aside(alpha, tmp_path
         assert not StationJudge(bus, alpha, checkpoint=checkpoint).is_restored
     assert "damaged, its checksum differs; kept as alpha.detector.refused, learning starts again" in caplog.text
     assert [path.name for path in (tmp_path / "state").iterdir()] == ["alpha.detector.refused"]
+
+
+def test_a_late_writer_does_not_put_an_older_state_over_a_newer_one(alpha, payloads, tmp_path):
+    with MemoryBus() as bus:
+        checkpoint = Checkpoint(tmp_path, "alpha")
+        judge = StationJudge(bus, alpha, checkpoint=checkpoint)
+        older = checkpoint.encode(judge.detector, Told({}))
+        judge.take_payloads(payloads)
+        judge.keep()
+        checkpoint.write(*older)
+        assert StationJudge(bus, alpha, checkpoint=checkpoint).detector.snapshot() == judge.detector.snapshot()
 
 
 def test_a_checkpoint_of_version_0_1_which_is_a_bare_snapshot_is_taken_up(alpha, tmp_path):
