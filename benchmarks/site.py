@@ -14,217 +14,42 @@ import platform
 import shutil
 import socket
 import sqlite3
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from site_load import SETTLE_S, Played, play, prepare
+from site_processes import Site, started
 from site_week import memory_of_a_week
 
-from wetwell.detector.block import blocks
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import SITE, sample_key, status_key, verdict_key
-from wetwell.protocols.messages import Status, Verdict
-from wetwell.protocols.recording import Recording
+from wetwell.protocols.keys import SITE
 from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import ZenohBus, connect_client
+from wetwell.protocols.zenoh_link import connect_client
 from wetwell.services.charts import Series, line_chart
-from wetwell.services.daemon import PARENT_VARIABLE
-from wetwell.services.presets import find_scenario, find_station
-from wetwell.simulator.simulation import Simulation
-
-LEARNT_S = 28_800
-"""So much of each recording is judged beforehand; the faults of scenario `demo` begin then."""
-SHIFT_S = 97
-"""Two stations that share a recording are so far apart in it."""
-RECORDINGS = 16
-SCENARIOS = ("nominal", "demo")
-SUMP_AREA_M2 = 2.0
-"""A small wet well: about 130 runs a pump and day."""
-HISTORY = 600
-SETTLE_S = 5.0
-TICK_S = 0.01
-PATIENCE_S = 300.0
-CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
-PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
-@dataclass(frozen=True)
-class Played:
-    """A station of the load: a stretch of a recording."""
-
-    name: str
-    recording: Recording
-    begin_s: int
-
-
-def part_of(recording: Recording, begin: int, end: int) -> Recording:
-    columns = {name: values[begin:end] for name, values in recording.columns.items()}
-    return replace(recording, time_ns=recording.time_ns[begin:end], columns=columns)
-
-
-def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
-    """Write station files and checkpoints; what each station plays."""
-    model = find_station("alpha")
-    small = model.model_copy(update={"sump": model.sump.model_copy(update={"area_m2": SUMP_AREA_M2})})
-    text = Path(sys.modules[Simulation.__module__].__file__ or "").parent / "stations" / "alpha.toml"
-    source = text.read_text().replace("area_m2 = 8.0", f"area_m2 = {SUMP_AREA_M2}")
-    for name in ("stations", "state"):
-        (folder / name).mkdir()
-    played: list[Played] = []
-    shares = -(-stations // RECORDINGS)
-    for number in range(min(RECORDINGS, stations)):
-        length_s = LEARNT_S + SHIFT_S * shares + seconds
-        simulation = Simulation(small, find_scenario(SCENARIOS[number % 2]), seed=number + 1)
-        recording = simulation.advance(length_s, truth=False)
-        detector, begin_s = Detector("", nominal_of(small)), 0
-        for share in range(shares):
-            if (index := share * RECORDINGS + number) >= stations:
-                break
-            until_s = LEARNT_S + share * SHIFT_S
-            for block in blocks(part_of(recording, begin_s, until_s), len(small.pump)):
-                detector.take(block._replace(seq=block.seq + begin_s))
-            begin_s, name = until_s, f"s{index:05d}"
-            (folder / "stations" / f"{name}.toml").write_text(source.replace('"alpha"', f'"{name}"'))
-            head, _, body = detector.snapshot().partition(b"\n")
-            head = json.dumps(json.loads(head) | {"station": name}).encode()
-            (folder / "state" / f"{name}.detector.json").write_bytes(head + b"\n" + body)
-            played.append(Played(name, part_of(recording, begin_s, begin_s + seconds), begin_s))
-    return sorted(played, key=lambda each: each.name)
-
-
-def play(endpoint: str, played: list[Played], accelerate: float, out: Path) -> None:
-    """Publish each station at so many samples a second, spread over it; keep when each was sent."""
-
-    async def run() -> None:
-        with await connect_client(endpoint) as bus:
-            publishers = [bus.publisher(sample_key(each.name), history=HISTORY) for each in played]
-            messages = [
-                [sample.encode() for sample in each.recording.samples(each.name, each.begin_s)] for each in played
-            ]
-            sent_s = np.full((len(played[0].recording), len(played)), np.nan)
-            await asyncio.sleep(SETTLE_S)
-            start_s, count, late_s = time.monotonic(), 0, 0.0
-            while count < sent_s.size:
-                due = min(int((time.monotonic() - start_s) * accelerate * len(played)) + 1, sent_s.size)
-                while count < due:
-                    second, station = divmod(count, len(played))
-                    sent_s[second, station] = now_s = time.monotonic()
-                    publishers[station].put(messages[station][second])
-                    late_s = max(late_s, now_s - start_s - count / (accelerate * len(played)))
-                    count += 1
-                await asyncio.sleep(TICK_S)
-            np.savez(out, sent_s=sent_s, late_s=late_s)
-            await asyncio.sleep(SETTLE_S)
-
-    asyncio.run(run())
-
-
-def cpu_and_memory(pid: int) -> tuple[float, float]:
-    """CPU time and resident memory of a process. [s, MB]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return (int(fields[11]) + int(fields[12])) / CLOCK_TICKS, pages * PAGE_BYTES / 1e6
-
-
-@contextlib.contextmanager
-def daemons(folder: Path, endpoint: str) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
-    """Start what a site has; at the end ask it to stop."""
-    stations = str(folder / "stations")
-    of_each = [word for path in sorted(Path(stations).iterdir()) for word in ("--station", str(path))]
-    commands = {
+def commands_of(folder: Path) -> dict[str, list[str]]:
+    """What a site runs."""
+    stations = folder / "stations"
+    of_each = [word for path in sorted(stations.iterdir()) for word in ("--station", str(path))]
+    return {
         "router": ["router"],
         "historian": ["historian", "--data", str(folder / "history")],
         "alarms": ["alarms", *of_each],
-        "detector": ["detector", "--station", stations],
+        "detector": ["detector", "--station", str(stations)],
     }
-    environment = os.environ | {
-        "WETWELL_DETECTOR": json.dumps({"state_dir": str(folder / "state")}),
-        "WETWELL_ALARMS": json.dumps({"state_dir": str(folder / "alarms")}),
-        PARENT_VARIABLE: "1",
-        "WETWELL_LOG": json.dumps({"level": "ERROR"}),
-    }
-    started: dict[str, subprocess.Popen[bytes]] = {}
-    try:
-        for name, words in commands.items():
-            command = [sys.executable, "-m", "wetwell.services", *words, "--zenoh", endpoint]
-            started[name] = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE)  # noqa: S603 - our own commands
-        yield started
-    finally:
-        for process in reversed(started.values()):
-            process.terminate()
-            process.wait()
-
-
-class Site:
-    """What is heard of a site, and what its processes use."""
-
-    def __init__(self, bus: ZenohBus, pids: dict[str, int]) -> None:
-        self.arrivals: list[tuple[float, Verdict]] = []
-        self.figures: dict[tuple[str, str], dict[str, float]] = {}
-        self.curve: list[dict[str, float]] = []
-        self._pids = pids
-        self._verdicts = bus.subscribe(verdict_key("*"), capacity=1_000_000)
-        self._statuses = bus.subscribe(status_key("*", "*"), history=1, capacity=1_000_000)
-
-    async def hear_verdicts(self) -> None:
-        """Keep verdicts and when they came, for ever."""
-        while True:
-            payloads = await self._verdicts.receive()
-            now_s = time.monotonic()
-            self.arrivals += [(now_s, Verdict.decode(payload)) for payload in payloads]
-
-    async def hear_statuses(self) -> None:
-        """Keep the last health figures of each service, for ever."""
-        while True:
-            for payload in await self._statuses.receive():
-                status = Status.decode(payload)
-                self.figures[status.station, status.service] = status.figures
-
-    async def wait_for(self, stations: int) -> None:
-        """Until every daemon has shown itself."""
-        async with asyncio.timeout(PATIENCE_S):
-            while self._shown() < stations + 2:  # noqa: ASYNC110 - they show themselves on the bus
-                await asyncio.sleep(0.2)
-
-    def _shown(self) -> int:
-        return sum(service == "detector" or station == SITE for station, service in self.figures)
-
-    async def look(self, period_s: float) -> None:
-        """Note what the processes use, for ever."""
-        while True:
-            self.look_once()
-            await asyncio.sleep(period_s)
-
-    def look_once(self) -> None:
-        """Note what the processes use."""
-        point = {"time_s": time.monotonic(), "load": os.getloadavg()[0]}
-        for name, pid in self._pids.items():
-            point[f"{name}_cpu_s"], point[f"{name}_mb"] = cpu_and_memory(pid)
-        self.curve.append(point)
-
-    def summed(self, service: str) -> dict[str, float]:
-        """Health figures of a service over all stations."""
-        total: dict[str, float] = {}
-        for (_, each), figures in self.figures.items():
-            if each == service:
-                for name, value in figures.items():
-                    total[name] = total.get(name, 0.0) + value
-        return total
 
 
 async def observe(endpoint: str, folder: Path, load: list[Played], accelerate: float, period_s: float) -> Site:
     """Run the load against the daemons."""
-    with daemons(folder, endpoint) as started, await connect_client(endpoint) as bus:
-        site = Site(bus, {name: process.pid for name, process in started.items()})
+    kept_in = {"detector": {"state_dir": str(folder / "state")}, "alarms": {"state_dir": str(folder / "alarms")}}
+    with started(commands_of(folder), endpoint, **kept_in) as running, await connect_client(endpoint) as bus:
+        site = Site(bus, {name: process.pid for name, process in running.items()})
         hearing = [asyncio.create_task(site.hear_verdicts()), asyncio.create_task(site.hear_statuses())]
         begun_s = time.monotonic()
-        await site.wait_for(len(load))
+        await site.wait_for(len(load), services=2)
         print(f"all daemons up after {time.monotonic() - begun_s:.1f} s", file=sys.stderr)
         context = multiprocessing.get_context("spawn")
         player = context.Process(target=play, args=(endpoint, load, accelerate, folder / "sent.npz"), daemon=True)
@@ -232,7 +57,7 @@ async def observe(endpoint: str, folder: Path, load: list[Played], accelerate: f
         await asyncio.sleep(SETTLE_S)
         hearing.append(asyncio.create_task(site.look(period_s)))
         while player.is_alive():
-            for name, process in started.items():
+            for name, process in running.items():
                 if process.poll() is not None:
                     raise SystemExit(f"{name} has ended with code {process.returncode}")
             await asyncio.sleep(0.5)

@@ -1,0 +1,102 @@
+"""Stations that have been learnt, and a process that plays them on the bus."""
+
+import asyncio
+import json
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from wetwell.detector.block import blocks
+from wetwell.detector.nominal import nominal_of
+from wetwell.detector.pipeline import Detector
+from wetwell.protocols.keys import sample_key
+from wetwell.protocols.recording import Recording
+from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.presets import find_scenario, find_station
+from wetwell.simulator.simulation import Simulation
+
+LEARNT_S = 28_800
+"""So much of each recording is judged beforehand; the faults of scenario `demo` begin then."""
+SHIFT_S = 97
+"""Two stations that share a recording are so far apart in it."""
+RECORDINGS = 16
+SCENARIOS = ("nominal", "demo")
+SUMP_AREA_M2 = 2.0
+"""A small wet well: about 130 runs a pump and day."""
+HISTORY = 600
+SETTLE_S = 5.0
+TICK_S = 0.01
+
+
+@dataclass(frozen=True)
+class Played:
+    """A station of the load: a stretch of a recording."""
+
+    name: str
+    recording: Recording
+    begin_s: int
+
+
+def part_of(recording: Recording, begin: int, end: int) -> Recording:
+    columns = {name: values[begin:end] for name, values in recording.columns.items()}
+    return replace(recording, time_ns=recording.time_ns[begin:end], columns=columns)
+
+
+def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
+    """Write station files and checkpoints; what each station plays."""
+    model = find_station("alpha")
+    small = model.model_copy(update={"sump": model.sump.model_copy(update={"area_m2": SUMP_AREA_M2})})
+    text = Path(sys.modules[Simulation.__module__].__file__ or "").parent / "stations" / "alpha.toml"
+    source = text.read_text().replace("area_m2 = 8.0", f"area_m2 = {SUMP_AREA_M2}")
+    for name in ("stations", "state"):
+        (folder / name).mkdir()
+    played: list[Played] = []
+    shares = -(-stations // RECORDINGS)
+    for number in range(min(RECORDINGS, stations)):
+        length_s = LEARNT_S + SHIFT_S * shares + seconds
+        simulation = Simulation(small, find_scenario(SCENARIOS[number % 2]), seed=number + 1)
+        recording = simulation.advance(length_s, truth=False)
+        detector, begin_s = Detector("", nominal_of(small)), 0
+        for share in range(shares):
+            if (index := share * RECORDINGS + number) >= stations:
+                break
+            until_s = LEARNT_S + share * SHIFT_S
+            for block in blocks(part_of(recording, begin_s, until_s), len(small.pump)):
+                detector.take(block._replace(seq=block.seq + begin_s))
+            begin_s, name = until_s, f"s{index:05d}"
+            (folder / "stations" / f"{name}.toml").write_text(source.replace('"alpha"', f'"{name}"'))
+            head, _, body = detector.snapshot().partition(b"\n")
+            head = json.dumps(json.loads(head) | {"station": name}).encode()
+            (folder / "state" / f"{name}.detector.json").write_bytes(head + b"\n" + body)
+            played.append(Played(name, part_of(recording, begin_s, begin_s + seconds), begin_s))
+    return sorted(played, key=lambda each: each.name)
+
+
+def play(endpoint: str, played: list[Played], accelerate: float, out: Path) -> None:
+    """Publish each station at so many samples a second, spread over it; keep when each was sent."""
+
+    async def run() -> None:
+        with await connect_client(endpoint) as bus:
+            publishers = [bus.publisher(sample_key(each.name), history=HISTORY) for each in played]
+            messages = [
+                [sample.encode() for sample in each.recording.samples(each.name, each.begin_s)] for each in played
+            ]
+            sent_s = np.full((len(played[0].recording), len(played)), np.nan)
+            await asyncio.sleep(SETTLE_S)
+            start_s, count, late_s = time.monotonic(), 0, 0.0
+            while count < sent_s.size:
+                due = min(int((time.monotonic() - start_s) * accelerate * len(played)) + 1, sent_s.size)
+                while count < due:
+                    second, station = divmod(count, len(played))
+                    sent_s[second, station] = now_s = time.monotonic()
+                    publishers[station].put(messages[station][second])
+                    late_s = max(late_s, now_s - start_s - count / (accelerate * len(played)))
+                    count += 1
+                await asyncio.sleep(TICK_S)
+            np.savez(out, sent_s=sent_s, late_s=late_s)
+            await asyncio.sleep(SETTLE_S)
+
+    asyncio.run(run())
