@@ -14,7 +14,7 @@ from wetwell.services.dashboard.site_view import SiteView
 log = logging.getLogger(__name__)
 
 SETTLED_S = 2.0
-"""So long after the first sample that was heard the historian has committed those before it."""
+"""So long after the start the historian has committed what came before."""
 AGAIN_S = 30.0
 """After so long a historian that did not answer is asked again, while somebody looks."""
 AT_ONCE = 4
@@ -37,16 +37,19 @@ class Past:
         self._bus = bus
         self._view = view
         self._hub = hub
+        self._ready_s = asyncio.get_running_loop().time() + SETTLED_S
         self._asked: dict[str, tuple[int, float]] = {}
         self._at_once = asyncio.Semaphore(AT_ONCE)
 
     def wanted(self, now_s: float) -> list[str]:
         """Stations that are looked at whose past has to be asked for now; each is told once."""
+        if now_s < self._ready_s:
+            return []
         return [name for name in self._hub.topics if self._is_wanted(name, now_s)]
 
     def _is_wanted(self, name: str, now_s: float) -> bool:
         station = self._view.stations.get(name)
-        if station is None or station.sample is None or now_s - station.first_s < SETTLED_S:
+        if station is None or station.sample is None:
             return False
         first_ns, again_s = self._asked.get(name, (None, 0.0))
         if first_ns == station.first_ns and now_s < again_s:

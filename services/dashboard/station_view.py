@@ -46,7 +46,6 @@ class StationView:
         self.index = index
         self.sample: Sample | None = None
         self.first_ns = 0
-        self.first_s = 0.0
         self.seen_s = 0.0
         self.is_stale = True
         self.lost = 0
@@ -82,9 +81,9 @@ class StationView:
             self._rows.clear()
             self._fresh_samples.clear()
             self._begins = True
-            self.first_ns, self.first_s = sample.time, now_s
+            self.first_ns = sample.time
         elif self.sample is None:
-            self.first_ns, self.first_s = sample.time, now_s
+            self.first_ns = sample.time
         elif sample.seq > self.sample.seq + 1:
             self.lost += sample.seq - self.sample.seq - 1
         self._late = 0
