@@ -213,3 +213,9 @@ def test_nothing_sticks_out_from_phone_to_wall(site, open_page, screenshots, wid
     expect(page.locator(".well .big")).to_contain_text("m", timeout=SLOW_MS)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.screenshot(path=screenshots / f"station-{width}.png")
+
+
+def test_on_a_phone_an_alarm_has_its_buttons_in_sight(site, open_page) -> None:
+    page = open_page(f"{site.url}/alarms", viewport={"width": 390, "height": 844})
+    row = page.get_by_role("row").filter(has_text="level high")
+    expect(row.get_by_role("button", name="shelve")).to_be_in_viewport(ratio=1.0, timeout=SLOW_MS)

@@ -261,7 +261,7 @@ def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_pa
     assert "sandbox" in page.headers["content-security-policy"]
     for name in ("../secret.html", "%2e%2e/secret.html", "link.html", "gap", "none.html"):
         assert get(f"/reports/{name}", desk).status_code == 404, name
-    assert get("/api/reports").json()["reason"] == "dashboard.reports names no folder"
+    assert get("/api/reports").json()["reason"] == "the setting dashboard.reports names no folder of HTML reports"
 
 
 def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_server() -> None:
