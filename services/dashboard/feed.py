@@ -9,6 +9,7 @@ from wetwell.protocols.keys import alarm_key, alive_key, model_key, sample_key, 
 from wetwell.protocols.link import Bus, Subscription
 from wetwell.services.daemon import ticks
 from wetwell.services.dashboard.hub import Hub
+from wetwell.services.dashboard.past import Past
 from wetwell.services.dashboard.site_view import SiteView
 
 log = logging.getLogger(__name__)
@@ -35,6 +36,7 @@ class Feed:
         self._view = view
         self._hub = hub
         self._bus = bus
+        self._past = Past(bus, view, hub)
         self._samples = bus.subscribe(sample_key("*"), capacity=100_000, recover=False)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
             (self._samples, view.take_sample),
@@ -53,14 +55,16 @@ class Feed:
             for subscription, take in self._messages:
                 group.create_task(_take(subscription, take))
             group.create_task(_take(self._presence, self._view.take_presence))
-            group.create_task(self._send())
+            group.create_task(self._send(group))
 
-    async def _send(self) -> None:
+    async def _send(self, group: asyncio.TaskGroup) -> None:
         number = 0
         loop = asyncio.get_running_loop()
         async for _ in ticks(FRAME_S, asyncio.Event()):
             for name, frame in self._view.advance(loop.time()).items():
                 self._hub.send(name, frame)
+            for name in self._past.wanted(loop.time()):
+                group.create_task(self._past.fill(name), name=f"dashboard.past.{name}")
             number += 1
             if number % FRAMES_A_SECOND == 0:
                 frame_or_none = self._view.site_frame()

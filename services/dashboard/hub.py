@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 QUEUE = 16
 """Events that may wait for a browser."""
 RESYNC = b"retry: 1000\nevent: resync\ndata: {}\n\n"
-"""Tells a browser to ask for the whole state: at the beginning, and when it has missed something."""
+"""Tells a browser to ask for the whole state: at the beginning, and when it lacks something."""
 KEEP_ALIVE = b": \n\n"
 KEEP_ALIVE_S = 15.0
 
@@ -69,6 +69,11 @@ class Hub:
         """How many browsers listen."""
         return sum(len(clients) for clients in self._clients.values())
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """What somebody looks at."""
+        return tuple(self._clients)
+
     async def listen(self, topic: str) -> AsyncIterator[bytes]:
         """Events of a topic for one browser, until it goes or the hub closes."""
         client = Client()
@@ -90,6 +95,11 @@ class Hub:
             encoded = event(data)
             for client in clients:
                 client.put(encoded)
+
+    def resync(self, topic: str) -> None:
+        """Let all that look at a topic ask for its whole state."""
+        for client in self._clients.get(topic, ()):
+            client.put(RESYNC)
 
     def close(self) -> None:
         """End all streams."""

@@ -13,7 +13,7 @@ DEEPEST = 3
 def report_names(folder: Path | None) -> dict[str, object]:
     """Pages in a folder, newest first, or why there are none."""
     if folder is None:
-        return {"reports": [], "reason": "dashboard.reports names no folder"}
+        return {"reports": [], "reason": "the setting dashboard.reports names no folder of HTML reports"}
     if not folder.is_dir():
         return {"reports": [], "reason": f"dashboard.reports: there is no folder '{folder}'"}
     found = [

@@ -2,6 +2,7 @@
 
 import math
 
+from wetwell.protocols.history_messages import History
 from wetwell.protocols.messages import Number, Sample
 
 NS_PER_MS = 1_000_000
@@ -32,6 +33,23 @@ def sample_row(sample: Sample) -> str:
     for pump in sample.pumps:
         values += (number(pump.frequency_hz), number(pump.flow_m3h), number(pump.head_m), number(pump.power_kw))
     return f"[{sample.time // NS_PER_MS},{','.join(values)}]"
+
+
+def past_rows(history: History) -> list[str]:
+    """Rows as of `sample_row` from what the historian tells of samples; `null` where it has no such column.
+
+    Examples
+    --------
+    >>> columns = {"level_m": (1.2,), "pump1_frequency_hz": (50.0,), "pump1_flow_m3h": (201.23,)}
+    >>> past_rows(History(station="alpha", kind="samples", time=(1_000_000_000,), columns=columns))
+    ['[1000,1.2,null,50,201.2,null,null]']
+    """
+    pumps = sum(name.endswith("_frequency_hz") for name in history.columns)
+    quantities = ("frequency_hz", "flow_m3h", "head_m", "power_kw")
+    names = ["level_m", "inflow_m3h", *(f"pump{pump}_{name}" for pump in range(1, pumps + 1) for name in quantities)]
+    columns = [history.columns.get(name, (None,) * len(history.time)) for name in names]
+    rows = zip(history.time, *columns, strict=False)  # a foreign answer may be ragged
+    return [f"[{time_ns // NS_PER_MS},{','.join(map(number, values))}]" for time_ns, *values in rows]
 
 
 def live_figures(sample: Sample) -> str:

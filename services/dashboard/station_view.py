@@ -45,6 +45,7 @@ class StationView:
         self.name = name
         self.index = index
         self.sample: Sample | None = None
+        self.first_ns = 0
         self.seen_s = 0.0
         self.is_stale = True
         self.lost = 0
@@ -80,11 +81,26 @@ class StationView:
             self._rows.clear()
             self._fresh_samples.clear()
             self._begins = True
-        elif self.sample is not None and sample.seq > self.sample.seq + 1:
+            self.first_ns = sample.time
+        elif self.sample is None:
+            self.first_ns = sample.time
+        elif sample.seq > self.sample.seq + 1:
             self.lost += sample.seq - self.sample.seq - 1
         self._late = 0
         self.sample = sample
         self._fresh_samples.append(sample)
+        return True
+
+    @property
+    def room(self) -> int:
+        """How many samples fit before those that were heard."""
+        return (self._rows.maxlen or 0) - len(self._rows)
+
+    def take_past(self, rows: list[str], first_ns: int) -> bool:
+        """Take rows from before `first_ns` as far as there is room; whether that still is the first sample."""
+        if first_ns != self.first_ns:
+            return False
+        self._rows.extendleft(reversed(rows[max(0, len(rows) - self.room) :]))
         return True
 
     def take_verdict(self, verdict: Verdict) -> None:

@@ -1,29 +1,34 @@
-"""A site in processes of its own, with a stand-in for historian and alarms, and a browser that looks at it."""
+"""A site in processes of its own, and a browser that looks at it."""
 
-import asyncio
 import contextlib
+import json
 import os
 import socket
 import subprocess
 import sys
-import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
 import pytest
 from playwright.sync_api import sync_playwright
 
-from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
-from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.keys import alarm_act_key, alarm_key, history_key
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import connect_client
-
 CHROMIUM = Path("/usr/bin/chromium")
 SCREENSHOTS = Path(__file__).parents[2] / "build" / "screenshots"
 DEADLINE_S = 30.0
+SEE_CHARTS = """
+let original = null;
+window.charts = [];
+Object.defineProperty(window, "uPlot", {
+  get: () => original,
+  set(made) {
+    const construct = (kind, given) => window.charts[window.charts.push(new kind(...given)) - 1];
+    original = new Proxy(made, { construct });
+  },
+});
+"""
+"""Puts all charts of a page into `charts`, in the order in which they were made."""
 SCENARIO = """
 name = "quick-blockage"
 clock_speed = 2400
@@ -87,7 +92,13 @@ class Site:
 
     endpoint: str
     port: int
-    acts: list[AlarmAct] = field(default_factory=list)
+    folder: Path
+
+    @property
+    def acts(self):
+        """Acts that the alarms daemon has written into its audit."""
+        lines = (self.folder / "alarms" / "alarm-audit.jsonl").read_text(encoding="utf-8").splitlines()
+        return [json.loads(line) for line in lines]
 
     @property
     def url(self):
@@ -100,74 +111,24 @@ class Site:
             yield process
 
 
-ALARM = Alarm(
-    id="station.high_level",
-    time=0,
-    station="gamma",
-    priority="urgent",
-    state="unacknowledged",
-    is_active=True,
-    text="gamma: high level",
-    advice="look at the inflow",
-    raised=0,
-)
-
-
-async def stand_in(site, is_up, stop):
-    """What historian and alarm service would say of the station gamma."""
-    with await connect_client(site.endpoint) as bus:
-        alarms = bus.publisher(alarm_key("gamma", ALARM.id))
-        acts, questions = bus.answer(alarm_act_key("gamma")), bus.answer(history_key("*"))
-        alarms.put(ALARM.encode())
-        is_up.set()
-
-        async def act():
-            while True:
-                for request in await acts.receive():
-                    asked = AlarmAct.decode(request.payload)
-                    site.acts.append(asked)
-                    after = ALARM.model_copy(update={"state": "acknowledged", "by": asked.by})
-                    alarms.put(after.encode())
-                    request.reply(AlarmAnswer(id=asked.id, is_done=True, alarm=after).encode())
-
-        async def remember():
-            while True:
-                for request in await questions.receive():
-                    request.reply(history_of(HistoryQuery.decode(request.payload)).encode())
-
-        async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(act()), group.create_task(remember())]
-            await asyncio.to_thread(stop.wait)
-            for task in tasks:
-                task.cancel()
-
-
-def history_of(query):
-    hours = range(max(query.start // (3600 * NS_PER_S) + 1, 0), query.end // (3600 * NS_PER_S) + 1)
-    times = tuple(hour * 3600 * NS_PER_S for hour in hours)[-48:]
-    values = tuple(float(place % 7) for place in range(len(times)))
-    names = ("level_m", "energy_kwh", "volume_m3", "run_h", "starts", "pump1_energy_kwh", "pump1_starts")
-    return History(station="x", kind=query.kind, time=times, columns=dict.fromkeys(names, values))
-
-
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """Router, detector, a simulated station with a blockage of pump 2, and the stand-in; without the dashboard."""
-    scenario = tmp_path_factory.mktemp("site") / "quick.toml"
+    """All daemons of a site, and a simulated station with a blockage of pump 2; its level is always too high."""
+    folder = tmp_path_factory.mktemp("site")
+    scenario = folder / "quick.toml"
     scenario.write_text(SCENARIO)
-    place = Site(f"tcp/127.0.0.1:{free_port()}", free_port())
-    is_up, stop = threading.Event(), threading.Event()
-    thread = threading.Thread(target=lambda: asyncio.run(stand_in(place, is_up, stop)))
+    place = Site(f"tcp/127.0.0.1:{free_port()}", free_port(), folder)
     common = ["--zenoh", place.endpoint]
-    with wetwell("router", *common), wetwell("detector", *common), place.dashboard(place.port):
-        thread.start()
-        try:
-            assert is_up.wait(DEADLINE_S)
-            with wetwell("simulator", "--scenario", str(scenario), *common):
-                yield place
-        finally:
-            stop.set()
-            thread.join()
+    of_alarms = {"WETWELL_ALARMS__STATE_DIR": str(folder / "alarms"), "WETWELL_ALARMS__HIGH_LEVEL_M": "0.1"}
+    with (
+        wetwell("router", *common),
+        wetwell("historian", *common, "--data", str(folder / "history")),
+        wetwell("alarms", *common, **of_alarms),
+        wetwell("detector", *common),
+        place.dashboard(place.port),
+        wetwell("simulator", "--scenario", str(scenario), *common),
+    ):
+        yield place
 
 
 @pytest.fixture(scope="module")
@@ -195,6 +156,7 @@ def open_page(browser):
         context = browser.new_context(**{"viewport": {"width": 1600, "height": 1000}} | options)
         contexts.append(context)
         context.route("**/*", guard)
+        context.add_init_script(SEE_CHARTS)
         page = context.new_page()
         if not may_lose_its_server:
             page.on(

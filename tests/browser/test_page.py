@@ -5,14 +5,23 @@ import re
 import signal
 from importlib.resources import files
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from playwright.sync_api import expect
 
+from wetwell.protocols.recording import read_recording
+from wetwell.protocols.stamps import from_iso
 from wetwell.services.tokens import new_token
 
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 SLOW_MS = 30_000
+MANY_IN_THE_FIRST_CHART = """async () => {
+  const end = Date.now() + 20000;
+  const isThere = () => charts[0].data[0].length > 1000;
+  while (!isThere() && Date.now() < end) await new Promise((go) => setTimeout(go, 50));
+  return isThere();
+}"""
 
 
 def test_the_overview_lives_and_leads_to_the_station(site, open_page, screenshots) -> None:
@@ -75,14 +84,14 @@ def test_a_blockage_turns_the_right_pump_red_and_tells_why(site, open_page, scre
 
 def test_acknowledging_by_name_works_and_survives_a_reload(site, open_page, screenshots) -> None:
     page = open_page(f"{site.url}/alarms")
-    row = page.get_by_role("row").filter(has_text="gamma: high level")
+    row = page.get_by_role("row").filter(has_text="level high")
     expect(row).to_contain_text("unacknowledged", timeout=SLOW_MS)
     page.screenshot(path=screenshots / "alarms.png")
     row.get_by_role("button", name="acknowledge").click()
     page.get_by_label("Your name").fill("Ada")
     page.get_by_role("dialog").get_by_role("button", name="acknowledge").click()
     expect(row).to_contain_text("acknowledged by Ada", timeout=SLOW_MS)
-    assert [(act.alarm, act.act, act.by) for act in site.acts] == [("station.high_level", "acknowledge", "Ada")]
+    assert [(act["alarm"], act["act"], act["by"]) for act in site.acts] == [("level_high", "acknowledge", "Ada")]
     page.reload()
     expect(row).to_contain_text("acknowledged by Ada", timeout=SLOW_MS)
     row.get_by_role("button", name="shelve").click()
@@ -107,6 +116,36 @@ def test_the_address_holds_the_view(site, open_page) -> None:
     assert "recording.csv" in page.get_by_role("link", name="download as recording").get_attribute("href")
 
 
+def test_the_historian_fills_the_chart_of_the_past_and_the_download(site, open_page, tmp_path) -> None:
+    page = open_page(f"{site.url}/station/alpha")
+    expect(page.locator("#station-time")).to_have_text(re.compile(" (?!00).*UTC"), timeout=SLOW_MS)
+    page.get_by_role("button", name="24h").click()
+    note = page.get_by_text("Drag to zoom")
+    expect(note).to_have_text(re.compile(r"\d{2,} points"), timeout=SLOW_MS)
+    whole = note.inner_text()
+    over = page.locator(".is-history .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.5 * box["height"], steps=5)
+    page.mouse.up()
+    expect(page).to_have_url(re.compile("from=.*&to="))
+    expect(note).not_to_have_text(whole)
+    expect(note).to_have_text(re.compile(r"\d{2,} points"))
+    page.get_by_label("Quantity").select_option("flow_m3h")
+    expect(page.locator(".is-history .u-legend")).to_contain_text("pump 3")
+    with page.expect_download() as download:
+        page.get_by_role("link", name="download as recording").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    recording = read_recording(path)
+    span = parse_qs(urlsplit(page.url).query)
+    assert from_iso(span["from"][0]) <= recording.time_ns[0] < recording.time_ns[-1] < from_iso(span["to"][0])
+    assert len(recording.time_ns) > 1000
+    assert recording.pumps == 3
+
+
 def test_the_page_comes_back_when_the_server_does(site, open_page, unused_port) -> None:
     port = unused_port()
     with site.dashboard(port) as server:
@@ -120,6 +159,8 @@ def test_the_page_comes_back_when_the_server_does(site, open_page, unused_port) 
         told = page.locator("#station-time")
         before = told.inner_text()
         expect(told).not_to_have_text(before, timeout=SLOW_MS)
+        # At most 32 samples a second come live: so many are those that the historian has kept.
+        assert page.evaluate(MANY_IN_THE_FIRST_CHART)
 
 
 def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_port, tmp_path) -> None:
@@ -134,7 +175,7 @@ def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_po
                 expect(page.get_by_role("alert")).to_have_text("This token is not known.")
         expect(page.locator("#link")).to_have_text("live", timeout=SLOW_MS)
         page.reload()
-        row = page.get_by_role("row").filter(has_text="gamma: high level")
+        row = page.get_by_role("row").filter(has_text="level high")
         row.get_by_role("button", name="shelve").click()
         expect(page.get_by_label("Your name")).to_have_value("ada")
         expect(page.get_by_label("Your name")).not_to_be_editable()
@@ -172,3 +213,9 @@ def test_nothing_sticks_out_from_phone_to_wall(site, open_page, screenshots, wid
     expect(page.locator(".well .big")).to_contain_text("m", timeout=SLOW_MS)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.screenshot(path=screenshots / f"station-{width}.png")
+
+
+def test_on_a_phone_an_alarm_has_its_buttons_in_sight(site, open_page) -> None:
+    page = open_page(f"{site.url}/alarms", viewport={"width": 390, "height": 844})
+    row = page.get_by_role("row").filter(has_text="level high")
+    expect(row.get_by_role("button", name="shelve")).to_be_in_viewport(ratio=1.0, timeout=SLOW_MS)

@@ -14,12 +14,12 @@ from wetwell.protocols.keys import alarm_act_key, history_key, sample_key
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.recording import read_recording
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.dashboard.app import Desk, dashboard_app
 from wetwell.services.dashboard.daemon import serve_dashboard
 from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.hub import Hub
-from wetwell.services.dashboard.site_view import SiteView
+from wetwell.services.dashboard.site_view import ROWS, SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
 from wetwell.services.settings import DashboardSettings, Settings
 from wetwell.services.tokens import new_token
@@ -261,7 +261,7 @@ def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_pa
     assert "sandbox" in page.headers["content-security-policy"]
     for name in ("../secret.html", "%2e%2e/secret.html", "link.html", "gap", "none.html"):
         assert get(f"/reports/{name}", desk).status_code == 404, name
-    assert get("/api/reports").json()["reason"] == "dashboard.reports names no folder"
+    assert get("/api/reports").json()["reason"] == "the setting dashboard.reports names no folder of HTML reports"
 
 
 def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_server() -> None:
@@ -293,6 +293,108 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
     events, state = asyncio.run(run())
     assert [row[0] for event in events for row in event["rows"]] == [1000]
     assert state["rows"] == events[0]["rows"]
+
+
+def past_of(payload):
+    """A historian that has kept a sample each second since 1970."""
+    query = HistoryQuery.decode(payload)
+    seconds = range(max(0, -(-query.start // NS_PER_S)), -(-query.end // NS_PER_S))
+    assert query.kind == "samples"
+    assert len(seconds) <= query.points
+    columns = {"level_m": (2.5,) * len(seconds), "pump1_frequency_hz": (50.0,) * len(seconds)}
+    times = tuple(second * NS_PER_S for second in seconds)
+    return History(station="alpha", kind="samples", time=times, columns=columns).encode()
+
+
+@contextlib.asynccontextmanager
+async def looked_at(bus, monkeypatch):
+    """A desk that hears station alpha since second 2000 and beta, with a page that is open on alpha."""
+    monkeypatch.setattr("wetwell.services.dashboard.past.SETTLED_S", 0.0)
+    desk = desk_with(bus)
+    publishers = {name: bus.publisher(sample_key(name)) for name in ("alpha", "beta")}
+    events = desk.hub.listen("alpha")
+    feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+    assert b"resync" in await anext(events)
+    for name, publisher in publishers.items():
+        publisher.put(a_sample(2000, name).encode())
+    try:
+        yield desk, publishers["alpha"], events
+    finally:
+        feeding.cancel()
+
+
+def rows_of(desk, station="alpha"):
+    return json.loads(desk.view.station_state(station))["rows"]
+
+
+def test_charts_of_a_station_that_is_looked_at_begin_with_what_the_historian_has(monkeypatch) -> None:
+    async def run():
+        bus = MemoryBus()
+        questions = []
+
+        def answer(payload):
+            questions.append(payload)
+            return past_of(payload)
+
+        async with answering(bus, history_key("*"), answer), looked_at(bus, monkeypatch) as (desk, alpha, events):
+            async for event in events:
+                if b"resync" in event:  # open pages are told to ask for the whole state
+                    break
+            alpha.put(a_sample(2001).encode())
+            await until(lambda: rows_of(desk)[-1][0] == 2_001_000)
+            return rows_of(desk), rows_of(desk, "beta"), questions
+
+    rows, unseen, questions = asyncio.run(run())
+    assert len(rows) == ROWS[0][1]
+    assert [row[0] for row in rows] == [second * 1000 for second in range(2002 - len(rows), 2002)]
+    assert rows[-3][:4] == [1_999_000, 2.5, None, 50]
+    assert len(unseen) == 1, "nobody looks at beta"
+    assert len(questions) == 1
+
+
+@pytest.mark.parametrize(
+    "answer", [None, b"{}", History(station="alpha", kind="samples", error="disk full").encode()]
+)
+def test_charts_begin_with_what_comes_where_no_historian_tells_more_and_ask_again(monkeypatch, answer) -> None:
+    monkeypatch.setattr("wetwell.services.dashboard.past.AGAIN_S", 0.3)
+
+    async def run():
+        bus = MemoryBus()
+        asked = []
+
+        def refuse(payload):
+            asked.append(payload)
+            return answer
+
+        async with contextlib.AsyncExitStack() as stack:
+            if answer is not None:
+                await stack.enter_async_context(answering(bus, history_key("*"), refuse))
+            desk, alpha, _ = await stack.enter_async_context(looked_at(bus, monkeypatch))
+            await until(lambda: len(rows_of(desk)) == 1 and (answer is None or asked))
+            alpha.put(a_sample(2001).encode())
+            await until(lambda: len(rows_of(desk)) == 2)
+            async with answering(bus, history_key("*"), past_of) if answer is None else contextlib.nullcontext():
+                await until(lambda: len(asked) == 2 or len(rows_of(desk)) > 2)
+            return rows_of(desk)
+
+    rows = asyncio.run(run())
+    assert len(rows) == (ROWS[0][1] if answer is None else 2)
+
+
+def test_a_station_in_a_time_that_nobody_keeps_harms_nothing(monkeypatch) -> None:
+    async def run():
+        bus = MemoryBus()
+        async with looked_at(bus, monkeypatch) as (desk, alpha, _):
+            early = a_sample(0, "gamma").model_copy(update={"time": -MAX_STAMP_NS})
+            bus.publisher(sample_key("gamma")).put(early.encode())
+            gamma = desk.hub.listen("gamma")
+            await anext(gamma)
+            assert b'"rows"' in await anext(gamma)
+            alpha.put(a_sample(2001).encode())
+            await until(lambda: len(rows_of(desk)) == 2)  # the feed goes on
+            return rows_of(desk, "gamma")
+
+    assert len(asyncio.run(run())) == 1
 
 
 async def until(is_so):

@@ -5,10 +5,11 @@ import json
 import pytest
 
 from wetwell.protocols.alarm_messages import Alarm
+from wetwell.protocols.history_messages import History
 from wetwell.protocols.link import Presence
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
 from wetwell.protocols.stamps import NS_PER_S
-from wetwell.services.dashboard.rows import sample_row, thinned
+from wetwell.services.dashboard.rows import past_rows, sample_row, thinned
 from wetwell.services.dashboard.site_view import ROWS, SiteView
 from wetwell.services.dashboard.station_view import LATE_SAMPLES, ROWS_A_FRAME
 
@@ -103,6 +104,50 @@ def test_samples_that_come_again_are_dropped_and_a_source_that_begins_anew_is_fo
     frame = frame_of(view, 0.5)
     assert frame["begins"]
     assert [row[0] for row in frame["rows"]] == [117_000, 118_000, 119_000]
+
+
+def test_the_past_goes_before_what_was_heard_as_far_as_there_is_room(view) -> None:
+    for second in (500, 501):
+        view.take_sample(sample(second).encode())
+    view.advance(0.25)
+    station = view.stations["alpha"]
+    station.kept_rows = 5
+    assert station.room == 3
+    assert station.take_past([f"[{second}]" for second in range(10)], station.first_ns)
+    rows = json.loads(view.station_state("alpha"))["rows"]
+    assert [row[0] for row in rows] == [7, 8, 9, 500_000, 501_000]
+    assert station.take_past(["[6]"], station.first_ns)
+    assert json.loads(view.station_state("alpha"))["rows"] == rows
+
+
+def test_a_past_that_comes_after_the_source_has_begun_anew_is_left_out(view) -> None:
+    view.take_sample(sample(500).encode())
+    station = view.stations["alpha"]
+    first_ns = station.first_ns
+    for second in range(LATE_SAMPLES):
+        view.take_sample(sample(second).encode())
+    view.advance(0.25)
+    assert station.first_ns == (LATE_SAMPLES - 1) * NS_PER_S
+    assert not station.take_past(["[0]"], first_ns)
+    assert len(json.loads(view.station_state("alpha"))["rows"]) == 1
+
+
+def test_rows_of_the_past_are_like_those_of_samples() -> None:
+    heard = sample(7)
+    pumps = {
+        f"pump{place}_{name}": (getattr(pump, name),)
+        for place, pump in enumerate(heard.pumps, start=1)
+        for name in ("frequency_hz", "flow_m3h", "head_m", "power_kw")
+    }
+    told = History(station="alpha", kind="samples", time=(heard.time,), columns={"level_m": (1.0,)} | pumps)
+    assert past_rows(told) == [sample_row(heard)]
+
+
+def test_a_ragged_answer_of_a_stranger_harms_nothing() -> None:
+    told = History(
+        station="a", kind="samples", time=(0, 1, 2), columns={"level_m": (1.0, None), "x_frequency_hz": ()}
+    )
+    assert [json.loads(row)[1] for row in past_rows(told)] == [1.0, None]
 
 
 def test_a_verdict_that_comes_again_counts_once(view) -> None:

@@ -72,9 +72,9 @@ function cells(alarm, withStation) {
   return [
     html("td", {}, html("span", { class: `state is-${kind}` }, icon(SHAPES[alarm.priority], 14), html("span", {}, alarm.priority))),
     withStation ? html("td", {}, html("a", { href: `/station/${encodeURIComponent(alarm.station)}${alarm.pump > 1 ? `?pump=${alarm.pump}` : ""}` }, alarm.station)) : null,
-    html("td", {}, html("span", { class: "strong" }, alarm.text), alarm.advice ? html("span", { class: "note" }, ` ${alarm.advice}`) : null),
+    html("td", { class: "text" }, html("span", { class: "strong" }, alarm.text), alarm.advice ? html("span", { class: "note" }, ` ${alarm.advice}`) : null),
     html("td", {}, `${words(alarm.state)}${by}${until}`),
     html("td", {}, moment(millis(alarm.raised))),
-    html("td", {}, html("span", { class: "buttons" }, ...buttons), failed),
+    html("td", { class: "acts" }, html("span", { class: "buttons" }, ...buttons), failed),
   ].filter((cell) => cell);
 }

@@ -6,6 +6,7 @@ import { figure, moment } from "./format.js";
 import { colour, onTheme } from "./theme.js";
 
 export const PENS = ["pen1", "pen2", "pen3", "pen4"];
+const DAY_S = 86_400;
 const DASHES = [undefined, [7, 3], [2, 2], [9, 3, 2, 3]];
 
 /** The pen of a pump: a colour and a dash each, so that none rests on colour alone. */
@@ -14,7 +15,7 @@ export const pen = (number) => ({ pen: PENS[(number - 1) % PENS.length], dash: D
 /**
  * @param {string} label what is drawn, for those who do not see it
  * @param {() => object[]} series each {label, pen, dash, width, fill, band, paths, points, digits}; band: place of the other edge
- * @param {object} options {height, unit, sync, legend, onZoom, limits, range, splits, scale}
+ * @param {object} options {height, unit, sync, legend, onZoom, limits, range, splits, scale, ofDays}; ofDays: marks at days only
  */
 export function chart(label, series, options = {}) {
   const element = html("div", { class: "chart", role: "img", "aria-label": label });
@@ -37,7 +38,7 @@ export function chart(label, series, options = {}) {
         cursor: { sync: options.sync ? { key: options.sync } : undefined, drag: { x: Boolean(options.onZoom), y: false } },
         scales: { y: { ...options.scale, range: options.range ?? ((_, low, high) => spread(low, high)) } },
         axes: [
-          { ...axis, space: 75, size: 30, values: (_, times, __, ___, step) => times.map((time) => moment(time * 1000).slice(...(step >= 86_400 ? [5, 10] : step < 60 ? [11, 19] : [11, 16]))) },
+          { ...axis, space: 75, size: 30, incrs: options.ofDays && [1, 2, 7, 14].map((days) => days * DAY_S), values: (_, times, __, ___, step) => times.map((time) => moment(time * 1000).slice(...(step >= DAY_S ? [5, 10] : step < 60 ? [11, 19] : [11, 16]))) },
           { ...axis, size: 46, splits: options.splits, filter: options.splits && ((_, splits) => splits), label: options.unit, labelSize: options.unit ? 16 : 0, labelFont: "11px system-ui, sans-serif" },
         ],
         series: [
@@ -108,11 +109,16 @@ function drawLimits(plot, limits) {
     const y = plot.valToPos(value, "y", true);
     if (!(y > bbox.top && y < bbox.top + bbox.height)) continue;
     ctx.strokeStyle = ctx.fillStyle = colour("steel");
+    ctx.lineWidth = devicePixelRatio;
     ctx.setLineDash([4 * devicePixelRatio, 4 * devicePixelRatio]);
     ctx.beginPath();
     ctx.moveTo(bbox.left, y);
     ctx.lineTo(bbox.left + bbox.width, y);
     ctx.stroke();
+    ctx.setLineDash([]);
+    ctx.lineWidth = 4 * devicePixelRatio;
+    ctx.strokeStyle = colour("panel");
+    ctx.strokeText(word, bbox.left + bbox.width - 3, y - 3 * devicePixelRatio);
     ctx.fillText(word, bbox.left + bbox.width - 3, y - 3 * devicePixelRatio);
   }
   ctx.restore();

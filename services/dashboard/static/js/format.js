@@ -17,6 +17,17 @@ export const millis = (stamp) => (stamp ? Date.parse(stamp) : NaN);
 
 export const words = (name) => name.replaceAll("_", " ");
 
+/** A health figure in words: `live_bytes` in MB, `commit_age_s` in s, min, h or days, `is_failing` as yes or no. */
+export function measure(name, value) {
+  if (name.startsWith("is_")) return `${words(name)} ${value ? "yes" : "no"}`;
+  if (name.endsWith("_bytes")) return `${words(name.slice(0, -6))} ${short(value / 1e6)} MB`;
+  if (!name.endsWith("_s")) return `${words(name)} ${Number.isInteger(value) ? value : short(value)}`;
+  const [size, unit] = [[86_400, "days"], [3600, "h"], [60, "min"], [1, "s"]].find(([each]) => Math.abs(value) >= 2 * each) ?? [1, "s"];
+  return `${words(name.slice(0, -2))} ${short(value / size)} ${unit}`;
+}
+
+const short = (value) => Number(value.toPrecision(3));
+
 export function ago(seconds) {
   if (!Number.isFinite(seconds)) return NONE;
   if (seconds < 90) return `${Math.round(seconds)} s ago`;

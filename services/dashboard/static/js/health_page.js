@@ -1,7 +1,7 @@
 // Services of the site: who is there, and with which figures.
 
 import { html, say } from "./dom.js";
-import { ago, words } from "./format.js";
+import { ago, measure, words } from "./format.js";
 
 const AGAIN_MS = 2000;
 
@@ -25,7 +25,7 @@ export function healthPage(main, showLink) {
   }
 
   function line({ station, service, is_alive: isAlive, status, age_s: age }) {
-    const figures = Object.entries(status?.figures ?? {}).map(([name, value]) => `${words(name)} ${Number(value.toPrecision(4))}`);
+    const figures = Object.entries(status?.figures ?? {}).map(([name, value]) => measure(name, value));
     return html("tr", {}, html("td", {}, station === "_site" ? "all" : station), html("th", { scope: "row" }, words(service)),
       html("td", { class: isAlive ? "" : "is-gone" }, isAlive ? "yes" : "gone"), html("td", {}, ago(age)), html("td", { class: "note" }, figures.join(", ")));
   }

@@ -10,6 +10,8 @@ const SPANS = { "1h": 1, "6h": 6, "24h": 24, "7d": 168, "30d": 720 };
 const DEFAULT = "24h";
 const HOUR_MS = 3_600_000;
 const POINTS = 700;
+const STEPS = 50;
+const LEAST_MS = 10_000;
 const QUANTITIES = { level_m: "Level, m", flow_m3h: "Flow, m³/h", head_m: "Head, m", frequency_hz: "Frequency, Hz", power_kw: "Power, kW", inflow_m3h: "Inflow, m³/h" };
 const OF_STATION = ["level_m", "inflow_m3h"];
 
@@ -18,6 +20,7 @@ export function historyPanel(station) {
   let span = parseSpan();
   let past = null;
   let asked = "";
+  let loaded = { at: 0, end: 0 };
 
   const choice = html("select", { "aria-label": "Quantity" }, ...Object.entries(QUANTITIES).map(([value, word]) => html("option", { value, selected: value === quantity }, word)));
   choice.addEventListener("change", () => {
@@ -73,6 +76,7 @@ export function historyPanel(station) {
   async function load() {
     const [from, to] = limits();
     asked = `${from} ${to}`;
+    loaded = { at: performance.now(), end: to };
     const mine = asked;
     for (const button of buttons) mark(button, "aria-pressed", button.dataset.span === span.name);
     const text = new URLSearchParams({ start: new Date(from).toISOString(), end: new Date(to).toISOString() });
@@ -109,10 +113,16 @@ export function historyPanel(station) {
     plot.update([past.times.map((time) => time / 1000), ...values]);
   }
 
+  /** Whether a span that ends with the last sample has moved on by a part of itself. */
+  function isOld() {
+    if (!span?.hours || element.querySelector(".u-select")?.offsetWidth) return false;
+    return Math.abs(limits()[1] - loaded.end) > (span.hours * HOUR_MS) / STEPS && performance.now() - loaded.at > LEAST_MS;
+  }
+
   return {
     element,
     update(changed) {
-      if (span && changed.has("begin")) load();
+      if (span && (changed.has("begin") || isOld())) load();
     },
     end() {
       sight.disconnect();

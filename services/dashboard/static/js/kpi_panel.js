@@ -15,7 +15,7 @@ export function kpiPanel(station) {
   const head = html("tr", {}, ...["", "Starts", "Run hours", "Volume, m³", "Energy, kWh", "kWh/m³"].map((word, place) => html("th", { scope: "col", class: place ? "number" : "" }, word)));
   const table = html("table", { hidden: true }, html("caption", { class: "unseen" }, "Starts, run hours, volume and energy of each pump"), html("thead", {}, head), body);
   const daily = chart("Energy of each day", () => [{ label: "kWh a day", pen: "steel", fill: "soft", paths: uPlot.paths.bars({ size: [0.7, 60] }) }],
-    { unit: "kWh a day", height: 110, range: (_, low, high) => [0, (high || 1) * 1.1] });
+    { unit: "kWh a day", height: 110, ofDays: true, range: (_, low, high) => [0, (high || 1) * 1.1] });
   const total = chart("Cumulative energy", () => [{ label: "kWh", pen: "pen1", width: 2 }], { unit: "kWh, summed", height: 110 });
   const charts = html("div", { hidden: true, class: "pair" }, daily.element, total.element);
   const element = panel("Starts and energy", note, html("div", { class: "scroll" }, table), charts);
@@ -47,7 +47,9 @@ export function kpiPanel(station) {
       const day = Math.floor(time / DAY_MS) * DAY_MS;
       days.set(day, (days.get(day) ?? 0) + (columns.energy_kwh?.[place] ?? 0));
     });
-    daily.update([[...days.keys()].map((day) => day / 1000 + DAY_MS / 2000), [...days.values()]]);
+    const noons = [...days.keys()].map((day) => (day + DAY_MS / 2) / 1000);
+    const room = DAY_MS / 1000; // a day without a bar on both sides, so that none is cut
+    daily.update([[noons[0] - room, ...noons, noons.at(-1) + room], [null, ...days.values(), null]]);
     let summed = 0;
     total.update([times.map((time) => time / 1000), times.map((_, place) => (summed += columns.energy_kwh?.[place] ?? 0))]);
   }

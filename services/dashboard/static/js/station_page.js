@@ -27,7 +27,7 @@ export function stationPage(name, main, showLink) {
   const choice = html("div", { class: "buttons", role: "group", "aria-label": "Pump" });
   const head = html("div", { class: "tools" },
     html("h1", {}, name), chip, time, choice);
-  const panels = [wellPanel, planePanel, livePanel, alarmPanel, verdictPanel, residualPanel, kpiPanel, historyPanel, qualityPanel]
+  const panels = [wellPanel, planePanel, alarmPanel, livePanel, verdictPanel, residualPanel, kpiPanel, historyPanel, qualityPanel]
     .map((make) => make(station, () => pump, choose));
   main.append(head, html("div", { class: "station" }, ...panels.map((each) => each.element)));
 
