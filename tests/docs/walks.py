@@ -128,5 +128,10 @@ wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz"""
             "BUILDAH_ISOLATION": "needs a container engine",
         },
     ),
+    Walk(
+        ("docs/kubernetes.md",),
+        given='cp -r "$ROOT"/docker .',
+        left_out={"make image": "needs a container engine", "kubectl": "needs a cluster"},
+    ),
 )
 LEFT_OUT_PAGES = {"README.md": "make test runs this test; make up is `wetwell up`, which a walk runs"}
