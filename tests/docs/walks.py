@@ -91,12 +91,17 @@ printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
         services=("wetwell fleet --stations stations --shards",),
         changed={"--out report --scheduler tcp://192.0.2.10:8786": "--out report --scheduler local"},
         left_out={
-            "wetwell router --zenoh tcp/192.0.2.10": "tests/integration/test_topology.py starts a tree",
-            "WETWELL_ZENOH__UPSTREAM": "as above",
-            "wetwell fleet --stations stations --zenoh": "as above",
             "wetwell fleet --stations stations.csv": "needs a cluster; tests/integration/test_fleet.py starts one",
             "WETWELL_DETECTOR__STATE_DIR=state wetwell detector release": "needs a quarantined station; "
             "tests/unit/test_quarantine.py",
+        },
+    ),
+    Walk(
+        ("docs/routers.md",),
+        left_out={
+            "wetwell router --zenoh tcp/192.0.2.10": "tests/chaos/test_topology.py starts a tree and a ring",
+            "WETWELL_ZENOH__UPSTREAM": "as above",
+            "wetwell fleet": "as above",
         },
     ),
     Walk(("docs/gap.md",)),

@@ -1,5 +1,6 @@
 """Processes `wetwell router` that make a tree."""
 
+import json
 import os
 import socket
 import subprocess
@@ -15,11 +16,11 @@ def free_address(host: str) -> str:
 class Router:
     """A process `wetwell router`."""
 
-    def __init__(self, host: str, upstream: str | None = None, **settings: str) -> None:
+    def __init__(self, host: str, *upstream: str, **settings: str) -> None:
         self.address = free_address(host)
         given = {"endpoint": f"tcp/{self.address}"} | settings
-        if upstream is not None:
-            given["upstream"] = f'["tcp/{upstream}"]'
+        if upstream:
+            given["upstream"] = json.dumps([f"tcp/{address}" for address in upstream])
         self._environment = os.environ | {f"WETWELL_ZENOH__{name.upper()}": value for name, value in given.items()}
         self.start()
 
