@@ -55,7 +55,7 @@ image:  ## Image of the containers; make image BUILDER="buildah --storage-driver
 	$(BUILDER) build --build-arg BASE=$(BASE) --file docker/Dockerfile --tag $(IMAGE) .
 
 requirements: $(VENV)/.uv  ## Pin the newest versions anew
-	cd requirements && for name in runtime build dev; do \
+	cd requirements && for name in runtime build fleet dev; do \
 	  ../$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	    --no-header --upgrade $$name.in --output-file $$name.txt || exit 1; done
 

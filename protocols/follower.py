@@ -93,6 +93,10 @@ class Follower:
                 line.held[number] = payload
         self._go_on(line)
 
+    def is_replaced(self, line: Line) -> bool:
+        """Whether a later life of its publisher was heard: then nobody keeps the messages of this one any more."""
+        return self._sources[line.key][-1] != line.source
+
     def give_up(self, line: Line) -> None:
         """Go on without the messages that are missing now."""
         self._skip(line, min(line.held, default=line.end))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import zenoh
 
 from wetwell.protocols.follower import Follower, Line
+from wetwell.protocols.kept import Page
 from wetwell.protocols.keys import tail_key
 from wetwell.protocols.zenoh_publisher import at_once
 
@@ -74,10 +75,18 @@ class Feed:
             ready, self.follower.ready = self.follower.ready, []
             self._take(ready)
 
+    def take_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
+        """Take an answer; what its publisher does not keep any more is told."""
+        self.follower.take_page(key, page, is_from_next=is_from_next)
+        self._tell_lost(key)
+
     def give_up(self, line: Line) -> None:
         """Go on without what is missing, and say so."""
         self.follower.give_up(line)
         self.pass_on()
+        self._tell_lost(line.key)
+
+    def _tell_lost(self, key: str) -> None:
         if self.follower.lost > self._told:
-            logger.warning("%s: %d messages are lost, nobody has them", line.key, self.follower.lost - self._told)
+            logger.warning("%s: %d messages are lost, nobody has them", key, self.follower.lost - self._told)
             self._told = self.follower.lost

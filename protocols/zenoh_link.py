@@ -51,10 +51,11 @@ class ZenohBus:
     reconnect: a client comes back by itself, usually within 0.5 s of the router; its publishers, subscriptions and
     what it announced are then as before.
 
-    The messages of one publisher come in their order, each once. What was lost, or sent while the router was away,
-    comes afterwards as far as the publisher keeps it; later messages of it wait until then, at most some seconds. The
-    last one of a publisher that falls silent is missed after a second. Without a `history` a subscription begins with
-    the first message that reaches it.
+    The messages of one publisher come in their order, each once. What was lost, or sent while a router was away,
+    comes afterwards as far as the publisher keeps it; later messages of it wait until then, about a minute where
+    nobody answers. The last one of a publisher that falls silent is missed after a second, behind a link between
+    routers that was away after a minute at most. Without a `history` a subscription begins with the first message
+    that reaches it.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ class ZenohBus:
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
-            publisher = ZenohPublisher(self._session, key, history, self._pump.waiting)
+            publisher = ZenohPublisher(self._session, key, history, self._pump.questions)
         self._pump.publish(publisher)
         return publisher
 

@@ -4,7 +4,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import zenoh
@@ -15,24 +14,52 @@ from wetwell.protocols.keys import tail_key
 from wetwell.protocols.messages import JSON_ENCODING
 from wetwell.protocols.zenoh_session import reason
 
+LAST_LOSS_S = 1.0
+"""So long after a message that no other followed its publisher says that it was the last."""
+LONGEST_SILENCE_S = 60.0
+"""So long at most until it says so again."""
 
-@dataclass
-class Waiting:
-    """What publishers leave to the thread of their bus: to say that they have fallen silent, and to answer."""
 
-    unsettled: "set[ZenohPublisher]" = field(default_factory=set)
-    questions: "deque[tuple[ZenohPublisher, zenoh.Query]]" = field(default_factory=deque)
+def is_end_due(now_s: float, silent_s: float, told_s: float) -> bool:
+    """Whether a publisher should say, again, which message was its last: 1, 4, 16, 64 s after it, then each 60 s.
+
+    Once is not enough: where a link between two routers was away, neither the publisher nor who has missed
+    something is told of it. As the waits grow, what was lost is known within four times as long as the link was away.
+
+    Parameters
+    ----------
+    now_s : float
+        Time. [s]
+    silent_s : float
+        Since when it is silent. [s]
+    told_s : float
+        When it has said so before. [s]
+
+    Examples
+    --------
+    >>> [is_end_due(now_s, 10.0, 0.0) for now_s in (10.9, 11.1)]
+    [False, True]
+    >>> [is_end_due(now_s, 10.0, 11.0) for now_s in (13.9, 14.1)]
+    [False, True]
+    >>> [is_end_due(now_s, 10.0, 500.0) for now_s in (559.9, 560.1)]
+    [False, True]
+    """
+    wait_s = min(3.0 * (told_s - silent_s), LONGEST_SILENCE_S) if told_s > silent_s else 0.0
+    return now_s - silent_s > LAST_LOSS_S and now_s - told_s > wait_s
 
 
 class ZenohPublisher:
     """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
 
-    def __init__(self, session: zenoh.Session, key: str, history: int, waiting: Waiting) -> None:
+    def __init__(
+        self, session: zenoh.Session, key: str, history: int, questions: "deque[tuple[ZenohPublisher, zenoh.Query]]"
+    ) -> None:
         self.key = key
         self.kept = KeptMessages(history)
-        self.sent_s = 0.0
+        self._silent_s = 0.0
+        self._told_s = 0.0
         self._session = session
-        self._waiting = waiting
+        self._questions = questions
         self._lock = threading.Lock()
         self._publisher = session.declare_publisher(
             key, encoding=JSON_ENCODING, congestion_control=zenoh.CongestionControl.DROP
@@ -53,11 +80,10 @@ class ZenohPublisher:
                 self._publisher.put(payload, attachment=mark)
             except zenoh.ZError as error:
                 raise LinkError(f"cannot publish on '{self.key}': {reason(error)}") from error
-        self.sent_s = time.monotonic()
-        self._waiting.unsettled.add(self)
+        self._silent_s = time.monotonic()
 
     def _ask(self, query: zenoh.Query) -> None:
-        self._waiting.questions.append((self, query))
+        self._questions.append((self, query))
 
     def answer(self, query: zenoh.Query) -> None:
         """Answer what is kept, or the last message to those who only ask for that."""
@@ -70,8 +96,15 @@ class ZenohPublisher:
                 body, head = page.encode()
                 query.reply(self.key, body, attachment=head)
 
-    def tell_end(self) -> None:
-        """Tell those who follow which message was the last."""
+    def stir(self, now_s: float) -> None:
+        """Say which message was the last as if it had just been sent: the link was away."""
+        self._silent_s, self._told_s = now_s - LAST_LOSS_S, 0.0
+
+    def settle(self, now_s: float) -> None:
+        """Tell those who follow which message was the last, if it is time to."""
+        if not self.kept.end or not is_end_due(now_s, self._silent_s, self._told_s):
+            return
+        self._told_s = now_s
         drop = zenoh.CongestionControl.DROP
         self._session.put(tail_key(self.key), b"", attachment=self.kept.next_mark, congestion_control=drop)
 

@@ -18,20 +18,21 @@ from wetwell.protocols.follower import Line
 from wetwell.protocols.kept import KeptQuery, Page
 from wetwell.protocols.messages import JSON_ENCODING
 from wetwell.protocols.zenoh_feed import CHANNEL, Feed
-from wetwell.protocols.zenoh_publisher import Waiting, ZenohPublisher, at_once
+from wetwell.protocols.zenoh_publisher import LAST_LOSS_S, ZenohPublisher, at_once
 
 logger = logging.getLogger(__name__)
 
 PERIOD_S = 0.01
 
-LAST_LOSS_S = 1.0
-"""So long after a message that no other followed its publisher says that it was the last."""
 ASKED = 32
 """Questions for missing messages that are on the way at the same time."""
 ANSWER_S = 2.0
 TRIES = 5
+PATIENT_TRIES = 20
+"""Of messages whose publisher may be behind a link between routers that is away: about a minute."""
 FIRST_WAIT_S = 0.1
 """Longest wait before the second try; it doubles with each, and is drawn at random."""
+LONGEST_WAIT_S = 5.0
 
 LOOK = KeptQuery().encode()
 
@@ -62,7 +63,7 @@ class ZenohPump(threading.Thread):
 
     def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
         super().__init__(name="zenoh-pump")
-        self.waiting = Waiting()
+        self.questions: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
         self._session = session
         self._is_router = is_router
         self._feeds: list[Feed] = []
@@ -124,22 +125,22 @@ class ZenohPump(threading.Thread):
                 logger.exception("bus")
 
     def _answer(self) -> None:
-        while self.waiting.questions:
-            publisher, query = self.waiting.questions.popleft()
+        while self.questions:
+            publisher, query = self.questions.popleft()
             publisher.answer(query)
 
     def _settle(self, now_s: float) -> None:
         """Say of each publisher that has fallen silent, or whose link was away, which message was its last."""
         if self._has_reconnected.is_set():
             self._has_reconnected.clear()
-            self.waiting.unsettled.update(publisher for publisher in self._publishers if publisher.kept.end)
+            for publisher in self._publishers:
+                publisher.stir(now_s)
             due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
             self._due.extend(
                 Question(feed, key, due_s=due_s) for feed in self._feeds if feed.recovers for key in feed.keys
             )
-        for publisher in [each for each in self.waiting.unsettled.copy() if now_s - each.sent_s > LAST_LOSS_S]:
-            self.waiting.unsettled.discard(publisher)
-            publisher.tell_end()
+        for publisher in self._publishers:
+            publisher.settle(now_s)
 
     def _hear(self, now_s: float) -> None:
         """Take the answers that have come."""
@@ -162,7 +163,7 @@ class ZenohPump(threading.Thread):
                 head = reply.ok.attachment
                 page = head and Page.decode(reply.ok.payload.to_bytes(), head.to_bytes())
                 if page:
-                    feed.follower.take_page(str(reply.ok.key_expr), page, is_from_next=question.line is not None)
+                    feed.take_page(str(reply.ok.key_expr), page, is_from_next=question.line is not None)
         except zenoh.ZError:  # all that were asked have answered
             return False
         finally:
@@ -182,13 +183,14 @@ class ZenohPump(threading.Thread):
         if is_done:
             return
         question.tries += 1
-        if question.tries > TRIES:
+        is_patient = line is not None and not question.feed.follower.is_replaced(line)
+        if question.tries > (PATIENT_TRIES if is_patient else TRIES):
             if line is not None:
                 line.is_asked = False
                 question.feed.give_up(line)
             return
         if question.tries > 1:
-            longest_s = FIRST_WAIT_S * 2.0 ** (question.tries - 1)
+            longest_s = min(FIRST_WAIT_S * 2.0 ** (question.tries - 1), LONGEST_WAIT_S)
             question.due_s = now_s + random.uniform(longest_s / 2.0, longest_s)
         self._due.append(question)
 

@@ -102,12 +102,13 @@ class HealthSettings(Table):
 class DetectorSettings(Table):
     """The detector: where it keeps its state, if anywhere, how often, and what acts cost.
 
-    `crash_tries`: so often a station may bring the process down until it is left out.
+    `crash_tries`: so often within `crash_window_s` a station may bring the process down until it is left out.
     """
 
     state_dir: Path | None = None
     checkpoint_s: Positive = 60.0
     crash_tries: Annotated[int, Field(ge=1)] = 3
+    crash_window_s: Positive = 86_400.0
     costs: Costs = Costs()
 
 

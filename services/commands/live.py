@@ -181,7 +181,7 @@ def release(
     from wetwell.services.detector.quarantine import Quarantine
 
     kept = settings_of(config).detector
-    Quarantine(kept.state_dir, "release", kept.crash_tries).release(station)
+    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(station)
 
 
 @app.command()

@@ -53,7 +53,7 @@ class StationJudge:
         self.station = station.name
         self.detector = Detector(station.name, nominal_of(station), costs)
         self._checkpoint = checkpoint
-        self._quarantine = quarantine or Quarantine(None, "", 1)
+        self._quarantine = quarantine or Quarantine(None, "", 1, 0.0)
         told = None if checkpoint is None else checkpoint.restore(self.detector)
         self.is_restored = told is not None
         self._publishers = [

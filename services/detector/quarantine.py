@@ -6,7 +6,9 @@ import mmap
 from pathlib import Path
 
 from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.whole_file import whole_file
+from wetwell.services.clock import now_ns
 
 log = logging.getLogger(__name__)
 
@@ -17,7 +19,8 @@ class Quarantine:
     """Counts the crashes of each station in a folder; without a folder nothing is kept and nobody is left out.
 
     While a station is being judged its name stands in a file, `{name}.at`. If the process dies in that moment the
-    next one finds it there and counts it. A station that was counted `tries` times is left out until it is released.
+    next one finds it there and counts it. A station that was counted `tries` times within a window of time is left
+    out until it is released.
 
     Parameters
     ----------
@@ -27,6 +30,8 @@ class Quarantine:
         Of the group of stations that one process judges.
     tries : int
         Crashes after which a station is left out.
+    window_s : float
+        Crashes that are further apart than this are not counted together. [s]
 
     Raises
     ------
@@ -34,8 +39,9 @@ class Quarantine:
         If the folder cannot be used.
     """
 
-    def __init__(self, folder: Path | None, name: str, tries: int) -> None:
+    def __init__(self, folder: Path | None, name: str, tries: int, window_s: float) -> None:
         self._tries = tries
+        self._window_ns = window_s * NS_PER_S
         self._folder = folder
         self._trace: mmap.mmap | None = None
         if folder is None:
@@ -49,8 +55,7 @@ class Quarantine:
             raise ConfigError(f"detector.state_dir: {folder}: {error.strerror or error}") from error
         culprit = self._trace[:].decode(errors="replace").strip(" \0")
         if culprit:
-            crashes = self._crashes(culprit) + 1
-            self._note(culprit, crashes)
+            crashes = self._count(culprit, now_ns())
             log.error("station '%s': the process died while it was judged (%d of %d)", culprit, crashes, tries)
         self.leave()
 
@@ -63,7 +68,7 @@ class Quarantine:
 
     def holds(self, station: str) -> bool:
         """Whether a station is left out."""
-        return self._crashes(station) >= self._tries
+        return len(self._crashes_ns(station)) >= self._tries
 
     def release(self, station: str) -> None:
         """Let a station be judged again from the next start on."""
@@ -80,18 +85,23 @@ class Quarantine:
         if self._trace is not None:
             self._trace[:] = b" " * NAME_BYTES
 
-    def _crashes(self, station: str) -> int:
-        try:
-            return int(json.loads(self._path(station).read_bytes())["crashes"])
-        except (OSError, ValueError, KeyError, TypeError):
-            return 0
-
-    def _note(self, station: str, crashes: int) -> None:
+    def _count(self, station: str, time_ns: int) -> int:
+        """Note a crash; how many there are now, without those that are too long ago."""
+        crashes_ns = [each for each in self._crashes_ns(station) if abs(time_ns - each) <= self._window_ns] + [
+            time_ns
+        ]
         try:
             with whole_file(self._path(station)) as file:
-                file.write(json.dumps({"crashes": crashes}).encode())
+                file.write(json.dumps({"crashes_ns": crashes_ns}).encode())
         except RecordingError as error:
             log.warning("%s", error)
+        return len(crashes_ns)
+
+    def _crashes_ns(self, station: str) -> list[int]:
+        try:
+            return [int(each) for each in json.loads(self._path(station).read_bytes())["crashes_ns"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            return []
 
     def _path(self, station: str) -> Path:
         return (self._folder or Path()) / f"{station}.crashes.json"

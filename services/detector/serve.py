@@ -54,7 +54,7 @@ async def judge_all(
         Of the caller.
     """
     kept = settings.detector
-    quarantine = Quarantine(kept.state_dir, name, kept.crash_tries)
+    quarantine = Quarantine(kept.state_dir, name, kept.crash_tries, kept.crash_window_s)
     stack.callback(quarantine.close)
     async with asyncio.TaskGroup() as group:
         judges: list[StationJudge] = []

@@ -91,12 +91,17 @@ printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
         services=("wetwell fleet --stations stations --shards",),
         changed={"--out report --scheduler tcp://192.0.2.10:8786": "--out report --scheduler local"},
         left_out={
-            "wetwell router --zenoh tcp/192.0.2.10": "tests/integration/test_topology.py starts a tree",
-            "WETWELL_ZENOH__UPSTREAM": "as above",
-            "wetwell fleet --stations stations --zenoh": "as above",
             "wetwell fleet --stations stations.csv": "needs a cluster; tests/integration/test_fleet.py starts one",
             "WETWELL_DETECTOR__STATE_DIR=state wetwell detector release": "needs a quarantined station; "
             "tests/unit/test_quarantine.py",
+        },
+    ),
+    Walk(
+        ("docs/routers.md",),
+        left_out={
+            "wetwell router --zenoh tcp/192.0.2.10": "tests/chaos/test_topology.py starts a tree and a ring",
+            "WETWELL_ZENOH__UPSTREAM": "as above",
+            "wetwell fleet": "as above",
         },
     ),
     Walk(("docs/gap.md",)),
@@ -127,6 +132,11 @@ wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz"""
             "docker": "needs a container engine",
             "BUILDAH_ISOLATION": "needs a container engine",
         },
+    ),
+    Walk(
+        ("docs/kubernetes.md",),
+        given='cp -r "$ROOT"/docker .',
+        left_out={"make image": "needs a container engine", "kubectl": "needs a cluster"},
     ),
 )
 LEFT_OUT_PAGES = {"README.md": "make test runs this test; make up is `wetwell up`, which a walk runs"}

@@ -2,19 +2,20 @@
 
 import asyncio
 import contextlib
-import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
+from routers import Router
 
-from wetwell.protocols.keys import sample_key, verdict_key
+from wetwell.protocols.keys import SITE, history_key, plan_key, sample_key, status_key, verdict_key
 from wetwell.protocols.zenoh_access import ZenohAccess
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.protocols.zenoh_link import ZenohBus, connect_client
 
 LIMIT_S = 60.0
+MANIFESTS = Path(__file__).parents[2] / "docker" / "kubernetes"
 ROLES = """
 [[role]]
 name = "gateway"
@@ -26,32 +27,6 @@ read = ["wetwell/**"]
 ask = ["wetwell/**"]
 answer = ["wetwell/**"]
 """
-
-
-def free_address(host: str) -> str:
-    with socket.socket() as probe:
-        probe.bind((host, 0))
-        return f"{host}:{probe.getsockname()[1]}"
-
-
-class Router:
-    """A process `wetwell router`."""
-
-    def __init__(self, host: str, upstream: str | None = None, **settings: str) -> None:
-        self.address = free_address(host)
-        given = {"endpoint": f"tcp/{self.address}"} | settings
-        if upstream is not None:
-            given["upstream"] = f'["tcp/{upstream}"]'
-        self._environment = os.environ | {f"WETWELL_ZENOH__{name.upper()}": value for name, value in given.items()}
-        self.start()
-
-    def start(self) -> None:
-        command = [sys.executable, "-m", "wetwell.services", "router"]
-        self._process = subprocess.Popen(command, env=self._environment, stderr=subprocess.DEVNULL)
-
-    def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
 
 
 async def with_passwords(folder: Path) -> tuple[list[bytes], list[bytes]]:
@@ -88,6 +63,62 @@ def test_a_branch_shows_a_password_to_the_root(tmp_path):
     got, answers = asyncio.run(with_passwords(tmp_path))
     assert got == [b"sample"]
     assert set(answers) == {b"verdict"}
+
+
+async def as_on_kubernetes(folder: Path, secrets: dict[str, str]) -> None:
+    """What each daemon has to say and to hear, with the users and roles of `docker/kubernetes/`."""
+    async with contextlib.AsyncExitStack() as stack:
+        root = Router("127.0.0.1", users_file=str(folder / "users"), access_control=str(folder / "access.toml"))
+        stack.callback(root.kill)
+        branch = Router(
+            "127.0.0.2",
+            root.address,
+            users_file=str(folder / "branch_users"),
+            user="branch",
+            password=secrets["branch"],
+        )
+        stack.callback(branch.kill)
+
+        async def client(name: str, router: Router) -> ZenohBus:
+            access = ZenohAccess(user=name, password=secrets[name])
+            return stack.enter_context(await connect_client(f"tcp/{router.address}", access))
+
+        gateway, historian, dashboard = [await client(name, root) for name in ("gateway", "historian", "dashboard")]
+        controller, shard = [await client("fleet", branch) for _ in range(2)]
+        questions = historian.answer(history_key("alpha"))
+        heard = {
+            b"sample": shard.subscribe(sample_key("*"), history=10),
+            b"plan": shard.subscribe(plan_key(3), history=1),
+            b"verdict": historian.subscribe(verdict_key("*"), history=10),
+            b"shard": dashboard.subscribe(status_key(SITE, "shard-3"), history=1),
+            b"fleet": dashboard.subscribe(status_key(SITE, "fleet"), history=1),
+        }
+        for bus, key, payload in (
+            (gateway, sample_key("alpha"), b"sample"),
+            (gateway, verdict_key("alpha", 1), b"forged"),
+            (controller, plan_key(3), b"plan"),
+            (shard, verdict_key("alpha", 1), b"verdict"),
+            (shard, status_key(SITE, "shard-3"), b"shard"),
+            (controller, status_key(SITE, "fleet"), b"fleet"),
+        ):
+            bus.publisher(key, history=10).put(payload)
+        async with asyncio.timeout(LIMIT_S):
+            for payload, subscription in heard.items():
+                assert await subscription.receive() == [payload]
+            asked = asyncio.create_task(shard.ask(history_key("alpha"), b"?"))
+            (question,) = await questions.receive()
+            question.reply(b"history")
+            assert await asked == [b"history"]
+
+
+def test_users_and_roles_of_the_manifests_let_each_do_its_duty(tmp_path):
+    made = subprocess.run(["sh", MANIFESTS / "secrets.sh"], check=True, capture_output=True, text=True).stdout
+    secrets = next(yaml.safe_load_all(made))["stringData"]
+    for name in ("users", "branch_users"):
+        (tmp_path / name).write_text(secrets[name])
+    access = yaml.safe_load((MANIFESTS / "access.yaml").read_text())["data"]["access.toml"]
+    (tmp_path / "access.toml").write_text(access)
+    asyncio.run(as_on_kubernetes(tmp_path, secrets))
 
 
 @pytest.mark.parametrize("wrong", ["127.0.0.1:1", "udp/127.0.0.1:1"])
