@@ -16,6 +16,8 @@ CAPACITY = 1_000_000
 """Samples that wait to be judged: after a start a thousand publishers send what they keep."""
 BEHIND = 10_000
 """Samples of one station that wait while it catches up."""
+KEPT_S = 2.0
+"""Time in which what publishers keep comes, even if some of it is lost on the way once."""
 CATCH_UPS = 8
 """Stations that ask the historian at the same time."""
 SLICE = 500
@@ -77,25 +79,32 @@ class Intake:
                 self._obeying[key].take_order(payload)
 
     async def _catch_up(self, key: str, turn: asyncio.Semaphore) -> None:
-        """Take what was missed, then what came meanwhile: both overlap, and the detector drops what it has had."""
-        judge, last = self._judges[key], None
+        """Take what was missed, then what came meanwhile.
+
+        The bus keeps samples in the order in which they came, the historian in that of their stamps, which differs
+        where a clock was set: what the bus keeps is not taken from the historian.
+        """
+        judge = self._judges[key]
+        last = judge.detector.last_heard
+        await asyncio.sleep(KEPT_S)
         async with turn:
             async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns):
+                if _place(last, self._behind[key]):
+                    break
                 await judge.take(samples)
-                last = samples[-1]
-        judge.take_payloads(_after(last, list(self._behind.pop(key))))
+                last = samples[-1].time, samples[-1].seq
+        payloads = list(self._behind.pop(key))
+        judge.take_payloads(payloads[_place(last, payloads) :])
 
 
-def _after(last: Sample | None, payloads: list[bytes]) -> list[bytes]:
-    """Payloads behind the one of a sample; all of them if it is not there.
+def _place(last: tuple[int, int], payloads: Sequence[bytes]) -> int:
+    """Place behind the sample of this time and number; 0 if it is not there.
 
     The detector takes a long row of samples that it has had for a clock that was set back.
     """
-    if last is None:
-        return payloads
     for place in range(len(payloads), 0, -1):
         with contextlib.suppress(MessageError):
             sample = Sample.decode(payloads[place - 1])
-            if (sample.time, sample.seq) == (last.time, last.seq):
-                return payloads[place:]
-    return payloads
+            if (sample.time, sample.seq) == last:
+                return place
+    return 0
