@@ -26,11 +26,8 @@ def to_iso(stamp_ns: int) -> str:
     >>> to_iso(1_500_000_000)
     '1970-01-01T00:00:01.500Z'
     """
-    seconds, rest_ns = divmod(stamp_ns, NS_PER_S)
-    text = (_EPOCH + timedelta(seconds=seconds)).isoformat()[:-6]  # without +00:00
-    if rest_ns == 0:
-        return f"{text}Z"
-    return f"{text}.{rest_ns // 1_000_000:03d}Z" if rest_ns % 1_000_000 == 0 else f"{text}.{rest_ns:09d}Z"
+    unit: Literal["s", "ms", "ns"] = "s" if stamp_ns % NS_PER_S == 0 else "ms" if stamp_ns % 1_000_000 == 0 else "ns"
+    return f"{np.datetime_as_string(np.datetime64(stamp_ns, 'ns'), unit=unit)}Z"
 
 
 def from_iso(text: str) -> int:

@@ -3,8 +3,9 @@
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from wetwell.protocols.history_messages import LONGEST_NS
 from wetwell.protocols.keys import order_key, sample_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Sample
@@ -82,19 +83,28 @@ class Intake:
         """Take what was missed, then what came meanwhile.
 
         The bus keeps samples in the order in which they came, the historian in that of their stamps, which differs
-        where a clock was set: what the bus keeps is not taken from the historian.
+        where a clock was set: only what the bus keeps no more is taken from the historian.
         """
-        judge = self._judges[key]
+        judge, waiting = self._judges[key], self._behind[key]
         last = judge.detector.last_heard
         await asyncio.sleep(KEPT_S)
         async with turn:
-            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns):
-                if _place(last, self._behind[key]):
+            until_ns = _begin_ns(waiting)
+            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
+                if _place(last, waiting):
                     break
                 await judge.take(samples)
                 last = samples[-1].time, samples[-1].seq
-        payloads = list(self._behind.pop(key))
-        judge.take_payloads(payloads[_place(last, payloads) :])
+        del self._behind[key]
+        judge.take_payloads(list(waiting)[_place(last, waiting) :])
+
+
+def _begin_ns(payloads: Iterable[bytes]) -> int:
+    """Time of the first sample; as late as can be if there is none."""
+    for payload in payloads:
+        with contextlib.suppress(MessageError):
+            return min(Sample.decode(payload).time, LONGEST_NS)
+    return LONGEST_NS
 
 
 def _place(last: tuple[int, int], payloads: Sequence[bytes]) -> int:
