@@ -75,12 +75,12 @@ class Site:
     Attributes
     ----------
     published : dict
-        Samples that the gateway has published, by station, in order.
+        Samples that the gateway has published, by their key, in order, repeats left out.
     told : dict
         Verdicts that were heard, by station, each payload once.
     alarms : dict
         Alarms that were heard, by station and id, in order, repeats left out.
-    accidents : Counter
+    accidents : list of str
         What has happened, in order.
     """
 
