@@ -53,6 +53,11 @@ class Model:
         basis = np.concatenate(([1.0], point - self.origin))
         return float(basis @ self.mean), float(basis @ self.covariance @ basis)
 
+    def along(self, points: Floats) -> tuple[Floats, Floats]:
+        """(m,) residuals at operating points (m, p), and the variances of them. [m, m²]."""
+        basis = np.column_stack((np.ones(len(points)), points - self.origin))
+        return basis @ self.mean, ((basis @ self.covariance) * basis).sum(axis=1)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Baseline:

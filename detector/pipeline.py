@@ -96,6 +96,12 @@ class Detector:
         return int(self._gate.state["time_ns"][0])
 
     @property
+    def last_heard(self) -> tuple[int, int]:
+        """Time and number of the last sample that came, let through or not, as long as numbers count up."""
+        state = self._gate.state[0]
+        return int(state["other_ns"] if state["other_count"] else state["time_ns"]), int(state["seq"])
+
+    @property
     def baselines(self) -> tuple[Baseline | None, ...]:
         """What was learnt of each pump; None while it is being learnt."""
         return tuple(None if pump.known is None else pump.known.baseline for pump in self._pumps)

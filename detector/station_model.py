@@ -1,6 +1,6 @@
 """The curves of a station as configured, as learnt and as the last verdict sees them, for those who draw them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -79,9 +79,9 @@ def pump_model(index: int, nominal: Nominal, baseline: Baseline | None, evidence
     if baseline is None:
         return PumpModel(pump=index + 1, **configured)
     noise_m2 = np.diag(baseline.segment_covariance + baseline.run_covariance)
-    level_m = baseline.level_m if np.isfinite(baseline.level_m) else 0.0
-    r_p, pump_band_m = _learnt(baseline.pump, noise_m2[0], flow_m3h, lambda q: np.array([q, q * q, level_m]))
-    r_s, system_band_m = _learnt(baseline.system, noise_m2[1], flow_m3h, lambda q: np.array([q * q, level_m]))
+    levels_m = np.full(POINTS, baseline.level_m if np.isfinite(baseline.level_m) else 0.0)
+    r_p, pump_band_m = _learnt(baseline.pump, noise_m2[0], np.column_stack((flow_m3h, flow_m3h**2, levels_m)))
+    r_s, system_band_m = _learnt(baseline.system, noise_m2[1], np.column_stack((flow_m3h**2, levels_m)))
     learnt = {
         "learnt_pump": _curve(flow_m3h, pump_m + r_p, pump_band_m),
         "learnt_system": _curve(flow_m3h, system_m + r_s, system_band_m),
@@ -100,12 +100,10 @@ def pump_model(index: int, nominal: Nominal, baseline: Baseline | None, evidence
     return PumpModel(pump=index + 1, **configured, **learnt, **now)
 
 
-def _learnt(
-    model: ResidualModel, noise_m2: float, flow_m3h: Floats, point: Callable[[float], Floats]
-) -> tuple[Floats, Floats]:
-    """Learnt residual at each flow and half the width of its band. [m]."""
-    at = np.array([model.at(point(float(flow))) for flow in flow_m3h])
-    return at[:, 0], SIGMAS_95 * np.sqrt(at[:, 1] + noise_m2)
+def _learnt(model: ResidualModel, noise_m2: float, points: Floats) -> tuple[Floats, Floats]:
+    """Learnt residual at each operating point and half the width of its band. [m]."""
+    residual_m, variance_m2 = model.along(points)
+    return residual_m, SIGMAS_95 * np.sqrt(variance_m2 + noise_m2)
 
 
 def _band_m(component: str, evidence: Mapping[str, Any]) -> Floats:

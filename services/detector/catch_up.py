@@ -18,11 +18,11 @@ PAGE = 3_600
 ANSWER_S = 10.0
 
 
-async def missed_samples(bus: Bus, station: str, since_ns: int) -> AsyncIterator[list[Sample]]:
-    """Samples after a time, page by page, oldest first; none if no historian answers."""
+async def missed_samples(bus: Bus, station: str, since_ns: int, until_ns: int) -> AsyncIterator[list[Sample]]:
+    """Samples between two times, page by page, oldest first; none if no historian answers."""
     start_ns, more = since_ns + 1, True
-    while more:
-        query = HistoryQuery(kind="samples", start=start_ns, points=PAGE, raw=True)
+    while more and start_ns < until_ns:
+        query = HistoryQuery(kind="samples", start=start_ns, end=until_ns, points=PAGE, raw=True)
         page = await _answer(bus, station, query)
         if page is None or not page.time:
             return

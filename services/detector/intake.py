@@ -3,8 +3,9 @@
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from wetwell.protocols.history_messages import LONGEST_NS
 from wetwell.protocols.keys import order_key, sample_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Sample
@@ -16,6 +17,8 @@ CAPACITY = 1_000_000
 """Samples that wait to be judged: after a start a thousand publishers send what they keep."""
 BEHIND = 10_000
 """Samples of one station that wait while it catches up."""
+KEPT_S = 2.0
+"""Time in which what publishers keep comes, even if some of it is lost on the way once."""
 CATCH_UPS = 8
 """Stations that ask the historian at the same time."""
 SLICE = 500
@@ -77,25 +80,41 @@ class Intake:
                 self._obeying[key].take_order(payload)
 
     async def _catch_up(self, key: str, turn: asyncio.Semaphore) -> None:
-        """Take what was missed, then what came meanwhile: both overlap, and the detector drops what it has had."""
-        judge, last = self._judges[key], None
+        """Take what was missed, then what came meanwhile.
+
+        The bus keeps samples in the order in which they came, the historian in that of their stamps, which differs
+        where a clock was set: only what the bus keeps no more is taken from the historian.
+        """
+        judge, waiting = self._judges[key], self._behind[key]
+        last = judge.detector.last_heard
+        await asyncio.sleep(KEPT_S)
         async with turn:
-            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns):
+            until_ns = _begin_ns(waiting)
+            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
+                if _place(last, waiting):
+                    break
                 await judge.take(samples)
-                last = samples[-1]
-        judge.take_payloads(_after(last, list(self._behind.pop(key))))
+                last = samples[-1].time, samples[-1].seq
+        del self._behind[key]
+        judge.take_payloads(list(waiting)[_place(last, waiting) :])
 
 
-def _after(last: Sample | None, payloads: list[bytes]) -> list[bytes]:
-    """Payloads behind the one of a sample; all of them if it is not there.
+def _begin_ns(payloads: Iterable[bytes]) -> int:
+    """Time of the first sample; as late as can be if there is none."""
+    for payload in payloads:
+        with contextlib.suppress(MessageError):
+            return min(Sample.decode(payload).time, LONGEST_NS)
+    return LONGEST_NS
+
+
+def _place(last: tuple[int, int], payloads: Sequence[bytes]) -> int:
+    """Place behind the sample of this time and number; 0 if it is not there.
 
     The detector takes a long row of samples that it has had for a clock that was set back.
     """
-    if last is None:
-        return payloads
     for place in range(len(payloads), 0, -1):
         with contextlib.suppress(MessageError):
             sample = Sample.decode(payloads[place - 1])
-            if (sample.time, sample.seq) == (last.time, last.seq):
-                return payloads[place:]
-    return payloads
+            if (sample.time, sample.seq) == last:
+                return place
+    return 0

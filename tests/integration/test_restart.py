@@ -12,6 +12,7 @@ from wetwell.protocols.keys import history_key, sample_key, verdict_key
 from wetwell.protocols.link import Request, Subscription
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import Sample, Verdict
+from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.judge import StationJudge
@@ -31,6 +32,15 @@ def samples(alpha) -> list[Sample]:
 
 @pytest.fixture(scope="module")
 def undisturbed(alpha, samples) -> list[Verdict]:
+    return judged(alpha, samples)
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch):
+    monkeypatch.setattr("wetwell.services.detector.intake.KEPT_S", 0.0)  # a bus in memory brings it at once
+
+
+def judged(alpha, samples: list[Sample]) -> list[Verdict]:
     detector = Detector("alpha", nominal_of(alpha))
     return [verdict for sample in samples for verdict in detector.update(sample)]
 
@@ -92,6 +102,16 @@ def test_verdicts_after_kills_are_those_without(alpha, samples, undisturbed, tmp
     told = asyncio.run(verdicts_of_killed(alpha, samples, tmp_path, cuts, away))
     assert {verdict.state for verdict in undisturbed} >= {"learning", "normal", "pump_fault"}
     assert sorted(told, key=key) == sorted(undisturbed, key=key)
+
+
+def test_nor_does_a_kill_after_the_clock_of_the_station_was_set_back_change_them(alpha, samples, tmp_path):
+    set_at, cut = 8 * 3_600, 8 * 3_600 + 1_300
+    hour_ns = 3_600 * NS_PER_S
+    stepped = samples[:set_at] + [
+        sample.model_copy(update={"time": sample.time - hour_ns}) for sample in samples[set_at:]
+    ]
+    told = asyncio.run(verdicts_of_killed(alpha, stepped, tmp_path, [cut], 50))
+    assert sorted(told, key=key) == sorted(judged(alpha, stepped), key=key)
 
 
 def key(verdict: Verdict) -> tuple[int, int, str]:

@@ -5,6 +5,7 @@ lost on the way comes from the publisher's cache, a late joiner gets the last me
 """
 
 import asyncio
+import functools
 import random
 from collections import deque
 from collections.abc import Sequence
@@ -12,8 +13,9 @@ from dataclasses import dataclass, field
 
 from wetwell.protocols.link import Keyed, Presence, Request
 from wetwell.protocols.mailbox import Mailbox
-from wetwell.protocols.memory_link import matches
+from wetwell.protocols.memory_link import matches as any_matches
 
+matches = functools.cache(any_matches)
 SHORT_S, LONG_S = 0.002, 1.0
 """Usual delay of a message; delay of one that was lost and had to be asked for."""
 

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from accidents import happen
 from network import Network, SimulatedBus
 from simulated_plc import SimulatedPlc
 
@@ -21,7 +22,8 @@ from wetwell.protocols import whole_file
 from wetwell.protocols.alarm_messages import Alarm
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.keys import alarm_key, sample_key, verdict_key
-from wetwell.protocols.messages import Sample, Verdict
+from wetwell.protocols.link import Keyed
+from wetwell.protocols.messages import Verdict
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import Station
@@ -33,7 +35,6 @@ from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.historian.store import Batch, StoreError
-from wetwell.services.presets import find_scenario, find_station
 from wetwell.services.settings import AlarmSettings, DetectorSettings, HealthSettings, Settings
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -41,21 +42,6 @@ from wetwell.simulator.simulation import Simulation
 START_NS = 1_735_689_600 * NS_PER_S
 QUIET_S = 1_800.0
 """Virtual time after the last sample in which everything may settle."""
-
-ACCIDENTS = (
-    "kill gateway",
-    "kill detector",
-    "kill historian",
-    "kill alarms",
-    "cut gateway",
-    "cut detector",
-    "cut historian",
-    "cut alarms",
-    "disk full",
-    "plc away",
-    "plc silent",
-    "plc refuses",
-)
 
 
 @dataclass
@@ -89,12 +75,12 @@ class Site:
     Attributes
     ----------
     published : dict
-        Samples that the gateway has published, by station, in order.
+        Samples that the gateway has published, by their key, in order, repeats left out.
     told : dict
         Verdicts that were heard, by station, each payload once.
     alarms : dict
         Alarms that were heard, by station and id, in order, repeats left out.
-    accidents : Counter
+    accidents : list of str
         What has happened, in order.
     """
 
@@ -104,8 +90,7 @@ class Site:
     seconds: int
     period_s: int
     folder: Path
-    between_s: float = 10_000.0
-    published: dict[str, list[Sample]] = field(default_factory=dict)
+    published: dict[str, list[bytes]] = field(default_factory=dict)
     told: dict[str, dict[bytes, Verdict]] = field(default_factory=dict)
     alarms: dict[tuple[str, str], list[Alarm]] = field(default_factory=dict)
     accidents: list[str] = field(default_factory=list)
@@ -114,9 +99,10 @@ class Site:
         self.dice = random.Random(self.seed)
         self.network = Network(self.dice)
         self.is_disk_full = False
+        self.clock_s = 0.0
         self.settings = Settings(
-            health=HealthSettings(period_s=600.0),
-            detector=DetectorSettings(state_dir=self.folder / "detector", checkpoint_s=600.0),
+            health=HealthSettings(period_s=60.0 * self.period_s),
+            detector=DetectorSettings(state_dir=self.folder / "detector", checkpoint_s=60.0 * self.period_s),
             alarms=AlarmSettings(
                 state_dir=self.folder / "alarms", stale_after_s=5.0 * self.period_s, silent_after_s=600.0
             ),
@@ -139,11 +125,9 @@ class Site:
             observer.start(self.network)
             for process in self.processes.values():
                 process.start(self.network)
-            happening = asyncio.create_task(self._happen(), name="accidents")
-            await asyncio.sleep(self.seconds - 0.5 * self.period_s)
-            happening.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await happening
+            async with asyncio.TaskGroup() as group:
+                group.create_task(asyncio.sleep(self.seconds - 0.5 * self.period_s))
+                group.create_task(happen(self), name="accidents")
             await self.processes["gateway"].kill()
             await asyncio.sleep(QUIET_S)
             for name in ("detector", "alarms", "historian"):
@@ -163,7 +147,7 @@ class Site:
 
     async def _poll(self, bus: SimulatedBus) -> None:
         plcs = [simulated.plc for simulated in self.plcs.values()]
-        await gateway_daemon.poll_all(bus, plcs, health_s=600.0, longest_wait_s=30.0)
+        await gateway_daemon.poll_all(bus, plcs, health_s=60.0 * self.period_s, longest_wait_s=30.0)
 
     async def _detect(self, bus: SimulatedBus) -> None:
         async with contextlib.AsyncExitStack() as stack:
@@ -173,16 +157,18 @@ class Site:
         store = self.kept()
         historian = Historian(store)
         try:
-            await historian_daemon.keep(bus, historian, commit_s=60.0, maintain_s=3_600.0, health_s=600.0)
+            await historian_daemon.keep(
+                bus, historian, commit_s=2.0 * self.period_s, maintain_s=3_600.0, health_s=60.0 * self.period_s
+            )
         finally:
             store.close()
 
     async def _alarm(self, bus: SimulatedBus) -> None:
         keeper = AlarmKeeper(bus, self.settings.alarms, self.stations, alarms_serve.clocks)
-        await alarms_serve.keep(bus, keeper, health_period_s=600.0)
+        await alarms_serve.keep(bus, keeper, health_period_s=60.0 * self.period_s)
 
     async def _observe(self, bus: SimulatedBus) -> None:
-        samples = bus.subscribe(sample_key("*"), capacity=1_000_000)
+        samples = bus.collect([sample_key(station.name) for station in self.stations], capacity=1_000_000)
         verdicts = bus.subscribe(verdict_key("*"), capacity=1_000_000)
         alarms = bus.subscribe(alarm_key("*"), capacity=1_000_000)
         async with asyncio.TaskGroup() as group:
@@ -190,11 +176,11 @@ class Site:
             group.create_task(_each(verdicts, self._note_verdict))
             group.create_task(_each(alarms, self._note_alarm))
 
-    def _note_sample(self, payload: bytes) -> None:
-        sample = Sample.decode(payload)
-        heard = self.published.setdefault(sample.station, [])
-        if not heard or heard[-1] != sample:
-            heard.append(sample)
+    def _note_sample(self, sample: Keyed) -> None:
+        key, payload = sample
+        heard = self.published.setdefault(key, [])
+        if not heard or heard[-1] != payload:
+            heard.append(payload)
 
     def _note_verdict(self, payload: bytes) -> None:
         verdict = Verdict.decode(payload)
@@ -206,34 +192,6 @@ class Site:
         if not heard or heard[-1] != alarm:
             heard.append(alarm)
 
-    async def _happen(self) -> None:
-        """One accident after the other, each over before the next."""
-        while True:
-            await asyncio.sleep(self.dice.expovariate(1.0 / self.between_s))
-            kind, name = (accident := self.dice.choice(ACCIDENTS)).split()
-            self.accidents.append(accident)
-            lasts_s = self.dice.uniform(0.0, 1_000.0)
-            match kind:
-                case "kill":
-                    await self.processes[name].kill()
-                    await asyncio.sleep(lasts_s)
-                    self.processes[name].start(self.network)
-                case "cut":
-                    bus = self.processes[name].bus
-                    assert bus is not None
-                    bus.cut(lasts_s)
-                    await asyncio.sleep(lasts_s)
-                case "disk":
-                    self.is_disk_full = True
-                    await asyncio.sleep(lasts_s)
-                    self.is_disk_full = False
-                case "plc":
-                    plc = self.dice.choice(list(self.plcs.values()))
-                    plc.trouble = name
-                    await asyncio.sleep(lasts_s)
-                    plc.trouble = ""
-            await asyncio.sleep(60.0)
-
     @contextlib.contextmanager
     def _simulated_world(self) -> Iterator[None]:
         """Clock, PLC connections and disks of this site in place of the real ones."""
@@ -242,7 +200,7 @@ class Site:
         real = whole_file.whole_file
 
         def time_ns() -> int:
-            return START_NS + round(loop.time() * NS_PER_S)
+            return START_NS + round((loop.time() + self.clock_s) * NS_PER_S)
 
         def keep(store: FolderStore, batch: Batch) -> int:
             if self.is_disk_full:
@@ -261,26 +219,14 @@ class Site:
                 ("wetwell.services.clock.time", SimpleNamespace(time_ns=time_ns)),
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
-                ("wetwell.services.alarms.serve.LOOK_S", 30.0),
+                ("wetwell.services.alarms.serve.LOOK_S", 1.0 * self.period_s),
+                ("wetwell.services.alarms.serve.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.detector.checkpoint.whole_file", file),
                 ("wetwell.services.alarms.state_file.whole_file", file),
                 ("wetwell.services.historian.folder_store.FolderStore.write", keep),
             ):
                 patches.enter_context(mock.patch(target, replacement))
             yield
-
-
-def alpha_site(seed: int, stations: int, days: float, period_s: int, folder: Path) -> Site:
-    """Site of stations like the built-in one, with the paper's faults."""
-    alpha = find_station("alpha")
-    return Site(
-        seed=seed,
-        stations=[alpha.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
-        scenario=find_scenario("paper"),
-        seconds=round(days * 86_400.0),
-        period_s=period_s,
-        folder=folder,
-    )
 
 
 async def _each(subscription: Any, note: Callable[[bytes], None]) -> None:

@@ -1,6 +1,7 @@
 """An event loop whose clock jumps: hours of waiting cost nothing, and a seed gives the same events each time."""
 
 import asyncio
+import math
 import selectors
 from collections.abc import Coroutine
 from typing import Any
@@ -9,23 +10,28 @@ from typing import Any
 class _NoWait(selectors.SelectSelector):
     """Looks for files that are ready, but never waits: the loop's clock moves on instead."""
 
-    def __init__(self, clock: list[float]) -> None:
+    def __init__(self, clock: list[float], grain_s: float) -> None:
         super().__init__()
         self._clock = clock
+        self._grain_s = grain_s
 
     def select(self, timeout: float | None = None) -> list[Any]:
         if timeout is None:
             raise RuntimeError("deadlock: every task waits for something that cannot come")
-        self._clock[0] += timeout
+        now_s = self._clock[0] + timeout
+        self._clock[0] = math.ceil(now_s / self._grain_s) * self._grain_s if self._grain_s else now_s
         return []
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """Loop on a virtual clock that begins at 0 s. No threads and no sockets: nothing wakes it from outside."""
+    """Loop on a virtual clock that begins at 0 s. No threads and no sockets: nothing wakes it from outside.
 
-    def __init__(self) -> None:
+    With a grain it wakes at its multiples only, as on a busy machine: what is due since then comes at once, in order.
+    """
+
+    def __init__(self, grain_s: float = 0.0) -> None:
         self._clock = [0.0]
-        super().__init__(_NoWait(self._clock))
+        super().__init__(_NoWait(self._clock, grain_s))
 
     def time(self) -> float:
         """Virtual time. [s]"""
@@ -45,7 +51,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return future
 
 
-def run_virtual(main: Coroutine[Any, Any, Any]) -> Any:
+def run_virtual(main: Coroutine[Any, Any, Any], grain_s: float = 0.0) -> Any:
     """Result of a coroutine on a virtual clock."""
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+    with asyncio.Runner(loop_factory=lambda: VirtualLoop(grain_s)) as runner:
         return runner.run(main)

@@ -1,0 +1,48 @@
+"""Sites to simulate, and their lives."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from simulated_site import Site
+from virtual_loop import run_virtual
+
+from wetwell.protocols.station import Station
+from wetwell.services.presets import find_scenario, find_station
+
+GRAIN_S = 0.25
+"""Of the clock of a light site."""
+
+
+def alpha_site(seed: int, stations: int, days: float, period_s: int, folder: Path) -> Site:
+    """Site of stations like the built-in one, with the paper's faults, after its life."""
+    return _lived(seed, find_station("alpha"), stations, days, period_s, 0.0, folder)
+
+
+def light_site(seed: int, stations: int, days: float, period_s: int, folder: Path) -> Site:
+    """The same with one pump and a wide wet well, whose long runs can be judged by a sample each five minutes."""
+    alpha = find_station("alpha")
+    levels = {name: getattr(alpha.control, name)[:1] for name in ("start_levels_m", "stop_levels_m")}
+    parts = {
+        "pump": alpha.pump[:1],
+        "sump": alpha.sump.model_copy(update={"area_m2": 80.0}),
+        "control": alpha.control.model_copy(update=levels),
+    }
+    return _lived(seed, alpha.model_copy(update=parts), stations, days, period_s, GRAIN_S, folder)
+
+
+KINDS: dict[str, Callable[[int, int, float, int, Path], Site]] = {"alpha": alpha_site, "light": light_site}
+
+
+def _lived(
+    seed: int, station: Station, stations: int, days: float, period_s: int, grain_s: float, folder: Path
+) -> Site:
+    site = Site(
+        seed=seed,
+        stations=[station.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
+        scenario=find_scenario("paper"),
+        seconds=round(days * 86_400.0),
+        period_s=period_s,
+        folder=folder,
+    )
+    run_virtual(site.live(), grain_s)
+    return site
