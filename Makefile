@@ -18,7 +18,7 @@ up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C 
 
 test: lint types imports sbom  ## Lint, types, import contract, SBOM, all tests
 	@find simulator detector protocols -name '*.nb[ci]' -delete  # kernels know changes of their own file only
-	$(BIN)/pytest -q --numprocesses=2 --dist=loadfile --durations=10
+	$(BIN)/pytest -q --numprocesses=3 --dist=loadfile --durations=10
 
 lint: $(VENV)/.dev  ## ruff
 	$(BIN)/ruff check .

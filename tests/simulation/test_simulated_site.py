@@ -25,7 +25,7 @@ def test_a_seed_gives_the_same_events_again(folder):
 def test_many_seeds_see_every_accident(folder):
     happened: Counter[str] = Counter()
     for seed in range(100, 105):
-        site = alpha_site(seed, 5, 2.0, 60, folder / str(seed))
+        site = alpha_site(seed, 4, 2.0, 60, folder / str(seed))
         assert broken_rules(site) == [], f"seed {seed}"
         happened.update(site.accidents)
     assert set(happened) == set(ACCIDENTS)
