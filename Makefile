@@ -40,16 +40,16 @@ docs: $(VENV)/.dev  ## Build the documentation site in build/site, with its link
 	  echo "diagrams will be shown as text: npm or its registry is not there"
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-sbom: build/sbom.json  ## Bill of materials of what runs, CycloneDX, in build/sbom.json
+sbom: build/sbom.json  ## Bill of materials of the image, CycloneDX, in build/sbom.json
 
-build/sbom.json: requirements/runtime.txt pyproject.toml $(VENV)/.dev
+build/sbom.json: requirements/fleet.txt pyproject.toml $(VENV)/.dev
 	@mkdir -p build
-	$(BIN)/python -W ignore $(BIN)/cyclonedx-py requirements requirements/runtime.txt --index-url index \
+	$(BIN)/python -W ignore $(BIN)/cyclonedx-py requirements requirements/fleet.txt --index-url index \
 	  --pyproject pyproject.toml --output-reproducible --output-format JSON --output-file $@
 
 audit: $(VENV)/.dev  ## Known holes in the pinned packages; says so if the service that knows them is away
 	$(UV) pip check
-	$(BIN)/python .ci/audit.py requirements/runtime.txt
+	$(BIN)/python .ci/audit.py requirements/fleet.txt
 
 image:  ## Image of the containers; make image BUILDER="buildah --storage-driver vfs" where there is no Docker
 	$(BUILDER) build --build-arg BASE=$(BASE) --file docker/Dockerfile --tag $(IMAGE) .
