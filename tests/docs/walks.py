@@ -85,11 +85,14 @@ WALKS = (
         ("docs/fleet.md",),
         given="""mkdir -p stations && cp "$ROOT"/simulator/stations/alpha.toml stations/
 wetwell dataset --out set --count 2 --days 0.5
-wetwell simulate --station alpha --days 1 --seed 5 --out a.parquet
+wetwell simulate --station alpha --days 0.5 --seed 5 --out a.parquet
 printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
         before=("wetwell router",),
         services=("wetwell fleet --stations stations --shards",),
-        changed={"--out report --scheduler tcp://192.0.2.10:8786": "--out report --scheduler local"},
+        changed={
+            "--detectors all --out report --scheduler tcp://192.0.2.10:8786": "--detectors wetwell --out report "
+            "--scheduler local"
+        },
         left_out={
             "wetwell fleet --stations stations.csv": "needs a cluster; tests/integration/test_fleet.py starts one",
             "WETWELL_DETECTOR__STATE_DIR=state wetwell detector release": "needs a quarantined station; "
