@@ -1,7 +1,7 @@
 """A fleet beside one detector process on the same load, and a worker that is killed. Prints one JSON object.
 
 python benchmarks/fleet.py --stations 200 --seconds 60
-python benchmarks/fleet.py --stations 200 --seconds 60 --accelerate 20    # until something is the limit
+python benchmarks/fleet.py --stations 200 --seconds 600 --accelerate 20 --health-s 1    # until something is the limit
 
 Router, detector and fleet run as users start them; one more process plays the stations. Every verdict is compared,
 byte for byte, with what a detector says that takes the same samples from its checkpoint on without a bus.
@@ -31,8 +31,8 @@ from wetwell.detector.pipeline import Detector
 from wetwell.protocols.station import load_station
 from wetwell.protocols.zenoh_link import connect_client
 
-HEALTH_S = 0.5
-"""How often a judge says how many samples it has had; a time is found to this."""
+KILLED_HEALTH_S = 0.5
+"""How often a judge says how many samples it has had while a worker is killed; the time is found to this."""
 SHARDS = 8
 
 Told = dict[tuple[str, int, int], bytes]
@@ -65,15 +65,18 @@ def workers_of(pid: int) -> list[int]:
     return found or [pid]
 
 
-async def run(folder: Path, load: list[Played], accelerate: float, words: list[str], kill_s: float | None) -> Any:
+async def run(
+    folder: Path, load: list[Played], accelerate: float, health_s: float, words: list[str], kill_s: float | None
+) -> Any:
     """Figures of one way to judge; with `kill_s` a worker is killed so long after the first sample."""
+    health_s = health_s if kill_s is None else KILLED_HEALTH_S
     with socket.create_server(("127.0.0.1", 0)) as free:
         endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
     state = folder / "state-of-run"
     shutil.rmtree(state, ignore_errors=True)
     shutil.copytree(folder / "state", state)
     commands = {"router": ["router"], "judges": words}
-    tables = {"detector": {"state_dir": str(state)}, "health": {"period_s": HEALTH_S}}
+    tables = {"detector": {"state_dir": str(state)}, "health": {"period_s": health_s}}
     with started(commands, endpoint, **tables) as running, await connect_client(endpoint) as bus:
         site = Site(bus, {})
         hearing = [asyncio.create_task(site.hear_verdicts()), asyncio.create_task(site.hear_statuses())]
@@ -129,7 +132,7 @@ def is_one_behind(site: Site, load: list[Played], accelerate: float) -> bool:
     """Whether a station is further behind the foremost one than the health figures are old."""
     judged = site.judged
     had = [judged.get(each.name, 0.0) - each.begin_s for each in load]
-    return max(had) - min(had) > 3.0 * HEALTH_S * accelerate
+    return max(had) - min(had) > 3.0 * KILLED_HEALTH_S * accelerate
 
 
 def compared(site: Site, right: Told) -> dict[str, int]:
@@ -151,6 +154,9 @@ def main() -> None:
     parser.add_argument("--stations", type=int, default=200)
     parser.add_argument("--seconds", type=int, default=60, help="of each station")
     parser.add_argument("--accelerate", type=float, default=1.0, help="samples a second of each station")
+    parser.add_argument(
+        "--health-s", type=float, default=5.0, help="a judge says how far it is; the rate is found to this"
+    )
     given = parser.parse_args()
     load_before = os.getloadavg()[0]
     folder = Path(tempfile.mkdtemp(prefix="wetwell-fleet-"))
@@ -165,7 +171,7 @@ def main() -> None:
             "a_worker_killed": ([*fleet, "2"], given.seconds / given.accelerate / 3.0),
         }
         runs = {
-            name: asyncio.run(run(folder, load, given.accelerate, words, kill_s))
+            name: asyncio.run(run(folder, load, given.accelerate, given.health_s, words, kill_s))
             for name, (words, kill_s) in ways.items()
         }
     finally:

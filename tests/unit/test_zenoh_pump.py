@@ -7,7 +7,7 @@ import zenoh
 
 from wetwell.protocols.kept import KeptMessages, read_query
 from wetwell.protocols.zenoh_feed import Feed
-from wetwell.protocols.zenoh_pump import PERIOD_S, ZenohPump
+from wetwell.protocols.zenoh_pump import PERIOD_S, TOLD_AT_ONCE, ZenohPump
 
 KEY = "wetwell/alpha/sample"
 
@@ -133,3 +133,18 @@ def test_a_publisher_that_keeps_less_than_is_missing_is_not_asked_for_ever(bench
     bench.go_on(0.1)
     assert bench.got == [b"0", *(b"%d" % number for number in range(15, 20))]
     assert "14 messages are lost" in caplog.text
+
+
+def test_no_period_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forgotten():
+    bench = Bench()
+    told: list[int] = []
+
+    def publisher(number):
+        return SimpleNamespace(settle=lambda _: told.append(number) or True)
+
+    bench.pump._publishers = [publisher(number) for number in range(1_000)]
+    rounds = 1_000 // TOLD_AT_ONCE
+    for number in range(rounds):
+        bench.pump._settle(0.0)
+        assert len(told) == (number + 1) * TOLD_AT_ONCE
+    assert sorted(told) == list(range(1_000))
