@@ -31,6 +31,7 @@ async def serve_all(
     commands: Mapping[str, Sequence[str]],
     show: Callable[[Verdict], None],
     limit_s: float | None,
+    greet: Callable[[], None],
 ) -> None:
     """Run router and children until stopped, until the time is over, or until a child ends.
 
@@ -46,6 +47,8 @@ async def serve_all(
         Gets each verdict.
     limit_s : float, optional
         Time after which all is stopped. [s]
+    greet : callable
+        Called when the router listens and Ctrl-C is heard.
 
     Raises
     ------
@@ -56,6 +59,7 @@ async def serve_all(
     """
     async with stop_event() as stop:
         with listen(settings) as bus:
+            greet()
             running = asyncio.create_task(_run(settings, bus, station, commands, show), name="up.run")
             if limit_s is not None:
                 asyncio.get_running_loop().call_later(limit_s, stop.set)

@@ -60,8 +60,6 @@ def up(
         settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
     limit_s = None if limit is None else parse_duration_s(limit)
     plant, speed = live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
-    if not as_json:
-        typer.echo(banner(settings, plant.station, plant.scenario.name, speed))
     live = [
         "--station",
         station,
@@ -82,7 +80,13 @@ def up(
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
         settings = with_data(settings, data, Path(folder))
-        run(settings, serve_all(settings, plant.station.name, commands, line_printer(as_json=as_json), limit_s))
+        show = line_printer(as_json=as_json)
+
+        def greet() -> None:
+            if not as_json:
+                typer.echo(banner(settings, plant.station, plant.scenario.name, speed))
+
+        run(settings, serve_all(settings, plant.station.name, commands, show, limit_s, greet))
 
 
 @app.command()
