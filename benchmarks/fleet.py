@@ -15,7 +15,6 @@ import os
 import platform
 import shutil
 import signal
-import socket
 import tempfile
 import time
 from pathlib import Path
@@ -23,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from site_load import SETTLE_S, Played, play, prepare
-from site_processes import PATIENCE_S, Site, cpu_and_memory, started
+from site_processes import PATIENCE_S, Site, cpu_and_memory, free_endpoint, started
 
 from wetwell.detector.block import blocks
 from wetwell.detector.nominal import nominal_of
@@ -70,8 +69,7 @@ async def run(
 ) -> Any:
     """Figures of one way to judge; with `kill_s` a worker is killed so long after the first sample."""
     health_s = health_s if kill_s is None else KILLED_HEALTH_S
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    endpoint = free_endpoint()
     state = folder / "state-of-run"
     shutil.rmtree(state, ignore_errors=True)
     shutil.copytree(folder / "state", state)

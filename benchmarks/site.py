@@ -12,7 +12,6 @@ import multiprocessing
 import os
 import platform
 import shutil
-import socket
 import sqlite3
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from site_load import SETTLE_S, Played, play, prepare
-from site_processes import Site, started
+from site_processes import Site, free_endpoint, started
 from site_week import memory_of_a_week
 
 from wetwell.protocols.keys import SITE
@@ -144,8 +143,7 @@ def main() -> None:
             print(json.dumps(memory_of_a_week(Path(week_folder), arguments.stations, arguments.week), indent=2))
         return
     stations, period_s = arguments.stations, max(arguments.seconds / arguments.accelerate / 180.0, 1.0)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    endpoint = free_endpoint()
     load_before = os.getloadavg()[0]
     folder = Path(tempfile.mkdtemp(prefix="wetwell-site-"))
     try:

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -37,6 +38,12 @@ def started(
         for process in reversed(running.values()):
             process.terminate()
             process.wait()
+
+
+def free_endpoint() -> str:
+    """Where a router of ours may listen."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
 
 
 def cpu_and_memory(pid: int) -> tuple[float, float]:

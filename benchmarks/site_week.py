@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from site_processes import cpu_and_memory
 
 from wetwell.protocols.keys import alarm_key, sample_key, verdict_key
 from wetwell.protocols.link import Subscription
@@ -25,7 +26,6 @@ from wetwell.simulator.simulation import Simulation
 
 HOUR_S = 3_600
 SCENARIOS = ("nominal", "demo")
-PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 class Week:
@@ -113,7 +113,7 @@ class Week:
 
 def memory_mb() -> float:
     """Resident memory of this process."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_BYTES / 1e6
+    return cpu_and_memory(os.getpid())[1]
 
 
 def memory_of_a_week(folder: Path, stations: int, days: int) -> dict[str, object]:
