@@ -51,7 +51,7 @@ class SampleBlock(Message):
             raise ValueError(f"time: {len(self.time)} values, must be {samples} as in seq")
         for place, column in enumerate(_columns(self)):
             if len(column) not in {0, samples}:
-                raise ValueError(f"column {place + 1}: {len(column)} values, must be {samples} as in seq, or none")
+                raise ValueError(f"{_name(place)}: {len(column)} values, must be {samples} as in seq, or none")
         return self
 
     @classmethod
@@ -124,6 +124,14 @@ def _columns(block: SampleBlock) -> list[tuple[float | bool | None, ...]]:
     for pump in block.pumps:
         columns += (pump.frequency_hz, pump.flow_m3h, pump.head_m, pump.power_kw, pump.running)
     return columns
+
+
+def _name(place: int) -> str:
+    """Name of a column, as in a recording."""
+    if place < 2:
+        return ("level_m", "inflow_m3h")[place]
+    pump, quantity = divmod(place - 2, 5)
+    return f"pump{pump + 1}_{list(PumpBlock.model_fields)[quantity]}"
 
 
 def _column(values: Sequence[T | None]) -> tuple[T | None, ...]:

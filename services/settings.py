@@ -35,13 +35,15 @@ class ZenohTlsSettings(Table):
 class ZenohSettings(Table):
     """The bus: where; as whom (`user`); for a router whom it lets in (`users_file`) and to what (`access_control`).
 
-    `upstream`: routers that a router connects to, as a branch of their tree.
+    `upstream`: routers that a router connects to, as a branch of their tree. `gather_s`: so long gateway, simulator
+    and replay gather the samples of a station into one message; with 0 each is sent at once, by itself.
 
     A password comes from `password_file`, or from the environment as `WETWELL_ZENOH__PASSWORD`.
     """
 
     endpoint: Endpoint = "tcp/127.0.0.1:7447"
     upstream: tuple[Endpoint, ...] = ()
+    gather_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     user: str | None = None
     password: SecretStr | None = None
     password_file: Path | None = None
