@@ -14,8 +14,9 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS
-from wetwell.services.historian.float_arrays import from_postgres, to_postgres
-from wetwell.services.historian.hours import HOUR_NS, Hours
+from wetwell.services.historian.float_arrays import COPY_END, COPY_HEADER, copy_rows, from_postgres
+from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.rows import HOUR_NS, unpack
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store import (
     DAY_NS,
@@ -175,7 +176,9 @@ class PostgresStore:
             "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s",
             (station, start_ns, end_ns),
         )
-        return Samples.of_rows([(*key, from_postgres(values)) for *key, values in rows])
+        return Samples.of_rows(
+            [(time_ns, seq, 1, quality, from_postgres(values)) for time_ns, seq, quality, values in rows]
+        )
 
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
@@ -386,13 +389,15 @@ class PostgresStore:
 
 
 def _copy(database: psycopg.Connection[Any], batch: Batch, ids: dict[str, int]) -> int:
-    """Samples by COPY into a temporary table, and from there those that are new."""
+    """Samples, each a row, by COPY into a temporary table, and from there those that are new."""
     if not batch.samples:
         return 0
+    stations = np.array([ids[row.station] for row in batch.samples])
     with database.cursor().copy("COPY incoming FROM STDIN (FORMAT BINARY)") as copy:
-        copy.set_types(["int4", "int8", "int8", "int2", "bytea"])  # the bytes are those of a float8[]
-        for row, values in zip(batch.samples, to_postgres([row.data for row in batch.samples]), strict=True):
-            copy.write_row((ids[row.station], row.time_ns, row.seq, row.quality, values))
+        copy.write(COPY_HEADER)
+        for part in unpack([(row.time_ns, row.seq, row.size, row.quality, row.data) for row in batch.samples]):
+            copy.write(copy_rows(stations[part.row], part.time_ns, part.seq, part.quality, part.values))
+        copy.write(COPY_END)
     return database.execute(
         "INSERT INTO wetwell.sample SELECT * FROM incoming ORDER BY station, time_ns, seq ON CONFLICT DO NOTHING"
     ).rowcount
