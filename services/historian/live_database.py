@@ -32,7 +32,8 @@ _SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
 """Size, station, time, `seq` of a `SampleRow`: inserting rows of a page together takes half the time."""
 
 _OF_STATION = "FROM sample WHERE station = (SELECT id FROM station WHERE name = :station) "
-_TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND last_ns >= :start "
+_LAST = "coalesce(last_ns, time_ns)"
+_TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
 """Rows that may have a sample of a span: since a row keeps to its hour, none before the hour of the start has one."""
 
 _PACKED = "time_ns, seq, size, quality, data"
@@ -79,11 +80,19 @@ class LiveDatabase:
             new = 0
             for size, rows in itertools.groupby(sorted(batch.samples, key=_SIZE_AND_KEY), _SIZE):
                 values = [
-                    (ids[row.station], row.time_ns, row.seq, size, _checksum(row), row.last_ns, row.quality, row.data)
+                    (
+                        ids[row.station],
+                        row.time_ns,
+                        _key(row),
+                        row.quality,
+                        row.data,
+                        size,
+                        None if size == 1 else row.last_ns,
+                    )
                     for row in rows
                 ]
                 before = database.total_changes
-                database.executemany("INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", values)
+                database.executemany("INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?)", values)
                 new += size * (database.total_changes - before)
             before = database.total_changes
             database.executemany(
@@ -163,13 +172,13 @@ class LiveDatabase:
         with self._reading() as database:
             (whole,) = database.execute(
                 f"SELECT coalesce(sum(size), 0) FROM (SELECT size {_OF_STATION} "  # noqa: S608 - as above
-                "AND time_ns >= :start AND time_ns < :end AND last_ns < :end LIMIT :most)",
+                f"AND time_ns >= :start AND time_ns < :end AND {_LAST} < :end LIMIT :most)",
                 span | {"most": most},
             ).fetchone()
             if whole >= most:
                 return most
             cut = database.execute(
-                f"SELECT {_PACKED} {_TOUCHING} AND (time_ns < :start OR last_ns >= :end)", span
+                f"SELECT {_PACKED} {_TOUCHING} AND (time_ns < :start OR {_LAST} >= :end)", span
             ).fetchall()
         return min(most, int(whole) + len(Samples.of_rows(cut).between(start_ns, end_ns)))
 
@@ -183,7 +192,7 @@ class LiveDatabase:
             if count == len(samples):
                 database.execute(f"DELETE {_TOUCHING}", span)
                 return
-            rows = database.execute(f"SELECT {_PACKED}, station, digest {_TOUCHING}", span).fetchall()
+            rows = database.execute(f"SELECT {_PACKED}, station {_TOUCHING}", span).fetchall()
             known = set(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
             others = {
                 number
@@ -192,12 +201,8 @@ class LiveDatabase:
                 if tuple(key) not in known
             }
             database.executemany(
-                "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ? AND size = ? AND digest = ?",
-                [
-                    (number, time_ns, seq, size, digest)
-                    for place, (time_ns, seq, size, _, _, number, digest) in enumerate(rows)
-                    if place not in others
-                ],
+                "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?",
+                [(row[5], row[0], row[1]) for place, row in enumerate(rows) if place not in others],
             )
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
@@ -294,9 +299,9 @@ def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:
     return {"station": station, "hour": hour_ns, "start": start_ns, "end": end_ns}
 
 
-def _checksum(row: SampleRow) -> int:
-    """Checksum of times and `seq` of a row of several samples; 0 for one sample."""
-    return zlib.crc32(row.data[-16 * row.size :]) if row.size > 1 else 0
+def _key(row: SampleRow) -> int:
+    """Number of a sample, or of several samples one below 0 from all of their times and numbers."""
+    return row.seq if row.size == 1 else -1 - zlib.crc32(row.data[-16 * row.size :])
 
 
 def _digest(payload: bytes) -> bytes:

@@ -12,19 +12,13 @@ log = logging.getLogger(__name__)
 
 VERSION = 2
 
-_SAMPLE = """
-CREATE TABLE sample (
-    station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, size INTEGER NOT NULL,
-    digest INTEGER NOT NULL, last_ns INTEGER NOT NULL, quality INTEGER NOT NULL, data BLOB NOT NULL,
-    PRIMARY KEY (station, time_ns, seq, size, digest)
-) WITHOUT ROWID;
-"""
-"""Rows as `SampleRow`; `digest` tells rows that begin alike from each other."""
-
 _SCHEMA = f"""
 BEGIN IMMEDIATE;
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
-{_SAMPLE}
+CREATE TABLE sample (
+    station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, quality INTEGER NOT NULL,
+    data BLOB NOT NULL, size INTEGER NOT NULL DEFAULT 1, last_ns INTEGER, PRIMARY KEY (station, time_ns, seq)
+) WITHOUT ROWID;
 CREATE TABLE event (
     id INTEGER PRIMARY KEY, kind TEXT NOT NULL, station INTEGER NOT NULL, time_ns INTEGER NOT NULL,
     digest BLOB NOT NULL, payload BLOB NOT NULL, UNIQUE (kind, station, time_ns, digest)
@@ -35,17 +29,17 @@ CREATE TABLE hour (
 PRAGMA user_version = {VERSION};
 COMMIT;
 """
+"""A row of `sample` is a `SampleRow`. For one sample `last_ns` is NULL. For several `seq` is a number below 0, which
+tells rows from each other that begin at the same time."""
 
-_FROM_VERSION_1 = f"""
+_FROM_VERSION_1 = """
 BEGIN IMMEDIATE;
-ALTER TABLE sample RENAME TO sample_1;
-{_SAMPLE}
-INSERT INTO sample SELECT station, time_ns, seq, 1, 0, time_ns, quality, data FROM sample_1;
-DROP TABLE sample_1;
+ALTER TABLE sample ADD COLUMN size INTEGER NOT NULL DEFAULT 1;
+ALTER TABLE sample ADD COLUMN last_ns INTEGER;
 PRAGMA user_version = 2;
 COMMIT;
-"""  # noqa: S608 - a constant
-"""Version 1 had rows of one sample."""
+"""
+"""Version 1 had rows of one sample. No row is written anew: a large site has some ten gigabytes of them."""
 
 
 def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], AbstractContextManager[None]]) -> None:
@@ -66,8 +60,8 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
     elif version == 1:
         with alone():
             if _version(database) == 1:  # else another has done it meanwhile
-                log.warning("%s: is upgraded from version 1, which may take minutes", path)
                 database.executescript(_FROM_VERSION_1)
+                log.info("%s: upgraded from version 1 to 2", path)
 
 
 def _version(database: sqlite3.Connection) -> int:

@@ -128,7 +128,7 @@ LiveDatabase(Path(sys.argv[1]), contextlib.nullcontext)
 """
 
 
-@pytest.mark.parametrize("statement", ["DROP TABLE sample_1", "COMMIT"])
+@pytest.mark.parametrize("statement", ["ADD COLUMN last_ns", "COMMIT"])
 def test_an_upgrade_that_is_killed_leaves_the_earlier_database(tmp_path: Path, statement: str) -> None:
     path = tmp_path / "live.sqlite"
     store = FolderStore(tmp_path)

@@ -189,6 +189,7 @@ def test_a_database_of_version_1_is_upgraded_and_nothing_is_lost(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     of_version_1(tmp_path / "live.sqlite", 300)
+    caplog.set_level("INFO")
     for _ in range(2):
         with contextlib.closing(FolderStore(tmp_path)) as store:
             samples = store.samples("alpha", 0, DAY_NS)
@@ -199,7 +200,7 @@ def test_a_database_of_version_1_is_upgraded_and_nothing_is_lost(
             assert store.events("verdicts", "alpha", 0, 10, 10) == ["{}"]
             assert store.hours("alpha", 0, DAY_NS).values.tolist() == [[1.0]]
             assert store.write(Batch(samples=[pack("alpha", sample(3))])) == 0
-    assert caplog.text.count("is upgraded from version 1") == 1
+    assert caplog.text.count("upgraded from version 1 to 2") == 1
     with contextlib.closing(FolderStore(tmp_path)) as store:
         historian = Historian(store)
         historian.take("blocks", block(298, 299, 300).encode())
