@@ -171,12 +171,18 @@ def test_a_folder_gives_the_same_for_blocks_as_for_samples(
 def test_postgresql_gives_the_same_for_blocks_as_for_samples(
     postgres, pool: list[Sample], acts: list[Act], spans: list[tuple[int, int]]
 ) -> None:
-    def empty() -> Store:
+    def empty() -> None:
         with psycopg.connect(postgres.url, autocommit=True) as database:
             database.execute("DROP SCHEMA IF EXISTS wetwell CASCADE")
+
+    def make() -> Store:
+        empty()
         return PostgresStore(postgres.url)
 
-    compare(empty, pool, acts, spans)
+    try:
+        compare(make, pool, acts, spans)
+    finally:
+        empty()
 
 
 @limits(max_examples=40)
