@@ -4,6 +4,7 @@ import contextlib
 import re
 import sqlite3
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,10 @@ def block(*numbers: int, pumps: int = 3) -> SampleBlock:
     return SampleBlock.of([sample(number, pumps) for number in numbers])
 
 
+def samples_of(rows: list[SampleRow]) -> Samples:
+    return Samples.of_rows([(row.time_ns, row.seq, row.size, row.quality, row.data) for row in rows])
+
+
 def sizes(rows: list[SampleRow]) -> list[int]:
     return [row.size for row in rows]
 
@@ -92,6 +97,17 @@ def test_a_row_ends_where_time_falls_and_at_the_hour() -> None:
 
 def test_a_block_of_one_is_the_row_of_its_sample() -> None:
     assert pack_block(block(4)) == [pack("alpha", sample(4))]
+
+
+def test_samples_come_out_of_their_rows_as_they_went_in() -> None:
+    whole = samples_of(pack_block(block(*range(20))))
+    mixed = replace(whole, quality=np.arange(20) // 7 % 3)
+    rows = mixed.rows("alpha")
+    assert sizes(rows) == [3, 4, 3, 4, 6]
+    again = samples_of(rows[::-1])
+    for name in ("time_ns", "seq", "quality", "values"):
+        assert np.array_equal(getattr(again, name), getattr(mixed, name), equal_nan=True), name
+    assert again.values[:, 3].tolist() == list(range(20))
 
 
 @pytest.mark.parametrize(
@@ -193,8 +209,7 @@ def test_a_database_of_version_1_is_upgraded_and_nothing_is_lost(
     for _ in range(2):
         with contextlib.closing(FolderStore(tmp_path)) as store:
             samples = store.samples("alpha", 0, DAY_NS)
-            packed = [pack("alpha", sample(number)) for number in range(300)]
-            expected = Samples.of_rows([(row.time_ns, row.seq, 1, row.quality, row.data) for row in packed])
+            expected = samples_of([pack("alpha", sample(number)) for number in range(300)])
             assert samples.time_ns.tolist() == expected.time_ns.tolist()
             assert np.array_equal(samples.values, expected.values, equal_nan=True)
             assert store.events("verdicts", "alpha", 0, 10, 10) == ["{}"]
