@@ -163,7 +163,7 @@ class HistorianSettings(Table):
 
     `url` names a PostgreSQL database that is used in place of the folder, such as `postgresql://user@host/name`; its
     password may stand in `password_file`. Days count back from the newest sample of a station. A batch is kept each
-    `commit_s`; up to `spool_rows` wait in memory while the disk or the database refuses.
+    `commit_s`; up to `spool_rows` samples and messages wait in memory while the disk or the database refuses.
     """
 
     folder: Path = Path("wetwell-data")
