@@ -1,7 +1,7 @@
 """A fleet beside one detector process on the same load, and a worker that is killed. Prints one JSON object.
 
 python benchmarks/fleet.py --stations 200 --seconds 60
-python benchmarks/fleet.py --stations 200 --seconds 600 --accelerate 20 --health-s 1    # until something is the limit
+python benchmarks/fleet.py --stations 200 --seconds 12000 --accelerate 1000 --gather 60 --health-s 1    # no pause
 
 Router, detector and fleet run as users start them; one more process plays the stations. Every verdict is compared,
 byte for byte, with what a detector says that takes the same samples from its checkpoint on without a bus.
@@ -65,10 +65,11 @@ def workers_of(pid: int) -> list[int]:
 
 
 async def run(
-    folder: Path, load: list[Played], accelerate: float, health_s: float, words: list[str], kill_s: float | None
+    folder: Path, load: list[Played], given: argparse.Namespace, words: list[str], kill_s: float | None
 ) -> Any:
     """Figures of one way to judge; with `kill_s` a worker is killed so long after the first sample."""
-    health_s = health_s if kill_s is None else KILLED_HEALTH_S
+    health_s = given.health_s if kill_s is None else KILLED_HEALTH_S
+    samples = len(load) * given.seconds
     endpoint = free_endpoint()
     state = folder / "state-of-run"
     shutil.rmtree(state, ignore_errors=True)
@@ -86,7 +87,7 @@ async def run(
         before = {pid: cpu_and_memory(pid) for pid in {judges, *workers_of(judges)}}
         sent_file = folder / "sent.npz"
         player = multiprocessing.get_context("spawn").Process(
-            target=play, args=(endpoint, load, accelerate, sent_file), daemon=True
+            target=play, args=(endpoint, load, given.accelerate, sent_file, given.gather), daemon=True
         )
         sent_file.unlink(missing_ok=True)
         player.start()
@@ -96,7 +97,7 @@ async def run(
         killed_s = time.monotonic()
         async with asyncio.timeout(PATIENCE_S):
             while not sent_file.exists() or not is_through(site, load):
-                if kill_s is not None and is_one_behind(site, load, accelerate):
+                if kill_s is not None and is_one_behind(site, load, given.accelerate):
                     figures["all_judged_again_after_s"] = round(time.monotonic() - killed_s, 1)
                 await asyncio.sleep(0.1)
         through_s = time.monotonic()
@@ -110,13 +111,13 @@ async def run(
         sent_s = sent["sent_s"]
     wall_s = through_s - float(sent_s.min())
     figures |= {
-        "sent_per_s": round(sent_s.size / float(np.ptp(sent_s)), 1),
-        "judged_per_s": round(sent_s.size / wall_s, 1),
+        "sent_per_s": round(samples / float(np.ptp(sent_s)), 1),
+        "judged_per_s": round(samples / wall_s, 1),
         "memory_mb": round(sum(memory for _, memory in after.values()), 1),
     }
     if kill_s is None:
         spent_s = sum(cpu - before[pid][0] for pid, (cpu, _) in after.items())
-        figures["cpu_us_a_sample"] = round(1e6 * spent_s / sent_s.size, 1)
+        figures["cpu_us_a_sample"] = round(1e6 * spent_s / samples, 1)
     return figures | compared(site, wanted(folder, load))
 
 
@@ -152,6 +153,7 @@ def main() -> None:
     parser.add_argument("--stations", type=int, default=200)
     parser.add_argument("--seconds", type=int, default=60, help="of each station")
     parser.add_argument("--accelerate", type=float, default=1.0, help="samples a second of each station")
+    parser.add_argument("--gather", type=int, default=1, help="samples in a message")
     parser.add_argument(
         "--health-s", type=float, default=5.0, help="a judge says how far it is; the rate is found to this"
     )
@@ -168,16 +170,14 @@ def main() -> None:
             "fleet_of_2_workers": ([*fleet, "2"], None),
             "a_worker_killed": ([*fleet, "2"], given.seconds / given.accelerate / 3.0),
         }
-        runs = {
-            name: asyncio.run(run(folder, load, given.accelerate, given.health_s, words, kill_s))
-            for name, (words, kill_s) in ways.items()
-        }
+        runs = {name: asyncio.run(run(folder, load, given, words, kill_s)) for name, (words, kill_s) in ways.items()}
     finally:
         shutil.rmtree(folder)
     result = {
         "stations": given.stations,
         "seconds": given.seconds,
         "accelerate": given.accelerate,
+        "gather": given.gather,
         "shards": SHARDS,
         **runs,
         "load": {"before": load_before, "after": os.getloadavg()[0]},

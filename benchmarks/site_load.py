@@ -12,8 +12,9 @@ import numpy as np
 from wetwell.detector.block import blocks
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import sample_key
+from wetwell.protocols.keys import sample_block_key, sample_key
 from wetwell.protocols.recording import Recording
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.zenoh_link import connect_client
 from wetwell.services.presets import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
@@ -75,25 +76,33 @@ def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
     return sorted(played, key=lambda each: each.name)
 
 
-def play(endpoint: str, played: list[Played], accelerate: float, out: Path) -> None:
-    """Publish each station at so many samples a second, spread over it; keep when each was sent."""
+def messages_of(each: Played, gather: int) -> list[bytes]:
+    """What a station says: its samples one by one, or so many in a message."""
+    samples = list(each.recording.samples(each.name, each.begin_s))
+    if gather == 1:
+        return [sample.encode() for sample in samples]
+    return [SampleBlock.of(samples[at : at + gather]).encode() for at in range(0, len(samples), gather)]
+
+
+def play(endpoint: str, played: list[Played], accelerate: float, out: Path, gather: int = 1) -> None:
+    """Publish each station at so many samples a second, `gather` in a message, spread over it; keep when."""
 
     async def run() -> None:
         with await connect_client(endpoint) as bus:
-            publishers = [bus.publisher(sample_key(each.name), history=HISTORY) for each in played]
-            messages = [
-                [sample.encode() for sample in each.recording.samples(each.name, each.begin_s)] for each in played
-            ]
-            sent_s = np.full((len(played[0].recording), len(played)), np.nan)
+            key = sample_key if gather == 1 else sample_block_key
+            publishers = [bus.publisher(key(each.name), history=HISTORY // gather) for each in played]
+            messages = [messages_of(each, gather) for each in played]
+            sent_s = np.full((len(messages[0]), len(played)), np.nan)
+            messages_a_second = accelerate / gather * len(played)
             await asyncio.sleep(SETTLE_S)
             start_s, count, late_s = time.monotonic(), 0, 0.0
             while count < sent_s.size:
-                due = min(int((time.monotonic() - start_s) * accelerate * len(played)) + 1, sent_s.size)
+                due = min(int((time.monotonic() - start_s) * messages_a_second) + 1, sent_s.size)
                 while count < due:
                     second, station = divmod(count, len(played))
                     sent_s[second, station] = now_s = time.monotonic()
                     publishers[station].put(messages[station][second])
-                    late_s = max(late_s, now_s - start_s - count / (accelerate * len(played)))
+                    late_s = max(late_s, now_s - start_s - count / messages_a_second)
                     count += 1
                 await asyncio.sleep(TICK_S)
             np.savez(out, sent_s=sent_s, late_s=late_s)

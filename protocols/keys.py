@@ -10,6 +10,11 @@ def sample_key(station: str) -> str:
     return f"{ROOT}/{station}/sample"
 
 
+def sample_block_key(station: str) -> str:
+    """Key of the samples of a station, many in a message."""
+    return f"{ROOT}/{station}/samples"
+
+
 def verdict_key(station: str, pump: int | str = "*") -> str:
     """Key of the verdicts on one pump (from 1), or of all pumps of the station."""
     return f"{ROOT}/{station}/verdict/{pump}"

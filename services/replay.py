@@ -4,17 +4,16 @@ import asyncio
 import contextlib
 import logging
 
-from wetwell.protocols.keys import sample_key
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.bus import connect
 from wetwell.services.clock import tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
+from wetwell.services.sample_sender import SampleSender
 from wetwell.services.settings import Settings
 
 log = logging.getLogger(__name__)
 
-HISTORY = 600
 MAX_STEP_S = 60.0
 """A longer pause in the recording is cut to this length in the replay; the time stamps stay as they are."""
 
@@ -30,7 +29,8 @@ async def _run(
     settings: Settings, recording: Recording, station: str, speed: float, stack: contextlib.AsyncExitStack
 ) -> None:
     bus = stack.enter_context(await connect(settings))
-    publisher = bus.publisher(sample_key(station), history=HISTORY)
+    sender = SampleSender(bus, station, settings.zenoh.gather_s)
+    stack.callback(sender.flush)
     published = 0
     health = asyncio.create_task(
         report_health(
@@ -44,7 +44,7 @@ async def _run(
     never = asyncio.Event()
     async for elapsed_s in ticks(tick_period_s(speed), never):
         while published < len(due_s) and due_s[published] <= elapsed_s * speed:
-            publisher.put(next(samples).encode())
+            sender.put(next(samples))
             published += 1
         if published == len(due_s):
             break

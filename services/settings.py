@@ -35,13 +35,15 @@ class ZenohTlsSettings(Table):
 class ZenohSettings(Table):
     """The bus: where; as whom (`user`); for a router whom it lets in (`users_file`) and to what (`access_control`).
 
-    `upstream`: routers that a router connects to, as a branch of their tree.
+    `upstream`: routers that a router connects to, as a branch of their tree. `gather_s`: so long gateway, simulator
+    and replay gather the samples of a station into one message; with 0 each is sent at once, by itself.
 
     A password comes from `password_file`, or from the environment as `WETWELL_ZENOH__PASSWORD`.
     """
 
     endpoint: Endpoint = "tcp/127.0.0.1:7447"
     upstream: tuple[Endpoint, ...] = ()
+    gather_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     user: str | None = None
     password: SecretStr | None = None
     password_file: Path | None = None
@@ -161,7 +163,7 @@ class HistorianSettings(Table):
 
     `url` names a PostgreSQL database that is used in place of the folder, such as `postgresql://user@host/name`; its
     password may stand in `password_file`. Days count back from the newest sample of a station. A batch is kept each
-    `commit_s`; up to `spool_rows` wait in memory while the disk or the database refuses.
+    `commit_s`; up to `spool_rows` samples and messages wait in memory while the disk or the database refuses.
     """
 
     folder: Path = Path("wetwell-data")

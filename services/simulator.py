@@ -7,8 +7,6 @@ import ssl
 from collections.abc import Callable
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.keys import sample_key
-from wetwell.protocols.link import Bus
 from wetwell.protocols.modbus_server import ModbusServer
 from wetwell.protocols.recording import Recording
 from wetwell.protocols.stamps import NS_PER_S
@@ -18,13 +16,11 @@ from wetwell.services.bus import connect
 from wetwell.services.clock import due_seconds, tick_period_s
 from wetwell.services.daemon import report_health, stop_event, ticks, until
 from wetwell.services.exposure import is_loopback
+from wetwell.services.sample_sender import SampleSender
 from wetwell.services.settings import ModbusSettings, Settings
 from wetwell.simulator.simulation import Simulation
 
 log = logging.getLogger(__name__)
-
-HISTORY = 600
-"""Samples that the bus keeps for late joiners: ten minutes at one a second."""
 
 Sink = Callable[[Recording], None]
 
@@ -64,7 +60,9 @@ async def _run(
     async with asyncio.TaskGroup() as group:
         if zenoh:
             bus = stack.enter_context(await connect(settings))
-            sinks.append(_zenoh_sink(bus, simulation))
+            sender = SampleSender(bus, simulation.station.name, settings.zenoh.gather_s)
+            stack.callback(sender.flush)
+            sinks.append(_zenoh_sink(sender, simulation))
             group.create_task(
                 report_health(
                     bus,
@@ -90,13 +88,10 @@ async def _live(simulation: Simulation, speed: float, sinks: list[Sink]) -> None
                 sink(recording)
 
 
-def _zenoh_sink(bus: Bus, simulation: Simulation) -> Sink:
-    station = simulation.station.name
-    publisher = bus.publisher(sample_key(station), history=HISTORY)
-
+def _zenoh_sink(sender: SampleSender, simulation: Simulation) -> Sink:
     def publish(recording: Recording) -> None:
-        for sample in recording.samples(station, first_seq=simulation.seconds - len(recording)):
-            publisher.put(sample.encode())
+        for sample in recording.samples(simulation.station.name, first_seq=simulation.seconds - len(recording)):
+            sender.put(sample)
 
     return publish
 

@@ -3,7 +3,7 @@
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer, AlarmFigure, AlarmReport, AlarmState
@@ -11,6 +11,7 @@ from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.keys import SITE, alarm_act_key, alarm_key
 from wetwell.protocols.link import Bus, Presence, Publisher, Request
 from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.station import NAME_PATTERN, Station
 from wetwell.services.alarms.audit import Audit
 from wetwell.services.alarms.book import SHELF, AlarmBook
@@ -61,8 +62,21 @@ class AlarmKeeper:
     def take_sample(self, payload: bytes) -> None:
         """Look at a sample."""
         sample = self._decoded(Sample, payload)
-        if sample is not None and (watch := self._named(sample.station)) is not None:
-            limits = self._limits.get(watch.name) or limits_of(self._settings, None)
+        if sample is not None:
+            self._take_samples(sample.station, [sample])
+
+    def take_sample_block(self, payload: bytes) -> None:
+        """Look at many samples of a station."""
+        block = self._decoded(SampleBlock, payload)
+        if block is not None:
+            self._take_samples(block.station, block.samples())
+
+    def _take_samples(self, station: str, samples: Iterable[Sample]) -> None:
+        watch = self._named(station)
+        if watch is None:
+            return
+        limits = self._limits.get(station) or limits_of(self._settings, None)
+        for sample in samples:
             is_new = watch.take_sample(sample, self._now(), self.book, limits)
             self._counts["samples" if is_new else "doubled"] += 1
 

@@ -11,6 +11,7 @@ from wetwell.protocols.keys import (
     alarm_act_key,
     alarm_report_key,
     alive_key,
+    sample_block_key,
     sample_key,
     status_key,
     verdict_key,
@@ -64,6 +65,7 @@ async def _run(settings: Settings, stations: Sequence[Station], stack: contextli
 async def keep(bus: Bus, keeper: AlarmKeeper, health_period_s: float) -> None:
     """Let a keeper work on a bus for ever."""
     samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
+    sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
     verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY)
     statuses = bus.subscribe(status_key("*", "gateway"), history=1)
     presences = bus.watch(alive_key("*", "*"))
@@ -71,7 +73,7 @@ async def keep(bus: Bus, keeper: AlarmKeeper, health_period_s: float) -> None:
     keeper.publish_all()
 
     def figures() -> dict[str, float]:
-        dropped = samples.dropped + verdicts.dropped + statuses.dropped
+        dropped = samples.dropped + sample_blocks.dropped + verdicts.dropped + statuses.dropped
         return keeper.figures() | {"dropped": float(dropped)}
 
     def answer_report(request: Request) -> None:
@@ -79,6 +81,7 @@ async def keep(bus: Bus, keeper: AlarmKeeper, health_period_s: float) -> None:
 
     async with asyncio.TaskGroup() as group:
         group.create_task(_feed(samples, keeper.take_sample, keeper), name="alarms.samples")
+        group.create_task(_feed(sample_blocks, keeper.take_sample_block, keeper), name="alarms.sample_blocks")
         group.create_task(_feed(verdicts, keeper.take_verdict, keeper), name="alarms.verdicts")
         group.create_task(_feed(statuses, keeper.take_status, keeper), name="alarms.statuses")
         group.create_task(_feed(presences, keeper.take_presence, keeper), name="alarms.presences")

@@ -5,7 +5,15 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
-from wetwell.protocols.keys import alarm_key, alive_key, model_key, sample_key, status_key, verdict_key
+from wetwell.protocols.keys import (
+    alarm_key,
+    alive_key,
+    model_key,
+    sample_block_key,
+    sample_key,
+    status_key,
+    verdict_key,
+)
 from wetwell.protocols.link import Bus, Subscription
 from wetwell.services.daemon import ticks
 from wetwell.services.dashboard.hub import Hub
@@ -37,9 +45,9 @@ class Feed:
         self._hub = hub
         self._bus = bus
         self._past = Past(bus, view, hub)
-        self._samples = bus.subscribe(sample_key("*"), capacity=100_000, recover=False)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
-            (self._samples, view.take_sample),
+            (bus.subscribe(sample_key("*"), capacity=100_000, recover=False), view.take_sample),
+            (bus.subscribe(sample_block_key("*"), capacity=100_000, recover=False), view.take_sample_block),
             (bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY), view.take_verdict),
             (bus.subscribe(model_key("*"), history=1), view.take_model),
             (bus.subscribe(alarm_key("*"), history=1), view.take_alarm),
@@ -51,6 +59,8 @@ class Feed:
         """Take and send for ever, from the last sample of each station on."""
         for payload in await self._bus.ask(sample_key("*"), timeout_s=FIRST_S):
             self._view.take_sample(payload)
+        for payload in await self._bus.ask(sample_block_key("*"), timeout_s=FIRST_S):
+            self._view.take_sample_block(payload)
         async with asyncio.TaskGroup() as group:
             for subscription, take in self._messages:
                 group.create_task(_take(subscription, take))

@@ -10,6 +10,7 @@ from wetwell.protocols.keys import SITE
 from wetwell.protocols.link import Presence
 from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
 from wetwell.protocols.model_messages import Model
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.services.dashboard.station_view import StationView
 
 log = logging.getLogger(__name__)
@@ -46,9 +47,19 @@ class SiteView:
         """Take a sample."""
         sample = self._decoded(Sample, payload)
         if sample is not None:
-            station = self._station(sample.station)
-            if station.take_sample(sample, self._now_s):
-                self._with_news[station.name] = self._with_live[station.name] = station
+            self._take_samples(sample.station, [sample])
+
+    def take_sample_block(self, payload: bytes) -> None:
+        """Take many samples of a station."""
+        block = self._decoded(SampleBlock, payload)
+        if block is not None:
+            self._take_samples(block.station, block.samples())
+
+    def _take_samples(self, name: str, samples: list[Sample]) -> None:
+        station = self._station(name)
+        new = [sample for sample in samples if station.take_sample(sample, self._now_s)]
+        if new:
+            self._with_news[name] = self._with_live[name] = station
 
     def take_verdict(self, payload: bytes) -> None:
         """Take a verdict."""

@@ -1,20 +1,20 @@
 """Samples and orders of many stations from the bus to their judges: one subscription for all of them."""
 
 import asyncio
-import contextlib
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from wetwell.protocols.history_messages import LONGEST_NS
-from wetwell.protocols.keys import order_key, sample_key
+from wetwell.protocols.keys import order_key, sample_block_key, sample_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import MessageError, Sample
+from wetwell.protocols.messages import Sample
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.services.detector.catch_up import missed_samples
-from wetwell.services.detector.judge import StationJudge
+from wetwell.services.detector.judge import StationJudge, behind
 
 SAMPLE_HISTORY = 600
 CAPACITY = 1_000_000
-"""Samples that wait to be judged: after a start a thousand publishers send what they keep."""
+"""Messages that wait to be judged: after a start a thousand publishers send what they keep."""
 BEHIND = 10_000
 """Samples of one station that wait while it catches up."""
 KEPT_S = 2.0
@@ -22,7 +22,7 @@ KEPT_S = 2.0
 CATCH_UPS = 8
 """Stations that ask the historian at the same time."""
 SLICE = 500
-"""Samples that are judged before the other tasks have their turn."""
+"""Messages that are judged before the other tasks have their turn."""
 
 
 class Intake:
@@ -36,17 +36,19 @@ class Intake:
 
     def __init__(self, bus: Bus, judges: Sequence[StationJudge]) -> None:
         self._bus = bus
-        self._judges = {sample_key(judge.station): judge for judge in judges}
-        self._obeying = {order_key(judge.station): judge for judge in judges}
-        self._behind: dict[str, deque[bytes]] = {
-            sample_key(judge.station): deque(maxlen=BEHIND) for judge in judges if judge.is_restored
+        self._judges: dict[str, tuple[StationJudge, type[Sample | SampleBlock]]] = {
+            key(judge.station): (judge, kind)
+            for judge in judges
+            for key, kind in ((sample_key, Sample), (sample_block_key, SampleBlock))
         }
+        self._obeying = {order_key(judge.station): judge for judge in judges}
+        self._behind = {judge: deque[Sample](maxlen=BEHIND) for judge in judges if judge.is_restored}
         self._samples = bus.collect(list(self._judges), history=SAMPLE_HISTORY, capacity=CAPACITY)
         self._orders = bus.collect(list(self._obeying))
 
     @property
     def dropped(self) -> int:
-        """Samples for which there was no room."""
+        """Messages for which there was no room."""
         return self._samples.dropped
 
     async def run(self) -> None:
@@ -55,8 +57,8 @@ class Intake:
             group.create_task(self._judge(), name="detector.samples")
             group.create_task(self._obey(), name="detector.orders")
             turn = asyncio.Semaphore(CATCH_UPS)
-            for key in list(self._behind):
-                group.create_task(self._catch_up(key, turn), name=f"detector.missed.{self._judges[key].station}")
+            for judge in list(self._behind):
+                group.create_task(self._catch_up(judge, turn), name=f"detector.missed.{judge.station}")
 
     async def _judge(self) -> None:
         while True:
@@ -65,10 +67,11 @@ class Intake:
                 batches.setdefault(key, []).append(payload)
             judged = 0
             for key, payloads in batches.items():
-                if key in self._behind:
-                    self._behind[key].extend(payloads)
+                judge, kind = self._judges[key]
+                if judge in self._behind:
+                    self._behind[judge].extend(_samples(judge, payloads, kind))
                     continue
-                self._judges[key].take_payloads(payloads)
+                judge.take_payloads(payloads, kind)
                 judged += len(payloads)
                 if judged >= SLICE:
                     judged = 0
@@ -79,42 +82,31 @@ class Intake:
             for key, payload in await self._orders.receive():
                 self._obeying[key].take_order(payload)
 
-    async def _catch_up(self, key: str, turn: asyncio.Semaphore) -> None:
+    async def _catch_up(self, judge: StationJudge, turn: asyncio.Semaphore) -> None:
         """Take what was missed, then what came meanwhile.
 
         The bus keeps samples in the order in which they came, the historian in that of their stamps, which differs
         where a clock was set: only what the bus keeps no more is taken from the historian.
         """
-        judge, waiting = self._judges[key], self._behind[key]
+        waiting = self._behind[judge]
         last = judge.detector.last_heard
         await asyncio.sleep(KEPT_S)
         async with turn:
-            until_ns = _begin_ns(waiting)
+            until_ns = min(waiting[0].time, LONGEST_NS) if waiting else LONGEST_NS
             async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
-                if _place(last, waiting):
+                if any((sample.time, sample.seq) == last for sample in waiting):
                     break
                 await judge.take(samples)
                 last = samples[-1].time, samples[-1].seq
-        del self._behind[key]
-        judge.take_payloads(list(waiting)[_place(last, waiting) :])
+        del self._behind[judge]
+        judge.take_samples(behind(last, list(waiting)))
 
 
-def _begin_ns(payloads: Iterable[bytes]) -> int:
-    """Time of the first sample; as late as can be if there is none."""
+def _samples(judge: StationJudge, payloads: Iterable[bytes], kind: type[Sample | SampleBlock]) -> Iterator[Sample]:
+    """What is in payloads, one by one."""
     for payload in payloads:
-        with contextlib.suppress(MessageError):
-            return min(Sample.decode(payload).time, LONGEST_NS)
-    return LONGEST_NS
-
-
-def _place(last: tuple[int, int], payloads: Sequence[bytes]) -> int:
-    """Place behind the sample of this time and number; 0 if it is not there.
-
-    The detector takes a long row of samples that it has had for a clock that was set back.
-    """
-    for place in range(len(payloads), 0, -1):
-        with contextlib.suppress(MessageError):
-            sample = Sample.decode(payloads[place - 1])
-            if (sample.time, sample.seq) == last:
-                return place
-    return 0
+        message = judge.decoded(payload, kind)
+        if isinstance(message, SampleBlock):
+            yield from message.samples()
+        elif message is not None:
+            yield message

@@ -4,15 +4,19 @@ import asyncio
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
 
+import numpy as np
+
+from wetwell.detector.block import Block
 from wetwell.detector.dispatch import Costs
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
 from wetwell.protocols.keys import verdict_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import MessageError, Order, Sample, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.station import Station
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.quarantine import Quarantine
@@ -71,23 +75,30 @@ class StationJudge:
             for verdict in told.verdicts:
                 self._publish(verdict)
 
-    def take_payloads(self, payloads: Iterable[bytes]) -> None:
-        """Judge what has come from the bus. A payload that is no sample is counted and left out."""
+    def take_payloads(self, payloads: Iterable[bytes], kind: type[Sample | SampleBlock] = Sample) -> None:
+        """Judge what has come from the bus. A payload that is not of its kind is counted and left out."""
         self._quarantine.enter(self.station)
         for payload in payloads:
-            self.take_payload(payload)
+            message = self.decoded(payload, kind)
+            if isinstance(message, SampleBlock):
+                self._judge_block(message)
+            elif message is not None:
+                self._judge(message)
         self._quarantine.leave()
-        self._heard_s = time.monotonic()
 
     async def take(self, samples: Iterable[Sample]) -> None:
         """Judge samples that come another way, such as from the historian."""
         left = iter(samples)
         while batch := list(islice(left, 100)):
-            self._quarantine.enter(self.station)
-            for sample in batch:
-                self._judge(sample)
-            self._quarantine.leave()
+            self.take_samples(batch)
             await asyncio.sleep(0)
+
+    def take_samples(self, samples: Iterable[Sample]) -> None:
+        """Judge samples."""
+        self._quarantine.enter(self.station)
+        for sample in samples:
+            self._judge(sample)
+        self._quarantine.leave()
 
     def keep(self) -> None:
         """Save the state, if it is kept anywhere."""
@@ -108,18 +119,38 @@ class StationJudge:
         age_s = time.monotonic() - self._heard_s
         return counts | {"sample_age_s": age_s}
 
-    def take_payload(self, payload: bytes) -> None:
-        """Judge a sample; a payload that is none is counted and left out."""
+    def decoded(self, payload: bytes, kind: type[Sample | SampleBlock]) -> Sample | SampleBlock | None:
+        """Message of this station in a payload; one that is none is counted, and None."""
         try:
-            sample = Sample.decode(payload)
+            message = kind.decode(payload)
         except MessageError as error:
             self._counts["malformed"] += 1
             log.warning("station '%s': %s", self.station, error)
-            return
-        if sample.station != self.station:
+            return None
+        if message.station != self.station:
             self._counts["foreign"] += 1
+            return None
+        self._heard_s = time.monotonic()
+        return message
+
+    def _judge_block(self, message: SampleBlock) -> None:
+        block = Block(
+            time_ns=np.array(message.time, dtype=np.int64),
+            seq=np.array(message.seq, dtype=np.int64),
+            values=message.values(len(self._publishers)),
+            pumps=len(message.pumps),
+            is_bad=message.quality == "bad",
+        )
+        try:
+            verdicts = self.detector.take(block)
+        except Exception:  # one odd run must not take the station off
+            self._counts["failures"] += 1
+            log.exception("station '%s': samples from %d on could not be judged", self.station, message.seq[0])
+            for sample in behind(self.detector.last_heard, message.samples()):
+                self._judge(sample)
             return
-        self._judge(sample)
+        for verdict in verdicts:
+            self._publish(verdict)
 
     def _judge(self, sample: Sample) -> None:
         try:
@@ -164,3 +195,14 @@ class StationJudge:
         if last is None or last.state != verdict.state:
             log.info("station '%s' pump %d: %s", self.station, verdict.pump, verdict.state)
         self._last[verdict.pump] = verdict
+
+
+def behind(last: tuple[int, int], samples: Sequence[Sample]) -> Sequence[Sample]:
+    """Those behind the sample of this time and number; all if it is not among them.
+
+    The detector takes a long row of samples that it has had for a clock that was set back.
+    """
+    for place in range(len(samples), 0, -1):
+        if (samples[place - 1].time, samples[place - 1].seq) == last:
+            return samples[place:]
+    return samples

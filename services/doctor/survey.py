@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar
 
 from wetwell.protocols.alarm_messages import AlarmReport
@@ -13,12 +14,14 @@ from wetwell.protocols.keys import (
     alarm_report_key,
     alive_key,
     history_key,
+    sample_block_key,
     sample_key,
     status_key,
     verdict_key,
 )
 from wetwell.protocols.link import Bus, Presence, Subscription
 from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.clock import now_ns
 
@@ -55,6 +58,8 @@ async def listen(bus: Bus, seconds: float) -> Survey:
     def take_sample(sample: Sample) -> None:
         survey.samples.setdefault(sample.station, []).append((now_ns(), sample))
 
+    take_block = partial(_each_of_block, take_sample)
+
     def take_verdict(verdict: Verdict) -> None:
         last = survey.verdicts.get((verdict.station, verdict.pump))
         if last is None or verdict.time >= last.time:
@@ -69,6 +74,12 @@ async def listen(bus: Bus, seconds: float) -> Survey:
 
     tasks = [
         asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, take_sample))),
+        asyncio.create_task(
+            _each(
+                bus.subscribe(sample_block_key("*")),
+                _decoding(SampleBlock, take_block),
+            )
+        ),
         asyncio.create_task(_each(bus.subscribe(verdict_key("*"), history=1), _decoding(Verdict, take_verdict))),
         asyncio.create_task(_each(bus.subscribe(status_key("*", "*"), history=1), _decoding(Status, take_status))),
         asyncio.create_task(_each(bus.watch(alive_key("*", "*")), take_presence)),
@@ -91,6 +102,11 @@ async def _each(subscription: Subscription[T], take: Callable[[T], None]) -> Non
     while True:
         for message in await subscription.receive():
             take(message)
+
+
+def _each_of_block(take: Callable[[Sample], None], block: SampleBlock) -> None:
+    for sample in block.samples():
+        take(sample)
 
 
 def _decoding(message: type[M], take: Callable[[M], None]) -> Callable[[bytes], None]:

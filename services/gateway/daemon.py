@@ -7,19 +7,17 @@ from collections.abc import Callable, Coroutine, Sequence
 from typing import Any
 
 from wetwell.protocols.device_map import Plc
-from wetwell.protocols.keys import SITE, sample_key
+from wetwell.protocols.keys import SITE
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import Sample
 from wetwell.services.bus import connect
 from wetwell.services.daemon import report_health, stop_event, until
 from wetwell.services.gateway.poller import PlcPoller
+from wetwell.services.sample_sender import SampleSender
 from wetwell.services.settings import Settings
 
 log = logging.getLogger(__name__)
 
 SERVICE = "gateway"
-HISTORY = 600
-"""Samples that the bus keeps for late joiners: ten minutes at one a second."""
 
 
 async def serve_gateway(settings: Settings, plcs: Sequence[Plc]) -> None:
@@ -31,12 +29,24 @@ async def serve_gateway(settings: Settings, plcs: Sequence[Plc]) -> None:
 
 async def _run(settings: Settings, plcs: Sequence[Plc], stack: contextlib.AsyncExitStack) -> None:
     bus = stack.enter_context(await connect(settings))
-    await poll_all(bus, plcs, settings.health.period_s, settings.gateway.longest_wait_s)
+    longest_wait_s, gather_s = settings.gateway.longest_wait_s, settings.zenoh.gather_s
+    await poll_all(bus, plcs, settings.health.period_s, longest_wait_s, gather_s)
 
 
-async def poll_all(bus: Bus, plcs: Sequence[Plc], health_s: float, longest_wait_s: float) -> None:
+async def poll_all(
+    bus: Bus, plcs: Sequence[Plc], health_s: float, longest_wait_s: float, gather_s: float = 0.0
+) -> None:
     """Poll PLCs for ever, one task each; they begin spread over a second, so that not all are asked at once."""
-    pollers = [PlcPoller(plc, _publisher(bus, plc.station), longest_wait_s) for plc in plcs]
+    senders = [SampleSender(bus, plc.station, gather_s) for plc in plcs]
+    pollers = [PlcPoller(plc, sender.put, longest_wait_s) for plc, sender in zip(plcs, senders, strict=True)]
+    try:
+        await _poll(bus, pollers, health_s)
+    finally:
+        for sender in senders:
+            sender.flush()
+
+
+async def _poll(bus: Bus, pollers: Sequence[PlcPoller], health_s: float) -> None:
     log.info("polling %d PLCs", len(pollers))
     async with asyncio.TaskGroup() as group:
         for index, poller in enumerate(pollers):
@@ -61,11 +71,6 @@ def _reporter(bus: Bus, poller: PlcPoller, health_s: float) -> Callable[[], Coro
     return lambda: report_health(
         bus, poller.plc.station, SERVICE, health_s, poller.figures, condition=poller.condition
     )
-
-
-def _publisher(bus: Bus, station: str) -> Callable[[Sample], None]:
-    publisher = bus.publisher(sample_key(station), history=HISTORY)
-    return lambda sample: publisher.put(sample.encode())
 
 
 def _site_figures(pollers: Sequence[PlcPoller]) -> dict[str, float]:

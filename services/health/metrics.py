@@ -12,7 +12,7 @@ METRICS: Mapping[str, str] = {
     "chattering": "Alarms that come and go too often.",
     "clock_steps": "Times that the clock of the source was set.",
     "disk_errors": "Writes to disk that failed in a row; 0 after one that did not.",
-    "doubled": "Messages that came twice.",
+    "doubled": "Samples and messages that came twice.",
     "dropped": "Messages dropped because the daemon was too slow.",
     "failures": "Samples that could not be judged, with a traceback in the log.",
     "flood_share": "Share of the day's ten minutes with more than ten alarms.",

@@ -7,8 +7,9 @@ from wetwell.protocols.history_messages import History, HistoryQuery, Kind
 from wetwell.protocols.keys import SITE
 from wetwell.protocols.messages import MessageError
 from wetwell.protocols.stamps import to_iso
-from wetwell.services.historian.hours import HOUR_NS, Hours, joined_hours
-from wetwell.services.historian.samples import Floats, Integers, Samples, merged
+from wetwell.services.historian.hours import Hours, joined_hours
+from wetwell.services.historian.rows import HOUR_NS, Floats, Integers
+from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store import DAY_NS, StationSpan, Store, StoreError, blocks, day_of
 
 

@@ -13,7 +13,8 @@ import pyarrow.parquet
 
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.whole_file import whole_file
-from wetwell.services.historian.samples import Floats, Integers, Samples, columns_of, pumps_of
+from wetwell.services.historian.rows import Floats, Integers
+from wetwell.services.historian.samples import Samples, columns_of, pumps_of
 from wetwell.services.historian.store import StoreError
 from wetwell.services.historian.summary import Summary
 

@@ -3,26 +3,30 @@
 import logging
 import re
 import threading
-from collections import Counter, deque
+from collections import Counter
+from collections.abc import Sequence
 from typing import Literal
 
 from wetwell.protocols.alarm_messages import Alarm
 from wetwell.protocols.history_messages import LONGEST_NS
 from wetwell.protocols.keys import SITE
 from wetwell.protocols.messages import MessageError, Sample, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.station import NAME_PATTERN
 from wetwell.services.historian.answers import answer
-from wetwell.services.historian.samples import SampleRow, pack
+from wetwell.services.historian.rows import SampleRow, pack, pack_block
+from wetwell.services.historian.spool import Row, Spool, size_of
 from wetwell.services.historian.store import Batch, EventRow, Store, StoreError
 
 log = logging.getLogger(__name__)
 
 MAX_NAME = 64
 MAX_BATCH = 20_000
-"""Rows of one transaction."""
+"""Samples, verdicts and alarms of one transaction."""
 
-PayloadKind = Literal["samples", "verdicts", "alarms"]
+PayloadKind = Literal["samples", "blocks", "verdicts", "alarms"]
+"""`samples` come one in a payload, `blocks` are many samples of a station in one."""
 
 
 class Historian:
@@ -30,13 +34,13 @@ class Historian:
 
     What `take` has got waits in memory. `commit` gives it to the store; what it returns as committed is acknowledged:
     it survives a crash. While the store refuses, up to `spool_rows` wait; then the oldest are given up and counted as
-    `lost`.
+    `lost`. All is counted in samples, verdicts and alarms, whether samples come alone or in blocks.
 
     Parameters
     ----------
     store : Store
     spool_rows : int
-        Most rows that wait, >= 1.
+        Most samples, verdicts and alarms that wait, >= 1.
 
     Notes
     -----
@@ -46,9 +50,9 @@ class Historian:
     def __init__(self, store: Store, *, spool_rows: int = 500_000) -> None:
         self._store = store
         self._spool_rows = spool_rows
-        self._waiting: deque[SampleRow | EventRow] = deque()
+        self._spool = Spool(spool_rows)
         self._counts: Counter[str] = Counter(
-            dict.fromkeys(("taken", "committed", "doubled", "malformed", "lost", "failed_commits"), 0)
+            dict.fromkeys(("taken", "committed", "doubled", "malformed", "failed_commits"), 0)
         )
         self._newest_ns = 0
         self._committed_at_ns: int | None = None
@@ -56,31 +60,27 @@ class Historian:
         self._commits = threading.Lock()
 
     def take(self, kind: PayloadKind, payload: bytes) -> None:
-        """Take one payload; what is no sample, verdict or alarm is counted as `malformed` and left out."""
+        """Take one payload; what is not of its kind is counted as `malformed` and left out."""
         try:
-            row = _row(kind, payload)
+            rows = _rows(kind, payload)
         except MessageError as error:
             self._counts["malformed"] += 1
             log.warning("%s", error)
             return
-        self._counts["taken"] += 1
-        self._waiting.append(row)
-        if len(self._waiting) > self._spool_rows:
-            self._waiting.popleft()
-            self._counts["lost"] += 1
+        self._counts["taken"] += size_of(rows)
+        self._spool.put(rows)
 
     def commit(self, now_ns: int) -> int:
-        """Give what waits to the store, and return how many rows are now acknowledged.
+        """Give what waits to the store, and return how many samples, verdicts and alarms are now acknowledged.
 
-        A store that refuses is told once; the rows go on waiting.
+        A store that refuses is told once; what waits goes on waiting.
         """
         with self._commits:
             return self._commit(now_ns)
 
     def _commit(self, now_ns: int) -> int:
         acknowledged = 0
-        while self._waiting:
-            rows = [self._waiting.popleft() for _ in range(min(len(self._waiting), MAX_BATCH))]
+        while rows := self._spool.take(MAX_BATCH):
             batch = Batch(
                 samples=[row for row in rows if isinstance(row, SampleRow)],
                 events=[row for row in rows if isinstance(row, EventRow)],
@@ -88,16 +88,17 @@ class Historian:
             try:
                 new = self._store.write(batch)
             except StoreError as error:
-                self._put_back(rows)
+                self._spool.put_back(rows)
                 self._say_failing(error)
                 return acknowledged
-            acknowledged += len(rows)
-            self._counts["committed"] += len(rows)
-            self._counts["doubled"] += len(rows) - new
-            self._newest_ns = max([self._newest_ns, *(row.time_ns for row in rows)])
+            size = len(batch)
+            acknowledged += size
+            self._counts["committed"] += size
+            self._counts["doubled"] += size - new
+            self._newest_ns = max([self._newest_ns, *(row.last_ns for row in rows)])
         self._committed_at_ns = now_ns
         if self._is_failing:
-            log.warning("the store keeps again; %d rows were lost meanwhile or before", self._counts["lost"])
+            log.warning("the store keeps again; %d samples and messages were lost", self._spool.lost)
             self._is_failing = False
         return acknowledged
 
@@ -119,9 +120,10 @@ class Historian:
         return done is not None
 
     def figures(self, now_ns: int) -> dict[str, float]:
-        """Health figures: counts; rows that wait; age of the last commit and of the newest row that is kept."""
+        """Health figures: counts; what waits; age of the last commit and of the newest row that is kept."""
         figures = {name: float(count) for name, count in self._counts.items()}
-        figures["waiting"] = float(len(self._waiting))
+        figures["waiting"] = float(self._spool.waiting)
+        figures["lost"] = float(self._spool.lost)
         figures["is_failing"] = float(self._is_failing)
         if self._committed_at_ns is not None:
             figures["commit_age_s"] = (now_ns - self._committed_at_ns) / NS_PER_S
@@ -132,21 +134,15 @@ class Historian:
         except StoreError:
             return figures
 
-    def _put_back(self, rows: list[SampleRow | EventRow]) -> None:
-        self._waiting.extendleft(reversed(rows))
-        while len(self._waiting) > self._spool_rows:
-            self._waiting.popleft()
-            self._counts["lost"] += 1
-
     def _say_failing(self, error: StoreError) -> None:
         self._counts["failed_commits"] += 1
         if not self._is_failing:
-            log.error("%s; up to %d rows wait until it keeps again", error, self._spool_rows)
+            log.error("%s; up to %d samples and messages wait until it keeps again", error, self._spool_rows)
         self._is_failing = True
 
 
-def _row(kind: PayloadKind, payload: bytes) -> SampleRow | EventRow:
-    """Row of a payload.
+def _rows(kind: PayloadKind, payload: bytes) -> Sequence[Row]:
+    """Rows of a payload.
 
     Raises
     ------
@@ -156,10 +152,14 @@ def _row(kind: PayloadKind, payload: bytes) -> SampleRow | EventRow:
     if kind == "samples":
         sample = Sample.decode(payload)
         _check(sample.station, sample.time)
-        return pack(sample.station, sample)
+        return (pack(sample.station, sample),)
+    if kind == "blocks":
+        block = SampleBlock.decode(payload)
+        _check(block.station, max(block.time, key=abs))
+        return pack_block(block)
     event = Verdict.decode(payload) if kind == "verdicts" else Alarm.decode(payload)
     _check(event.station, event.time)
-    return EventRow(kind, event.station, event.time, payload)
+    return (EventRow(kind, event.station, event.time, payload),)
 
 
 def _check(station: str, time_ns: int) -> None:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 
-from wetwell.protocols.keys import ROOT, SITE, alarm_key, history_key, sample_key, verdict_key
+from wetwell.protocols.keys import ROOT, SITE, alarm_key, history_key, sample_block_key, sample_key, verdict_key
 from wetwell.protocols.link import Bus, Request, Subscription
 from wetwell.services.bus import connect
 from wetwell.services.clock import now_ns
@@ -16,6 +16,7 @@ from wetwell.services.settings import Settings
 log = logging.getLogger(__name__)
 
 SAMPLE_HISTORY = 600
+BLOCK_HISTORY = 60
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
 CAPACITY = 1_000_000
@@ -40,7 +41,10 @@ def _finish(historian: Historian) -> None:
     historian.commit(now_ns())
     waiting = historian.figures(now_ns())["waiting"]
     if waiting:
-        log.error("%d rows could not be kept and are lost, but for what their publishers still have", waiting)
+        log.error(
+            "%d samples and messages could not be kept and are lost, but for what their publishers still have",
+            waiting,
+        )
 
 
 async def _run(settings: Settings, historian: Historian, stack: contextlib.AsyncExitStack) -> None:
@@ -52,6 +56,7 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
     """Take, commit, maintain, answer and report for ever."""
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
         "samples": bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
+        "blocks": bus.subscribe(sample_block_key("*"), history=BLOCK_HISTORY, capacity=CAPACITY),
         "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
         "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
     }

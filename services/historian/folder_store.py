@@ -9,8 +9,9 @@ from pathlib import Path
 
 from wetwell.services.historian.archive import Archive, Form
 from wetwell.services.historian.file_query import summary_of_files
-from wetwell.services.historian.hours import HOUR_NS, Hours
+from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.live_database import LiveDatabase
+from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
@@ -52,7 +53,7 @@ class FolderStore:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
-        self.live = LiveDatabase(folder / "live.sqlite")
+        self.live = LiveDatabase(folder / "live.sqlite", self.alone)
         self.archive = Archive(folder)
         self._adopt()
 

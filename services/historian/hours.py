@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.services.historian.samples import Floats, Integers, Samples
+from wetwell.services.historian.rows import HOUR_NS, Floats, Integers
+from wetwell.services.historian.samples import Samples
 from wetwell.simulator.kpi import kpis
 
-HOUR_NS = 3600 * NS_PER_S
 STATION_FIGURES = ("known_h",)
 PUMP_FIGURES = ("energy_kwh", "volume_m3", "run_h", "starts")
 

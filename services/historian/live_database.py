@@ -6,46 +6,47 @@ a power failure. One connection writes; each reading has a connection of its own
 
 import contextlib
 import hashlib
+import itertools
 import logging
 import operator
 import sqlite3
 import threading
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS
 from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.live_schema import prepare
+from wetwell.services.historian.rows import HOUR_NS, SampleRow, unpack
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of, span_of
 
 log = logging.getLogger(__name__)
 
-VERSION = 1
 BUSY_S = 10.0
 """So long one process waits for another that writes."""
 
-_BY_KEY = operator.itemgetter(0, 1, 2)
-"""Station, time, `seq` of a `SampleRow`: inserting in this order takes half the time."""
+_SIZE = operator.attrgetter("size")
+_SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
+"""Size, station, time, `seq` of a `SampleRow`: inserting rows of a page together takes half the time."""
 
-_SCHEMA = f"""
-CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
-CREATE TABLE sample (
-    station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, quality INTEGER NOT NULL,
-    data BLOB NOT NULL, PRIMARY KEY (station, time_ns, seq)
-) WITHOUT ROWID;
-CREATE TABLE event (
-    id INTEGER PRIMARY KEY, kind TEXT NOT NULL, station INTEGER NOT NULL, time_ns INTEGER NOT NULL,
-    digest BLOB NOT NULL, payload BLOB NOT NULL, UNIQUE (kind, station, time_ns, digest)
-);
-CREATE TABLE hour (
-    station INTEGER NOT NULL, hour_ns INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (station, hour_ns)
-) WITHOUT ROWID;
-PRAGMA user_version = {VERSION};
-"""
+_OF_STATION = "FROM sample WHERE station = (SELECT id FROM station WHERE name = :station) "
+_LAST = "coalesce(last_ns, time_ns)"
+_TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
+"""Rows that may have a sample of a span: since a row keeps to its hour, none before the hour of the start has one."""
+
+_PACKED = "time_ns, seq, size, quality, data"
 
 
 class LiveDatabase:
-    """A file of SQLite, made if it is not there.
+    """A file of SQLite, made if it is not there, upgraded if it is of an earlier version.
+
+    Parameters
+    ----------
+    path : Path
+    alone : function
+        Context in which no historian works on the file, for the upgrade.
 
     Raises
     ------
@@ -53,8 +54,9 @@ class LiveDatabase:
         Here and from every method, if the file cannot be used now. A file that is damaged is put aside, and told.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, alone: Callable[[], contextlib.AbstractContextManager[None]]) -> None:
         self._path = path
+        self._alone = alone
         self._lock = threading.Lock()
         self._ids: dict[str, int] = {}
         try:
@@ -72,17 +74,27 @@ class LiveDatabase:
             self._writer.close()
 
     def write(self, batch: Batch) -> int:
-        """Keep a batch whole or not at all, and return how many of its rows were new."""
+        """Keep a batch whole or not at all, and return how many samples, verdicts and alarms of it were new."""
         with self._transaction() as database:
             ids = self._stations(database, batch)
+            new = 0
+            for size, rows in itertools.groupby(sorted(batch.samples, key=_SIZE_AND_KEY), _SIZE):
+                values = [
+                    (
+                        ids[row.station],
+                        row.time_ns,
+                        _key(row),
+                        row.quality,
+                        row.data,
+                        size,
+                        None if size == 1 else row.last_ns,
+                    )
+                    for row in rows
+                ]
+                before = database.total_changes
+                database.executemany("INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?)", values)
+                new += size * (database.total_changes - before)
             before = database.total_changes
-            database.executemany(
-                "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?)",
-                [
-                    (ids[row.station], row.time_ns, row.seq, row.quality, row.data)
-                    for row in sorted(batch.samples, key=_BY_KEY)  # rows of a page together
-                ],
-            )
             database.executemany(
                 "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?)",
                 [
@@ -90,7 +102,7 @@ class LiveDatabase:
                     for row in batch.events
                 ],
             )
-            new = database.total_changes - before
+            new += database.total_changes - before
             database.executemany(
                 "UPDATE station SET first_ns = min(coalesce(first_ns, ?1), ?1), "
                 "last_ns = max(coalesce(last_ns, ?2), ?2) WHERE id = ?3",
@@ -120,33 +132,30 @@ class LiveDatabase:
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
         """Samples from `start_ns` until before `end_ns`."""
         with self._reading() as database:
-            return Samples.of_rows(
-                database.execute(
-                    "SELECT time_ns, seq, quality, data FROM sample WHERE station = (SELECT id FROM station "
-                    "WHERE name = ?) AND time_ns >= ? AND time_ns < ?",
-                    (station, start_ns, end_ns),
-                ).fetchall()
-            )
+            rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", _span(station, start_ns, end_ns)).fetchall()
+        return Samples.of_rows(rows).between(start_ns, end_ns)
 
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
+        if end_ns - start_ns < HOUR_NS:  # it may lie between two samples of a row
+            samples = self.samples(station, start_ns, end_ns)
+            return samples.pumps if len(samples) else None
         with self._reading() as database:
-            (size,) = database.execute(
-                "SELECT max(length(data)) FROM sample WHERE station = (SELECT id FROM station WHERE name = ?) "
-                "AND time_ns >= ? AND time_ns < ?",
-                (station, start_ns, end_ns),
+            (width,) = database.execute(
+                f"SELECT max(length(data) / size / 8 - CASE size WHEN 1 THEN 0 ELSE 2 END) {_TOUCHING}",
+                _span(station, start_ns, end_ns),
             ).fetchone()
-        return None if size is None else (int(size) // 8 - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+        return None if width is None else (int(width) - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
 
     def next_time_ns(self, station: str, start_ns: int) -> int | None:
         """Time of the first sample from `start_ns` on."""
+        span = _span(station, start_ns, start_ns)
         with self._reading() as database:
-            (time_ns,) = database.execute(
-                "SELECT min(time_ns) FROM sample WHERE station = (SELECT id FROM station WHERE name = ?) "
-                "AND time_ns >= ?",
-                (station, start_ns),
-            ).fetchone()
-        return None if time_ns is None else int(time_ns)
+            begun = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
+            (time_ns,) = database.execute(f"SELECT min(time_ns) {_OF_STATION} AND time_ns >= :start", span).fetchone()
+        times_ns = Samples.of_rows(begun).time_ns
+        times_ns = times_ns[times_ns >= start_ns]
+        return min([*times_ns[:1].tolist(), *([] if time_ns is None else [int(time_ns)])], default=None)
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span, in order."""
@@ -158,30 +167,43 @@ class LiveDatabase:
         return days_ns
 
     def count(self, station: str, start_ns: int, end_ns: int, most: int) -> int:
-        """Number of samples of a span, counted up to `most`."""
+        """Number of samples of a span, up to `most`; one that came alone and in a row of several counts twice."""
+        span = _span(station, start_ns, end_ns)
         with self._reading() as database:
-            (count,) = database.execute(
-                "SELECT count(*) FROM (SELECT 1 FROM sample WHERE station = (SELECT id FROM station WHERE name = ?) "
-                "AND time_ns >= ? AND time_ns < ? LIMIT ?)",
-                (station, start_ns, end_ns, most),
+            (whole,) = database.execute(
+                f"SELECT coalesce(sum(size), 0) FROM (SELECT size {_OF_STATION} "  # noqa: S608 - as above
+                f"AND time_ns >= :start AND time_ns < :end AND {_LAST} < :end LIMIT :most)",
+                span | {"most": most},
             ).fetchone()
-        return int(count)
+            if whole >= most:
+                return most
+            cut = database.execute(
+                f"SELECT {_PACKED} {_TOUCHING} AND (time_ns < :start OR {_LAST} >= :end)", span
+            ).fetchall()
+        return min(most, int(whole) + len(Samples.of_rows(cut).between(start_ns, end_ns)))
 
     def delete_samples(self, station: str, samples: Samples) -> None:
-        """Delete these samples, and no others that came meanwhile."""
-        keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
+        """Delete the rows that hold these samples, and no others: what came meanwhile stays."""
+        if not len(samples):
+            return
+        span = _span(station, int(samples.time_ns[0]), int(samples.time_ns[-1]) + 1)
         with self._transaction() as database:
-            (number,) = database.execute("SELECT id FROM station WHERE name = ?", (station,)).fetchone()
-            span = (number, keys[0][0], keys[-1][0])
-            between = "FROM sample WHERE station = ? AND time_ns BETWEEN ? AND ?"
-            (count,) = database.execute(f"SELECT count(*) {between}", span).fetchone()
-            if count == len(keys):
-                database.execute(f"DELETE {between}", span)
-            else:
-                database.executemany(
-                    "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?",
-                    [(number, *key) for key in keys],
-                )
+            (count,) = database.execute(f"SELECT sum(size) {_TOUCHING}", span).fetchone()
+            if count == len(samples):
+                database.execute(f"DELETE {_TOUCHING}", span)
+                return
+            rows = database.execute(f"SELECT {_PACKED}, station {_TOUCHING}", span).fetchall()
+            known = set(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
+            others = {
+                number
+                for part in unpack([row[:5] for row in rows])
+                for number, *key in zip(part.row.tolist(), part.time_ns.tolist(), part.seq.tolist(), strict=True)
+                if tuple(key) not in known
+            }
+            database.executemany(
+                "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?",
+                [(row[5], row[0], row[1]) for place, row in enumerate(rows) if place not in others],
+            )
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""
@@ -263,17 +285,23 @@ class LiveDatabase:
         try:
             database.execute("PRAGMA journal_mode = WAL")
             database.execute("PRAGMA synchronous = FULL")
-            (version,) = database.execute("PRAGMA user_version").fetchone()
-            if version == 0:
-                database.executescript(f"BEGIN IMMEDIATE; {_SCHEMA} COMMIT;")
+            prepare(database, self._path, self._alone)
             database.execute("SELECT count(*) FROM station").fetchone()
         except BaseException:
             database.close()
             raise
-        if version > VERSION:
-            database.close()
-            raise StoreError(f"{self._path}: version {version} is newer than {VERSION}, which this program knows")
         return database
+
+
+def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:
+    """Values for `_TOUCHING`."""
+    hour_ns = max(start_ns // HOUR_NS * HOUR_NS, -(2**63))
+    return {"station": station, "hour": hour_ns, "start": start_ns, "end": end_ns}
+
+
+def _key(row: SampleRow) -> int:
+    """Number of a sample, or of several samples one below 0 from all of their times and numbers."""
+    return row.seq if row.size == 1 else -1 - zlib.crc32(row.data[-16 * row.size :])
 
 
 def _digest(payload: bytes) -> bytes:

@@ -1,71 +1,20 @@
 """The store of a PostgreSQL database, in the schema `wetwell`; for people with SQL its view `wetwell.samples`."""
 
-import contextlib
 import hashlib
-import logging
-import threading
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, LiteralString
+from typing import Any
 
 import numpy as np
 import psycopg
-from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
-from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS
-from wetwell.services.historian.float_arrays import from_postgres, to_postgres
-from wetwell.services.historian.hours import HOUR_NS, Hours
+from wetwell.services.historian.float_arrays import COPY_END, COPY_HEADER, copy_rows, from_postgres
+from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.postgres_connection import PostgresConnection
+from wetwell.services.historian.rows import HOUR_NS, unpack
 from wetwell.services.historian.samples import Samples
-from wetwell.services.historian.store import (
-    DAY_NS,
-    Batch,
-    EventKind,
-    StationSpan,
-    StoreError,
-    day_of,
-    span_of,
-)
+from wetwell.services.historian.store import DAY_NS, Batch, EventKind, StationSpan, day_of, span_of
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
-
-log = logging.getLogger(__name__)
-
-CONNECT_S = 5
-LOCK = 0x77657477656C6C
-"""Advisory lock that the one historian holds: "wetwell" in ASCII."""
-
-_SCHEMA: LiteralString = """
-CREATE SCHEMA IF NOT EXISTS wetwell;
-CREATE TABLE IF NOT EXISTS wetwell.station (
-    id serial PRIMARY KEY, name text NOT NULL UNIQUE, first_ns bigint, last_ns bigint,
-    summed_until_ns bigint NOT NULL DEFAULT -9223372036854775808
-);
-CREATE TABLE IF NOT EXISTS wetwell.sample (
-    station int NOT NULL, time_ns bigint NOT NULL, seq bigint NOT NULL, quality smallint NOT NULL,
-    values float8[] NOT NULL, PRIMARY KEY (station, time_ns, seq)
-);
-CREATE TABLE IF NOT EXISTS wetwell.minute (
-    station int NOT NULL, time_ns bigint NOT NULL, count float8[] NOT NULL, mean float8[] NOT NULL,
-    low float8[] NOT NULL, high float8[] NOT NULL, PRIMARY KEY (station, time_ns)
-);
-CREATE TABLE IF NOT EXISTS wetwell.event (
-    id bigserial PRIMARY KEY, kind text NOT NULL, station int NOT NULL, time_ns bigint NOT NULL,
-    digest bytea NOT NULL, payload text NOT NULL, UNIQUE (kind, station, time_ns, digest)
-);
-CREATE TABLE IF NOT EXISTS wetwell.hour (
-    station int NOT NULL, hour_ns bigint NOT NULL, values float8[] NOT NULL, PRIMARY KEY (station, hour_ns)
-);
-CREATE OR REPLACE VIEW wetwell.samples AS
-    SELECT name AS station, to_timestamp(time_ns / 1e9) AS time, seq, quality, values[1] AS level_m,
-        values[2] AS inflow_m3h, values[3:] AS pumps
-    FROM wetwell.sample JOIN wetwell.station ON station.id = sample.station;
-"""
-
-_INCOMING: LiteralString = """
-CREATE TEMPORARY TABLE IF NOT EXISTS incoming (
-    station int, time_ns bigint, seq bigint, quality smallint, values float8[]
-) ON COMMIT DELETE ROWS
-"""
 
 
 class PostgresStore:
@@ -98,31 +47,18 @@ class PostgresStore:
         downsample_after_days: int | None = None,
         keep_days: int | None = None,
     ) -> None:
-        try:
-            parts = conninfo_to_dict(url)
-        except psycopg.ProgrammingError:
-            raise ConfigError(
-                "historian.url: is no address of PostgreSQL (it is not shown, it may be secret)"
-            ) from None
-        self._name = f"postgresql {parts.get('host', 'localhost')}/{parts.get('dbname', '')}"
-        self._url = url
-        self._password_file = password_file
-        self._is_alone = is_alone
+        self._connection = PostgresConnection(url, password_file, is_alone=is_alone)
         self._keep_live_days = keep_live_days
         self._downsample_after_days = downsample_after_days
         self._keep_days = keep_days
-        self._lock = threading.Lock()
-        self._has_tables = False
-        self._writer: psycopg.Connection[Any] | None = None
 
     def close(self) -> None:
         """Close the connection; twice is fine."""
-        with self._lock:
-            self._drop()
+        self._connection.close()
 
     def write(self, batch: Batch) -> int:
         """Keep a batch in one transaction."""
-        with self._transaction() as database:
+        with self._connection.transaction() as database:
             names = {row.station for row in batch.samples} | {row.station for row in batch.events}
             database.cursor().executemany(
                 "INSERT INTO wetwell.station (name) VALUES (%s) ON CONFLICT DO NOTHING",
@@ -152,12 +88,14 @@ class PostgresStore:
 
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
-        rows = self._read("SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM wetwell.station ORDER BY 1")
+        rows = self._connection.read(
+            "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM wetwell.station ORDER BY 1"
+        )
         return [StationSpan(*row) for row in rows]
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span."""
-        rows = self._read(
+        rows = self._connection.read(
             "WITH RECURSIVE s AS (SELECT id FROM wetwell.station WHERE name = %(station)s), next AS ("
             "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
             "AND time_ns >= %(start)s AND time_ns < %(end)s) AS at UNION ALL "
@@ -170,16 +108,18 @@ class PostgresStore:
 
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
         """Samples of a span."""
-        rows = self._read(
+        rows = self._connection.read(
             "SELECT time_ns, seq, quality, array_send(values) FROM wetwell.sample "
             "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s",
             (station, start_ns, end_ns),
         )
-        return Samples.of_rows([(*key, from_postgres(values)) for *key, values in rows])
+        return Samples.of_rows(
+            [(time_ns, seq, 1, quality, from_postgres(values)) for time_ns, seq, quality, values in rows]
+        )
 
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
-        ((width,),) = self._read(
+        ((width,),) = self._connection.read(
             "SELECT max(cardinality(values)) FROM wetwell.sample "
             "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s",
             (station, start_ns, end_ns),
@@ -188,7 +128,7 @@ class PostgresStore:
 
     def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
         """Whether a span has at most so many samples, and none that have become minutes."""
-        ((samples, minutes),) = self._read(
+        ((samples, minutes),) = self._connection.read(
             "WITH s AS (SELECT id FROM wetwell.station WHERE name = %(station)s) SELECT "
             "(SELECT count(*) FROM (SELECT 1 FROM wetwell.sample WHERE station = (SELECT id FROM s) "
             "AND time_ns >= %(start)s AND time_ns < %(end)s LIMIT %(most)s) AS few), "
@@ -213,7 +153,7 @@ class PostgresStore:
         return joined(parts).over(start_ns, span_ns)
 
     def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:
-        rows = self._read(
+        rows = self._connection.read(
             "SELECT time_ns, array_send(count), array_send(mean), array_send(low), array_send(high) "
             "FROM wetwell.minute WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
             "AND time_ns >= %s AND time_ns < %s ORDER BY time_ns",
@@ -223,7 +163,7 @@ class PostgresStore:
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""
-        rows = self._read(
+        rows = self._connection.read(
             "SELECT payload FROM wetwell.event WHERE kind = %s "
             "AND station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s "
             "ORDER BY time_ns DESC, id DESC LIMIT %s",
@@ -233,7 +173,7 @@ class PostgresStore:
 
     def hours(self, station: str, start_ns: int, end_ns: int) -> Hours:
         """Figures of the hours of days that are complete and summed up."""
-        rows = self._read(
+        rows = self._connection.read(
             "SELECT hour_ns, array_send(values) FROM wetwell.hour JOIN wetwell.station ON station.id = hour.station "
             "WHERE name = %s AND hour_ns >= %s AND hour_ns < %s ORDER BY 1",
             (station, start_ns, end_ns),
@@ -252,11 +192,13 @@ class PostgresStore:
 
     def figures(self) -> dict[str, float]:
         """Whether it is connected."""
-        return {"is_connected": float(self._writer is not None)}
+        return {"is_connected": float(self._connection.is_connected)}
 
     def _sum_up(self, station: str, newest_ns: int) -> str | None:
         """Work out the hours of the oldest complete day that has none yet, or has had late samples since."""
-        ((summed_ns,),) = self._read("SELECT summed_until_ns FROM wetwell.station WHERE name = %s", (station,))
+        ((summed_ns,),) = self._connection.read(
+            "SELECT summed_until_ns FROM wetwell.station WHERE name = %s", (station,)
+        )
         end_ns = newest_ns - self._keep_live_days * DAY_NS
         day_ns = next(iter(self.days_ns(station, summed_ns, end_ns)), None) if summed_ns < end_ns else None
         if day_ns is None:
@@ -264,7 +206,7 @@ class PostgresStore:
         has_minutes = len(self._minutes(station, day_ns, day_ns + DAY_NS)) > 0
         around = self.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
         hours = Hours.of_samples(around, day_ns, day_ns + DAY_NS)
-        with self._transaction() as database:
+        with self._connection.transaction() as database:
             for hour_ns, data in [] if has_minutes else hours.rows():  # else these are a few late samples
                 database.execute(
                     "INSERT INTO wetwell.hour SELECT id, %b, %b::float8[] FROM wetwell.station WHERE name = %b "
@@ -289,7 +231,7 @@ class PostgresStore:
         minutes = Summary.of(samples).over(day_ns, MINUTE_NS)
         minutes = fuller(self._minutes(station, day_ns, day_ns + DAY_NS), minutes)
         keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
-        with self._transaction() as database:
+        with self._connection.transaction() as database:
             ((number,),) = database.execute("SELECT id FROM wetwell.station WHERE name = %s", (station,)).fetchall()
             database.execute(
                 "DELETE FROM wetwell.minute WHERE station = %s AND time_ns >= %s AND time_ns < %s",
@@ -311,7 +253,7 @@ class PostgresStore:
         if self._keep_days is None:
             return None
         deleted = 0
-        with self._transaction() as database:
+        with self._connection.transaction() as database:
             for table in ("sample", "minute", "event"):
                 deleted += database.execute(
                     psycopg.sql.SQL(
@@ -322,77 +264,17 @@ class PostgresStore:
                 ).rowcount
         return f"station '{station}': {deleted} old rows deleted" if deleted else None
 
-    @contextlib.contextmanager
-    def _transaction(self) -> Iterator[psycopg.Connection[Any]]:
-        with self._lock, self._errors():
-            try:
-                if self._writer is None:
-                    self._writer = self._connect_writer()
-                with self._writer.transaction():
-                    yield self._writer
-            except (psycopg.Error, OSError):
-                self._drop()
-                raise
-
-    def _read(self, query: LiteralString, values: Any = ()) -> list[Any]:
-        """Rows of a query, read on a connection of its own."""
-        if not self._has_tables:
-            with self._transaction():
-                pass
-        with self._errors(), self._connect() as database:
-            database.read_only = True
-            return database.cursor(binary=True).execute(query, values).fetchall()
-
-    def _connect(self) -> psycopg.Connection[Any]:
-        password = None if self._password_file is None else self._password_file.read_text().strip()
-        return psycopg.connect(make_conninfo(self._url, password=password), connect_timeout=CONNECT_S)
-
-    def _connect_writer(self) -> psycopg.Connection[Any]:
-        database = self._connect()
-        try:
-            database.autocommit = True
-            with database.transaction():
-                database.execute("SELECT pg_advisory_xact_lock(%s)", (LOCK + 1,))  # one at a time makes the tables
-                database.execute(_SCHEMA)
-            database.execute(_INCOMING)
-            self._has_tables = True
-            if self._is_alone:
-                self._hold(database)
-        except BaseException:
-            database.close()
-            raise
-        return database
-
-    def _hold(self, database: psycopg.Connection[Any]) -> None:
-        ((is_held,),) = database.execute("SELECT pg_try_advisory_lock(%s)", (LOCK,)).fetchall()
-        if not is_held:
-            raise StoreError(f"{self._name}: another historian works here")
-
-    def _drop(self) -> None:
-        if self._writer is not None:
-            with contextlib.suppress(psycopg.Error):
-                self._writer.close()
-            self._writer = None
-
-    @contextlib.contextmanager
-    def _errors(self) -> Iterator[None]:
-        try:
-            yield
-        except psycopg.Error as error:
-            line = next(iter(str(error).strip().splitlines()), type(error).__name__)
-            raise StoreError(f"{self._name}: {line}") from error
-        except OSError as error:
-            raise StoreError(f"historian.password_file: {error.strerror or error}") from error
-
 
 def _copy(database: psycopg.Connection[Any], batch: Batch, ids: dict[str, int]) -> int:
-    """Samples by COPY into a temporary table, and from there those that are new."""
+    """Samples, each a row, by COPY into a temporary table, and from there those that are new."""
     if not batch.samples:
         return 0
+    stations = np.array([ids[row.station] for row in batch.samples])
     with database.cursor().copy("COPY incoming FROM STDIN (FORMAT BINARY)") as copy:
-        copy.set_types(["int4", "int8", "int8", "int2", "bytea"])  # the bytes are those of a float8[]
-        for row, values in zip(batch.samples, to_postgres([row.data for row in batch.samples]), strict=True):
-            copy.write_row((ids[row.station], row.time_ns, row.seq, row.quality, values))
+        copy.write(COPY_HEADER)
+        for part in unpack([(row.time_ns, row.seq, row.size, row.quality, row.data) for row in batch.samples]):
+            copy.write(copy_rows(stations[part.row], part.time_ns, part.seq, part.quality, part.values))
+        copy.write(COPY_END)
     return database.execute(
         "INSERT INTO wetwell.sample SELECT * FROM incoming ORDER BY station, time_ns, seq ON CONFLICT DO NOTHING"
     ).rowcount

@@ -1,36 +1,15 @@
-"""Samples as the historian holds them: packed rows on the way to a store, arrays on the way back."""
+"""Samples as the historian gives them back: arrays in the order of time."""
 
 import re
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.messages import Quality
-from wetwell.protocols.readings import Readings
 from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-
-QUALITIES: tuple[str, ...] = get_args(Quality)
-"""A sample's quality is kept as its place in here."""
-
-_NAN = float("nan")
-
-
-class SampleRow(NamedTuple):
-    """One sample, packed: `data` holds its values as little-endian float64 in the order of `columns_of`."""
-
-    station: str
-    time_ns: int
-    seq: int
-    quality: int
-    data: bytes
+from wetwell.services.historian.rows import Floats, Integers, PackedSamples, SampleRow, pack_arrays, unpack
 
 
 @lru_cache
@@ -48,20 +27,6 @@ def columns_of(pumps: int) -> tuple[str, ...]:
 def pumps_of(columns: Sequence[str]) -> int:
     """Number of pumps that some column names speak of."""
     return max((int(match[1]) for match in map(re.compile(r"pump(\d+)_").match, columns) if match), default=0)
-
-
-def pack(station: str, sample: Readings) -> SampleRow:
-    """Row of a sample; what has no value is NaN."""
-    values: list[float | None] = [sample.level_m, sample.inflow_m3h]
-    for pump in sample.pumps:
-        values += (pump.frequency_hz, pump.flow_m3h, pump.head_m, pump.power_kw, pump.running)
-    data = _packer(len(values)).pack(*[_NAN if value is None else value for value in values])
-    return SampleRow(station, sample.time, sample.seq, QUALITIES.index(sample.quality), data)
-
-
-@lru_cache
-def _packer(values: int) -> struct.Struct:
-    return struct.Struct(f"<{values}d")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,17 +59,14 @@ class Samples:
         return columns_of(self.pumps)
 
     @classmethod
-    def of_rows(cls, rows: Sequence[tuple[int, int, int, bytes]]) -> "Samples":
-        """Samples of rows (time, seq, quality, data) in any order; of the same time and `seq` the first counts."""
-        width = max((len(row[3]) for row in rows), default=8 * len(STATION_COLUMNS)) // 8
-        if all(len(row[3]) == 8 * width for row in rows):
-            values = np.frombuffer(b"".join(row[3] for row in rows), dtype="<f8").reshape(len(rows), width)
-        else:
-            values = np.full((len(rows), width), np.nan)
-            for number, row in enumerate(rows):
-                values[number, : len(row[3]) // 8] = np.frombuffer(row[3], dtype="<f8")
-        keys = np.array([row[:3] for row in rows], dtype=np.int64).reshape(len(rows), 3)
-        return cls(time_ns=keys[:, 0], seq=keys[:, 1], quality=keys[:, 2], values=_finite(values)).in_order()
+    def of_rows(cls, rows: Sequence[PackedSamples]) -> "Samples":
+        """Samples of rows in any order, each once."""
+        return merged(
+            [
+                cls(time_ns=part.time_ns, seq=part.seq, quality=part.quality, values=_finite(part.values))
+                for part in unpack(rows)
+            ]
+        ).in_order()
 
     @classmethod
     def of_recording(cls, recording: Recording) -> "Samples":
@@ -146,9 +108,7 @@ class Samples:
 
     def rows(self, station: str) -> list[SampleRow]:
         """As packed rows."""
-        data = np.ascontiguousarray(self.values, dtype="<f8")
-        keys = zip(self.time_ns.tolist(), self.seq.tolist(), self.quality.tolist(), data, strict=True)
-        return [SampleRow(station, time_ns, seq, quality, values.tobytes()) for time_ns, seq, quality, values in keys]
+        return pack_arrays(station, self.time_ns, self.seq, self.quality, self.values)
 
 
 def merged(parts: Sequence[Samples]) -> Samples:

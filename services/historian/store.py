@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple, Protocol
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.historian.hours import Hours
-from wetwell.services.historian.samples import SampleRow, Samples
+from wetwell.services.historian.rows import SampleRow
+from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.summary import Summary
 
 DAY_NS = 86_400 * NS_PER_S
@@ -27,16 +28,26 @@ class EventRow(NamedTuple):
     time_ns: int
     payload: bytes
 
+    @property
+    def size(self) -> int:
+        """How many verdicts or alarms: one."""
+        return 1
+
+    @property
+    def last_ns(self) -> int:
+        """Its time."""
+        return self.time_ns
+
 
 @dataclass
 class Batch:
-    """What is kept together, or not at all."""
+    """What is kept together, or not at all; its length is the number of samples, verdicts and alarms."""
 
     samples: list[SampleRow] = field(default_factory=list)
     events: list[EventRow] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self.samples) + len(self.events)
+        return sum(row.size for row in self.samples) + len(self.events)
 
 
 class StationSpan(NamedTuple):
@@ -54,7 +65,11 @@ class Store(Protocol):
     """
 
     def write(self, batch: Batch) -> int:
-        """Keep a batch, and return how many rows of it were new. When it returns, they survive a crash."""
+        """Keep a batch, and return how many samples, verdicts and alarms of it were new.
+
+        When it returns, they survive a crash. Where a sample comes both alone and in a row of several, a store may
+        call it new twice; it is read once.
+        """
 
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
@@ -102,9 +117,9 @@ def day_of(time_ns: int) -> int:
 
 
 def span_of(rows: Sequence[SampleRow]) -> dict[str, tuple[int, int]]:
-    """First and last time of each station in some rows."""
+    """Times of the first and last sample of each station in some rows."""
     spans: dict[str, tuple[int, int]] = {}
     for row in rows:
-        first_ns, last_ns = spans.get(row.station, (row.time_ns, row.time_ns))
-        spans[row.station] = (min(first_ns, row.time_ns), max(last_ns, row.time_ns))
+        first_ns, last_ns = spans.get(row.station, (row.time_ns, row.last_ns))
+        spans[row.station] = (min(first_ns, row.time_ns), max(last_ns, row.last_ns))
     return spans

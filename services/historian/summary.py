@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.stamps import NS_PER_S
-from wetwell.services.historian.samples import Floats, Integers, Samples, columns_of
+from wetwell.services.historian.rows import Floats, Integers
+from wetwell.services.historian.samples import Samples, columns_of
 
 MINUTE_NS = 60 * NS_PER_S
 

@@ -9,7 +9,6 @@ from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.history_messages import LONGEST_NS
 from wetwell.protocols.recording import read_recording, recording_writer
 from wetwell.protocols.station import NAME_PATTERN
-from wetwell.services.historian.core import MAX_BATCH
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store import DAY_NS, Batch, Store, blocks
 
@@ -60,7 +59,5 @@ def import_recording(store: Store, station: str, path: Path) -> tuple[int, int]:
     for day_ns in np.unique(samples.time_ns // DAY_NS * DAY_NS).tolist():
         day = samples.between(day_ns, day_ns + DAY_NS)
         known = store.samples(station, day_ns, day_ns + DAY_NS)
-        rows = day.take(~np.isin(day.time_ns, known.time_ns)).rows(station)
-        for first in range(0, len(rows), MAX_BATCH):
-            new += store.write(Batch(samples=rows[first : first + MAX_BATCH]))
+        new += store.write(Batch(samples=day.take(~np.isin(day.time_ns, known.time_ns)).rows(station)))
     return len(recording), new

@@ -1,10 +1,14 @@
-"""A historian that is to be killed: takes samples from a number on, and says each time how many are acknowledged."""
+"""A historian that is to be killed: takes samples from a number on, every other twenty of them in a block.
+
+It says each time how many are acknowledged.
+"""
 
 import itertools
 import sys
 from pathlib import Path
 
 from wetwell.protocols.messages import PumpReading, Sample
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.services.historian.core import Historian
 from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.historian.store import DAY_NS
@@ -14,15 +18,22 @@ STEP_NS = DAY_NS // 200
 
 def write(folder: Path, first: int) -> None:
     historian = Historian(FolderStore(folder))
-    for number in itertools.count(first):
-        pump = PumpReading(flow_m3h=float(number), head_m=number / 3)
-        sample = Sample(station="alpha", seq=number, time=number * STEP_NS, level_m=number / 7, pumps=(pump,))
-        historian.take("samples", sample.encode())
-        if number % 20 == 19:
-            historian.commit(sample.time)
-            sys.stdout.write(f"{number + 1}\n")
-            sys.stdout.flush()
-            historian.maintain(sample.time)
+    for begin in itertools.count(first, 20):
+        samples = [sample(number) for number in range(begin, begin + 20)]
+        if begin % 40 == 0:
+            historian.take("blocks", SampleBlock.of(samples).encode())
+        else:
+            for each in samples:
+                historian.take("samples", each.encode())
+        historian.commit(samples[-1].time)
+        sys.stdout.write(f"{begin + 20}\n")
+        sys.stdout.flush()
+        historian.maintain(samples[-1].time)
+
+
+def sample(number: int) -> Sample:
+    pump = PumpReading(flow_m3h=float(number), head_m=number / 3)
+    return Sample(station="alpha", seq=number, time=number * STEP_NS, level_m=number / 7, pumps=(pump,))
 
 
 if __name__ == "__main__":

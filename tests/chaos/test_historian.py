@@ -1,10 +1,12 @@
 """The historian under kill -9, a full disk and a lost database: what was acknowledged is there, once."""
 
 import asyncio
+import contextlib
 import os
 import random
 import shutil
 import socket
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -108,6 +110,48 @@ def test_a_historian_that_was_killed_gets_what_it_missed_from_the_publishers(tmp
     history, code = asyncio.run(killed_beside_a_station(tmp_path))
     assert history.columns["seq"] == tuple(map(float, range(800)))
     assert code == 0
+
+
+UPGRADER = """
+import contextlib, os, signal, sqlite3, sys
+from pathlib import Path
+from wetwell.services.historian.live_database import LiveDatabase
+
+class Killed(sqlite3.Connection):
+    def __init__(self, *arguments, **named):
+        super().__init__(*arguments, **named)
+        self.set_trace_callback(lambda told: sys.argv[2] in told and os.kill(os.getpid(), signal.SIGKILL))
+
+connect = sqlite3.connect
+sqlite3.connect = lambda *arguments, **named: connect(*arguments, factory=Killed, **named)
+LiveDatabase(Path(sys.argv[1]), contextlib.nullcontext)
+"""
+
+
+@pytest.mark.parametrize("statement", ["ADD COLUMN last_ns", "COMMIT"])
+def test_an_upgrade_that_is_killed_leaves_the_earlier_database(tmp_path: Path, statement: str) -> None:
+    path = tmp_path / "live.sqlite"
+    store = FolderStore(tmp_path)
+    historian = Historian(store)
+    take(historian, range(5000))
+    historian.commit(NOW_NS)
+    store.close()
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.executescript(
+            "CREATE TABLE earlier (station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, "
+            "quality INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (station, time_ns, seq)) WITHOUT ROWID;"
+            "INSERT INTO earlier SELECT station, time_ns, seq, quality, data FROM sample;"
+            "DROP TABLE sample; ALTER TABLE earlier RENAME TO sample; PRAGMA user_version = 1"
+        )
+    killed = subprocess.run([sys.executable, "-c", UPGRADER, str(path), statement], check=False)
+    assert killed.returncode == -9
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        assert database.execute("PRAGMA user_version").fetchone() == (1,)
+        assert database.execute("SELECT count(*), max(length(data)) FROM sample").fetchone() == (5000, 56)
+        assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+    store = FolderStore(tmp_path)
+    assert kept(store) == list(range(5000))
+    store.close()
 
 
 class Killed(BaseException):

@@ -41,13 +41,13 @@ def free_port() -> int:
 
 
 @contextlib.contextmanager
-def wetwell(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+def wetwell(*arguments: str, gather_s: float = 0.0) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
         [sys.executable, "-m", "wetwell.services", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"WETWELL_HEALTH__PERIOD_S": "0.5"},
+        env=os.environ | {"WETWELL_HEALTH__PERIOD_S": "0.5", "WETWELL_ZENOH__GATHER_S": str(gather_s)},
     )
     try:
         yield process
@@ -86,7 +86,8 @@ def iter_until(subscriber: zenoh.Subscriber) -> Iterator[zenoh.Sample]:
     pytest.fail(f"nothing more came within {DEADLINE_S:g} s")
 
 
-def test_blockage_is_seen_on_zenoh_and_every_daemon_stops_with_0(tmp_path: Path) -> None:
+@pytest.mark.parametrize("gather_s", [0.0, 0.1])
+def test_blockage_is_seen_on_zenoh_and_every_daemon_stops_with_0(tmp_path: Path, gather_s: float) -> None:
     scenario = tmp_path / "quick.toml"
     scenario.write_text(SCENARIO)
     port = free_port()
@@ -95,8 +96,13 @@ def test_blockage_is_seen_on_zenoh_and_every_daemon_stops_with_0(tmp_path: Path)
         wetwell("router", "--zenoh", endpoint) as router,
         wetwell("detector", "--zenoh", endpoint) as detector,
         listener(port, "wetwell/alpha/verdict/*") as verdicts,
-        wetwell("simulator", "--scenario", str(scenario), "--zenoh", endpoint) as simulator,
+        listener(port, "wetwell/alpha/samples") as blocks,
+        wetwell("simulator", "--scenario", str(scenario), "--zenoh", endpoint, gather_s=gather_s) as simulator,
     ):
+        if gather_s:
+            block = json.loads(next(blocks).payload.to_string())
+            assert block["schema"] == "wetwell.samples/1"
+            assert len(block["time"]) == len(block["seq"]) == len(block["pumps"][0]["flow_m3h"]) > 1
         states: dict[int, list[str]] = {1: [], 2: [], 3: []}
         for sample in verdicts:
             assert sample.encoding == zenoh.Encoding.APPLICATION_JSON

@@ -6,8 +6,9 @@ import socket
 from pathlib import Path
 
 from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.keys import history_key, sample_key
+from wetwell.protocols.keys import history_key, sample_block_key, sample_key
 from wetwell.protocols.messages import PumpReading, Sample
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.protocols.zenoh_link import open_client, open_router
 from wetwell.services.historian.core import Historian
@@ -25,16 +26,22 @@ async def over_zenoh(folder: Path) -> None:
     place = endpoint()
     with open_router(place), open_client(place) as station, open_client(place) as site, open_client(place) as asker:
         publisher = station.publisher(sample_key("alpha"), history=600)
+        of_blocks = station.publisher(sample_block_key("alpha"), history=60)
         samples = [
             Sample(station="alpha", seq=seq, time=seq * NS_PER_S, level_m=float(seq), pumps=(PumpReading(),))
             for seq in range(200)
         ]
-        for sample in samples[:100]:
-            publisher.put(sample.encode())  # before anybody listens
+
+        def put(begin: int) -> None:
+            for sample in samples[begin : begin + 50]:
+                publisher.put(sample.encode())
+            for first in range(begin + 50, begin + 100, 10):
+                of_blocks.put(SampleBlock.of(samples[first : first + 10]).encode())
+
+        put(0)  # before anybody listens
         with contextlib.closing(FolderStore(folder)) as store:
             keeping = asyncio.create_task(keep(site, Historian(store), 0.05, 60.0, 60.0))
-            for sample in samples[100:]:
-                publisher.put(sample.encode())
+            put(100)
             question = HistoryQuery(kind="samples", raw=True).encode()
             async with asyncio.timeout(20.0):
                 while True:
@@ -48,5 +55,5 @@ async def over_zenoh(folder: Path) -> None:
         assert answer.columns["level_m"] == tuple(float(seq) for seq in range(200))
 
 
-def test_samples_from_before_and_after_its_start_are_kept_and_asked_for_over_zenoh(tmp_path: Path) -> None:
+def test_samples_and_blocks_from_before_and_after_its_start_are_kept_and_asked_for_over_zenoh(tmp_path: Path) -> None:
     asyncio.run(over_zenoh(tmp_path))

@@ -8,10 +8,11 @@ import pytest
 
 from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import history_key, sample_key, verdict_key
+from wetwell.protocols.keys import history_key, sample_block_key, sample_key, verdict_key
 from wetwell.protocols.link import Request, Subscription
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import Sample, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake
@@ -53,23 +54,40 @@ async def answer(requests: Subscription[Request], historian: Historian) -> None:
             request.reply(historian.answer("alpha", request.payload))
 
 
-async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: list[int], away: int) -> list[Verdict]:
+def message_at(samples: list[Sample], number: int, gather: int) -> bytes | None:
+    """What is sent when a sample has come: itself, or once in a while all since the last message."""
+    if (number + 1) % gather and number + 1 < len(samples):
+        return None
+    gathered = samples[number // gather * gather : number + 1]
+    return gathered[0].encode() if gather == 1 else SampleBlock.of(gathered).encode()
+
+
+async def verdicts_of_killed(
+    alpha, samples: list[Sample], folder: Path, cuts: list[int], away: int, gather: int = 1
+) -> list[Verdict]:
     """Verdicts in order of their first arrival; the judge dies at each cut and comes back `away` samples later."""
     got: dict[bytes, Verdict] = {}
     with MemoryBus() as bus:
-        publisher = bus.publisher(sample_key("alpha"), history=KEPT)
+        key = sample_key if gather == 1 else sample_block_key
+        publisher = bus.publisher(key("alpha"), history=KEPT // gather)
         verdicts = bus.subscribe(verdict_key("alpha"))
         store = FolderStore(folder / "history", keep_live_days=1)
         historian = Historian(store)
         answering = asyncio.create_task(answer(bus.answer(history_key("*")), historian))
+
+        def send(number: int) -> None:
+            payload = message_at(samples, number, gather)
+            if payload is not None:
+                historian.take("samples" if gather == 1 else "blocks", payload)
+                publisher.put(payload)
+
         position = 0
         for cut in [*cuts, len(samples)]:
             judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
             running = asyncio.create_task(Intake(bus, [judge]).run())
             checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
             for number in range(position, cut):
-                historian.take("samples", samples[number].encode())
-                publisher.put(samples[number].encode())
+                send(number)
                 if number % 200 == 0 or number + 1 == checkpoint_at:
                     await asyncio.sleep(0.0)
                     await asyncio.sleep(0.0)
@@ -83,9 +101,8 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
                 await asyncio.sleep(0.0)
             running.cancel()
             position = min(cut + away, len(samples))
-            for sample in samples[cut:position]:
-                historian.take("samples", sample.encode())
-                publisher.put(sample.encode())
+            for number in range(cut, position):
+                send(number)
         answering.cancel()
         store.close()
         for payload in await verdicts.receive():
@@ -93,13 +110,13 @@ async def verdicts_of_killed(alpha, samples: list[Sample], folder: Path, cuts: l
     return list(got.values())
 
 
-@pytest.mark.parametrize(("seed", "away"), [(2, 300), (3, 3_000)])
-def test_verdicts_after_kills_are_those_without(alpha, samples, undisturbed, tmp_path, seed, away):
+@pytest.mark.parametrize(("seed", "away", "gather"), [(2, 300, 1), (3, 3_000, 1), (4, 300, 10), (5, 3_000, 10)])
+def test_verdicts_after_kills_are_those_without(alpha, samples, undisturbed, tmp_path, seed, away, gather):
     quarter = len(samples) // 4
     cuts = [
         int(cut) + quarter * k for k, cut in enumerate(np.random.default_rng(seed).integers(1_000, quarter - away, 4))
     ]
-    told = asyncio.run(verdicts_of_killed(alpha, samples, tmp_path, cuts, away))
+    told = asyncio.run(verdicts_of_killed(alpha, samples, tmp_path, cuts, away, gather))
     assert {verdict.state for verdict in undisturbed} >= {"learning", "normal", "pump_fault"}
     assert sorted(told, key=key) == sorted(undisturbed, key=key)
 

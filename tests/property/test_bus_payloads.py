@@ -17,6 +17,7 @@ from wetwell.protocols.history_messages import HistoryQuery
 from wetwell.protocols.keys import alarm_act_key
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import MessageError, Order, PumpReading, Sample, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.services.alarms.keeper import AlarmKeeper
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.judge import StationJudge
@@ -27,10 +28,10 @@ from wetwell.services.settings import AlarmSettings
 EXAMPLES = int(os.environ.get("WETWELL_FUZZ_EXAMPLES", "1500"))
 
 STAMP = "2025-01-01T00:00:00Z"
+SAMPLE = Sample(station="alpha", seq=0, time=0, level_m=1.0, pumps=(PumpReading(flow_m3h=1.0, running=True),) * 3)
 VALID = [
-    Sample(
-        station="alpha", seq=0, time=0, level_m=1.0, pumps=(PumpReading(flow_m3h=1.0, running=True),) * 3
-    ).encode(),
+    SAMPLE.encode(),
+    SampleBlock.of([SAMPLE, SAMPLE.model_copy(update={"seq": 1, "time": 10**9})]).encode(),
     Verdict.model_validate(
         {"station": "alpha", "time": STAMP, "pump": 1, "state": "normal", "probability": {}, "evidence": {}}
         | {"window": [STAMP, STAMP]}
@@ -102,9 +103,10 @@ def daemons(alpha, tmp_path_factory):
 @given(payload=PAYLOADS)
 def test_no_payload_brings_a_daemon_down(daemons, payload):
     judge, keeper, historian = daemons
-    judge.take_payload(payload)
+    judge.take_payloads([payload])
+    judge.take_payloads([payload], SampleBlock)
     judge.take_order(payload)
-    for take in (keeper.take_sample, keeper.take_verdict, keeper.take_status):
+    for take in (keeper.take_sample, keeper.take_sample_block, keeper.take_verdict, keeper.take_status):
         take(payload)
     for kind in ("samples", "verdicts", "alarms"):
         historian.take(kind, payload)
@@ -120,7 +122,7 @@ def test_no_payload_brings_a_daemon_down(daemons, payload):
 def test_after_all_of_them_good_samples_are_still_taken(daemons):
     judge, keeper, historian = daemons
     before = judge.figures().get("samples", 0.0)
-    judge.take_payload(VALID[0])
+    judge.take_payloads([VALID[0]])
     keeper.take_sample(VALID[0])
     historian.take("samples", VALID[0])
     assert judge.figures()["samples"] == before + 1.0

@@ -105,7 +105,7 @@ def test_summing_up_twice_is_summing_up_once(values: list[list[float]], first: i
 
 WORDS = st.sampled_from(["samples", "kpi", "verdicts", "stations", "2025-01-01T00:00:00Z", "-1", "", "alpha"])
 VALUE = st.none() | st.booleans() | st.integers() | st.floats() | WORDS
-NAMES = ["schema", "kind", "start", "end", "points", "raw", "station", "time", "seq", "pumps", "level_m"]
+NAMES = ["schema", "kind", "start", "end", "points", "raw", "station", "time", "seq", "pumps", "level_m", "quality"]
 NEARLY = st.dictionaries(st.sampled_from(NAMES), VALUE | st.lists(VALUE, max_size=2)).map(
     lambda told: json.dumps(told).encode()
 )
@@ -114,7 +114,7 @@ NEARLY = st.dictionaries(st.sampled_from(NAMES), VALUE | st.lists(VALUE, max_siz
 @limits(max_examples=300)
 @given(payload=st.binary(max_size=200) | NEARLY)
 def test_no_payload_takes_it_down(filled: Historian, payload: bytes) -> None:
-    for kind in ("samples", "verdicts", "alarms"):
+    for kind in ("samples", "blocks", "verdicts", "alarms"):
         filled.take(kind, payload)
     assert History.decode(filled.answer("alpha", payload)).station
 

@@ -18,6 +18,7 @@ from wetwell.protocols.keys import (
     history_key,
     model_key,
     order_key,
+    sample_block_key,
     sample_key,
     status_key,
     verdict_key,
@@ -50,8 +51,10 @@ def test_the_default_table_lets_only_the_gateway_and_the_simulator_put_samples()
     ("role", "act", "key"),
     [
         ("gateway", "publish", sample_key("alpha")),
+        ("gateway", "publish", sample_block_key("alpha")),
         ("simulator", "publish", sample_key("alpha")),
         ("detector", "read", sample_key("alpha")),
+        ("detector", "read", sample_block_key("alpha")),
         ("detector", "read", order_key("alpha")),
         ("detector", "publish", verdict_key("alpha", 1)),
         ("detector", "publish", model_key("alpha")),

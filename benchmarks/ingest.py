@@ -1,0 +1,116 @@
+"""How many station-samples a second one detector and one historian take in messages of many. Prints one JSON object.
+
+python benchmarks/ingest.py --stations 1000 --seconds 600 --accelerate 50 --gather 10
+
+Router, detector and historian run as users start them, and one more process plays the stations, `accelerate` times as
+fast as life. To the daemons 1,000 stations at 50 samples a second are as 50,000 at one, but for their memory.
+"""
+
+import argparse
+import asyncio
+import json
+import multiprocessing
+import os
+import platform
+import shutil
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from site_load import SETTLE_S, Played, play, prepare
+from site_processes import PATIENCE_S, Site, cpu_and_memory, free_endpoint, started
+
+from wetwell.protocols.keys import SITE
+from wetwell.protocols.zenoh_link import connect_client
+
+HEALTH_S = 1.0
+"""The rate is found to this."""
+
+
+async def run(folder: Path, load: list[Played], given: argparse.Namespace) -> dict[str, Any]:
+    """Figures of one run."""
+    endpoint = free_endpoint()
+    commands = {
+        "router": ["router"],
+        "historian": ["historian"],
+        "detector": ["detector", "--station", str(folder / "stations")],
+    }
+    tables: dict[str, dict[str, object]] = {
+        "detector": {"state_dir": str(folder / "state")},
+        "historian": {"folder": str(folder / "history")},
+        "health": {"period_s": HEALTH_S},
+    }
+    samples = sum(len(each.recording) for each in load)
+    with started(commands, endpoint, **tables) as running, await connect_client(endpoint) as bus:
+        site = Site(bus, {})
+        hearing = [asyncio.create_task(site.hear_verdicts()), asyncio.create_task(site.hear_statuses())]
+        await site.wait_for(len(load), services=1)
+        sent_file = folder / "sent.npz"
+        player = multiprocessing.get_context("spawn").Process(
+            target=play, args=(endpoint, load, given.accelerate, sent_file, given.gather), daemon=True
+        )
+        before = {name: cpu_and_memory(process.pid)[0] for name, process in running.items()}
+        player.start()
+        through_s = dict.fromkeys(("detector", "historian"), 0.0)
+        async with asyncio.timeout(PATIENCE_S + given.seconds / given.accelerate):
+            while not sent_file.exists() or not all(through_s.values()):
+                have = {
+                    "detector": all(site.judged.get(each.name, 0.0) >= each.begin_s + given.seconds for each in load),
+                    "historian": site.figures.get((SITE, "historian"), {}).get("committed", 0.0) >= samples,
+                }
+                for name, is_through in have.items():
+                    if is_through and not through_s[name]:
+                        through_s[name] = time.monotonic()
+                await asyncio.sleep(0.05)
+        after = {name: cpu_and_memory(process.pid) for name, process in running.items()}
+        await asyncio.to_thread(player.join)
+        for task in hearing:
+            task.cancel()
+        await asyncio.gather(*hearing, return_exceptions=True)
+    with np.load(sent_file) as sent:
+        sent_s, late_s = sent["sent_s"], float(sent["late_s"])
+    begin_s, end_s = float(sent_s.min()), float(sent_s.max())
+    return {
+        "samples": samples,
+        "sent_per_s": round(samples / (end_s - begin_s)),
+        "player_late_s": round(late_s, 2),
+        "taken_per_s": {name: round(samples / (at_s - begin_s)) for name, at_s in through_s.items()},
+        "behind_s": {name: round(at_s - end_s, 1) for name, at_s in through_s.items()},
+        "cpu_us_a_sample": {
+            name: round(1e6 * (cpu_s - before[name]) / samples, 2) for name, (cpu_s, _) in after.items()
+        },
+        "memory_mb": {name: round(memory) for name, (_, memory) in after.items()},
+        "verdicts": len(site.arrivals),
+        "history_bytes_a_sample": round(
+            sum(path.stat().st_size for path in (folder / "history").rglob("*") if path.is_file()) / samples
+        ),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--stations", type=int, default=1000)
+    parser.add_argument("--seconds", type=int, default=600, help="of each station")
+    parser.add_argument("--accelerate", type=float, default=50.0, help="samples a second of each station")
+    parser.add_argument("--gather", type=int, default=10, help="samples in a message")
+    given = parser.parse_args()
+    load_before = os.getloadavg()[0]
+    folder = Path(tempfile.mkdtemp(prefix="wetwell-ingest-"))
+    try:
+        figures = asyncio.run(run(folder, prepare(folder, given.stations, given.seconds), given))
+    finally:
+        shutil.rmtree(folder)
+    machine = {"cores": os.cpu_count(), "python": platform.python_version()}
+    print(
+        json.dumps(
+            {**vars(given), "settle_s": SETTLE_S, **figures}
+            | {"load": {"before": load_before, "after": os.getloadavg()[0]}, "machine": machine},
+            indent=2,
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
