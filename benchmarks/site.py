@@ -108,7 +108,7 @@ def processes(curve: list[dict[str, float]], stations: int) -> dict[str, dict[st
 def kept(folder: Path) -> int:
     """Samples in the database of the historian, after its end."""
     with contextlib.closing(sqlite3.connect(next((folder / "history").glob("*.sqlite*")))) as database:
-        return int(database.execute("SELECT count(*) FROM sample").fetchone()[0])
+        return int(database.execute("SELECT coalesce(sum(size), 0) FROM sample").fetchone()[0])
 
 
 def plots(curve: list[dict[str, float]], folder: Path) -> None:

@@ -1,6 +1,7 @@
 """A detector that is killed at any moment: its verdicts are those of one that was not."""
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -54,12 +55,20 @@ async def answer(requests: Subscription[Request], historian: Historian) -> None:
             request.reply(historian.answer("alpha", request.payload))
 
 
-def message_at(samples: list[Sample], number: int, gather: int) -> bytes | None:
-    """What is sent when a sample has come: itself, or once in a while all since the last message."""
-    if (number + 1) % gather and number + 1 < len(samples):
-        return None
-    gathered = samples[number // gather * gather : number + 1]
-    return gathered[0].encode() if gather == 1 else SampleBlock.of(gathered).encode()
+def source(bus: MemoryBus, historian: Historian, samples: list[Sample], gather: int) -> Callable[[int], None]:
+    """Sends a sample by its number to both, or, with `gather`, all since the last message once in a while."""
+    key = sample_key if gather == 1 else sample_block_key
+    publisher = bus.publisher(key("alpha"), history=KEPT // gather)
+
+    def send(number: int) -> None:
+        if (number + 1) % gather and number + 1 < len(samples):
+            return
+        gathered = samples[number // gather * gather : number + 1]
+        payload = gathered[0].encode() if gather == 1 else SampleBlock.of(gathered).encode()
+        historian.take("samples" if gather == 1 else "blocks", payload)
+        publisher.put(payload)
+
+    return send
 
 
 async def verdicts_of_killed(
@@ -68,19 +77,11 @@ async def verdicts_of_killed(
     """Verdicts in order of their first arrival; the judge dies at each cut and comes back `away` samples later."""
     got: dict[bytes, Verdict] = {}
     with MemoryBus() as bus:
-        key = sample_key if gather == 1 else sample_block_key
-        publisher = bus.publisher(key("alpha"), history=KEPT // gather)
         verdicts = bus.subscribe(verdict_key("alpha"))
         store = FolderStore(folder / "history", keep_live_days=1)
         historian = Historian(store)
         answering = asyncio.create_task(answer(bus.answer(history_key("*")), historian))
-
-        def send(number: int) -> None:
-            payload = message_at(samples, number, gather)
-            if payload is not None:
-                historian.take("samples" if gather == 1 else "blocks", payload)
-                publisher.put(payload)
-
+        send = source(bus, historian, samples, gather)
         position = 0
         for cut in [*cuts, len(samples)]:
             judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
