@@ -1,6 +1,6 @@
 """How many station-samples a second one detector and one historian take in messages of many. Prints one JSON object.
 
-python benchmarks/ingest.py --stations 1000 --seconds 600 --accelerate 50 --gather 10
+python benchmarks/ingest.py --stations 1000 --seconds 1200 --accelerate 50 --gather 10
 
 Router, detector and historian run as users start them, and one more process plays the stations, `accelerate` times as
 fast as life. To the daemons 1,000 stations at 50 samples a second are as 50,000 at one, but for their memory.
@@ -25,7 +25,7 @@ from site_processes import PATIENCE_S, Site, cpu_and_memory, free_endpoint, star
 from wetwell.protocols.keys import SITE
 from wetwell.protocols.zenoh_link import connect_client
 
-HEALTH_S = 1.0
+HEALTH_S = 2.0
 """The rate is found to this."""
 
 
@@ -92,7 +92,7 @@ async def run(folder: Path, load: list[Played], given: argparse.Namespace) -> di
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stations", type=int, default=1000)
-    parser.add_argument("--seconds", type=int, default=600, help="of each station")
+    parser.add_argument("--seconds", type=int, default=1200, help="of each station")
     parser.add_argument("--accelerate", type=float, default=50.0, help="samples a second of each station")
     parser.add_argument("--gather", type=int, default=10, help="samples in a message")
     given = parser.parse_args()
