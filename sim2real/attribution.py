@@ -47,7 +47,9 @@ PROBES = (0.02,)
 LIKELY = 8
 """Further effects that are fitted, the most promising first."""
 JOIN_SHARE = 0.06
-"""Least gain of a further effect, as a share of what the first explains."""
+"""Least gain of a further effect, as a share of what the first explains, which its form may leave."""
+OWN_SHARE = 0.002
+"""Least gain of a further effect beyond that share of each cell, as a share of what the first explains in all."""
 CLASS_SHARE = 0.02
 """Explanations within this share of the best gain are equivalent."""
 NOISY_SHARE = 0.06
@@ -147,7 +149,7 @@ class Attributor:
         accepted: Fit | None = None
         equivalent: tuple[tuple[str, ...], ...] = ()
         if best is not None and self._is_real(self.plain, best):
-            final = self._ordered(self._reduced(self._extend(best, singles)))
+            final = self._ordered(self._reduced(self._extend(best, singles), best))
             accepted, equivalent = final.fit, self._equivalent(final, singles)
         self._progress(1.0)
         return Attribution(
@@ -188,17 +190,23 @@ class Attributor:
 
     def _extend(self, best: Ranked, singles: Sequence[Ranked]) -> Ranked:
         current, first_gain = best, best.gain
+        floor = self._misfit.bins.floor
         for _ in range(MOST_EFFECTS - 1):
             left = self._left(current.fit)
             is_open = self._open(left)
-            if float((left**2 - self._misfit.bins.floor)[self.held].sum()) < JOIN_SHARE * first_gain and not is_open:
+            is_little = float((left**2 - floor)[self.held].sum()) < JOIN_SHARE * first_gain
+            if is_little and not is_open and not self._is_own(current.fit.residuals**2 - floor, best):
                 break  # no further effect could gain enough
             others = self._joined(current, _names(singles))
             if not others:
                 break
-            tried = others[0]
+            tried = next(
+                (one for one in others if self._is_own(current.fit.residuals**2 - one.fit.residuals**2, best)),
+                others[0],
+            )
             extra = self._rank(current.fit.residuals, tried.fit)
             is_enough = extra.gain >= JOIN_SHARE * first_gain or self._open(self._left(tried.fit)) < is_open
+            is_enough |= self._is_own(current.fit.residuals**2 - tried.fit.residuals**2, best)
             if not is_enough or not self._is_real(current.fit.residuals, extra, CLEAR):
                 break
             current = self._swapped(tried, singles)
@@ -209,6 +217,18 @@ class Attributor:
         effects = () if fit is None else fit.effects
         is_seen = bool(effects) and all(effect.is_seen(self._plant) for effect in effects)
         return self._fitter.left(effects, 0 if is_seen else EXCUSED_S)
+
+    def _is_own(self, gains: Floats, first: Ranked) -> bool:
+        """Whether there is more in some cells than the form of the first effect may have left there."""
+        left_by_form = JOIN_SHARE * np.maximum(self._by_cell(self.plain**2 - first.fit.residuals**2), 0.0)
+        own = float(np.maximum(self._by_cell(gains) - left_by_form, 0.0).sum())
+        return own > max(OWN_SHARE * first.gain, LEAST_GAIN)
+
+    def _by_cell(self, values: Floats) -> Floats:
+        """Sums over the held bins of each signal and regime."""
+        bins = self._misfit.bins
+        cell = bins.signal[self.held] * len(REGIMES) + bins.regime[self.held]
+        return np.bincount(cell, values[self.held], len(SIGNALS) * len(REGIMES)).astype(np.float64)
 
     def _open(self, left: Floats) -> set[int]:
         """Signals that keep more than a third of their gap, and a gap that is worth a name."""
@@ -223,7 +243,7 @@ class Attributor:
         was = np.bincount(signal, self.plain[self.held] ** 2 - floor, len(SIGNALS))
         return set(np.flatnonzero(is_worth & (now > KEPT * was)).tolist())
 
-    def _reduced(self, current: Ranked) -> Ranked:
+    def _reduced(self, current: Ranked, first: Ranked) -> Ranked:
         """Without the members that the others can stand in for."""
         count = len(current.fit.candidates)
         for place in range(count if count > 1 else 0):
@@ -232,8 +252,9 @@ class Attributor:
                 continue
             fewer = self._rank(self.plain, self._fitter.refine(start))
             is_open = self._open(self._left(fewer.fit)) > self._open(self._left(current.fit))
-            if fewer.gain > (1.0 - JOIN_SHARE) * current.gain and not is_open:
-                return self._reduced(fewer)
+            is_own = self._is_own(fewer.fit.residuals**2 - current.fit.residuals**2, first)
+            if fewer.gain > (1.0 - JOIN_SHARE) * current.gain and not is_open and not is_own:
+                return self._reduced(fewer, first)
         return current
 
     def _joined(self, current: Ranked, candidates: Sequence[Candidate]) -> list[Ranked]:

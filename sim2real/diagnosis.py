@@ -51,6 +51,12 @@ MADE = 2.0
 """Growth of the mean square of a cell that only wrong effects bring about, in units of noise."""
 MADE_SHARE = 0.03
 """The same as a share of the whole gap."""
+MINOR = 0.01
+"""Share of the whole gap under which a cell, or a signal, says nothing against effects that explain the rest."""
+UNCLOSED, UNCLOSED_SHARE = 0.1, 0.05
+"""What of the gap accepted effects may leave, in units of noise and as a share: who leaves more is no cause."""
+LITTLE = 0.3
+"""Shrinkage under which an effect is none."""
 SLOW_S = 1800
 """Time over which fast swings of a supply are forgotten."""
 
@@ -148,15 +154,23 @@ def diagnose(
     found = Attributor(replay, misfit, candidates, progress, each).search()
     bins, pumps = misfit.bins, traces.pumps
     rng = np.random.default_rng(seed)
-    if shrinkage_of(found.plain, found.plain, bins, found.held, rng).before < FLOOR + NOTHING:
+    accepted_residuals = found.plain if found.accepted is None else found.accepted.residuals
+    gap = shrinkage_of(found.plain, accepted_residuals, bins, found.held, np.random.default_rng(seed))
+    if gap.before < FLOOR + NOTHING or gap.shrinkage < LITTLE:
         found = replace(found, accepted=None, equivalent=(), ends=np.zeros((0, 2)))
+    over = gap.before - FLOOR, gap.after - FLOOR
+    is_wide = found.accepted is not None and over[1] > max(UNCLOSED, UNCLOSED_SHARE * over[0])
     before = _repeating_gap(found.plain, bins, found, pumps)
     accepted = found.accepted
     after_residuals = found.plain if accepted is None else accepted.residuals
     after = before if accepted is None else _repeating_gap(after_residuals, bins, found, pumps)
     verdict: Verdict = "none" if accepted is None else "effect"
     told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it
-    if _is_unexplained(before, after, after_residuals, bins, found, told) or _is_unclosed(bins, found, told):
+    if (
+        is_wide
+        or _is_unexplained(before, after, after_residuals, bins, found, told)
+        or _is_unclosed(bins, found, told)
+    ):
         verdict = "unknown"
     elif accepted is not None and not any(effect.is_seen(plain.plant) for effect in accepted.effects):
         verdict = "none"
@@ -202,14 +216,17 @@ def _is_unexplained(
     has_one_form = found.accepted is not None and all(effect.has_one_form for effect in found.accepted.effects)
     is_rigid = found.accepted is not None and not found.accepted.effects[0].is_shaped
     excess, plain_excess = residuals**2 - bins.floor, found.plain**2 - bins.floor
+    least = MINOR * float(np.maximum(plain_excess[found.held], 0.0).sum()) if found.accepted is not None else 0.0
     for signal in sorted(told):
         rows = found.held & (bins.signal == signal)
         was = max(float(before[rows].sum()), float(plain_excess[rows].sum()))
+        if max(was, float(excess[rows].sum())) < least:
+            continue
         left = float(after[rows].sum())
         is_left = False
         for regime in range(len(REGIMES)):
             cell = rows & (bins.regime == regime)
-            if cell.sum() < MIN_BINS:
+            if cell.sum() < MIN_BINS or max(float(plain_excess[cell].sum()), float(excess[cell].sum())) < least:
                 continue
             cycles = np.unique(bins.cycle[cell], return_inverse=True)[1]
             is_repeating = float(after[cell].mean()) > SEEN and is_sure(

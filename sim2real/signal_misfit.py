@@ -29,6 +29,10 @@ FLOOR = 0.005
 """The same near zero, as a share of the rated value."""
 TIMING_S = 0.2
 """Skew between signals that is nobody's fault: a scan takes its time."""
+STEP = 1.0 / 3.0
+"""Change of a pump's speed from one second to the next, as a share of nominal, that a recording does not resolve."""
+UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
+"""Share of a jump of a signal that is open then, and in the seconds after: it began somewhere within a second."""
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
 MIN_STRETCH_S = 60
@@ -89,13 +93,17 @@ def pump_misfits(
         "head_m": station.sensors.head_noise,
         "power_kw": station.sensors.power_noise,
     }
+    is_step = _steps(traces, plain)
     misfits = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
         quantity: Quantity = name  # type: ignore[assignment]
         noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
         for pump in range(traces.pumps):
-            misfit = _pump_misfit(name, pump, recorded[pump], expected[pump], regimes, noise, patterns.get(quantity))
+            open_ = _unresolved(expected[pump], is_step)
+            misfit = _pump_misfit(
+                name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(quantity)
+            )
             if misfit is not None:
                 misfits.append(misfit)
     return misfits
@@ -114,11 +122,25 @@ def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list
     return stretches
 
 
+def _steps(traces: Traces, plain: Prediction) -> npt.NDArray[np.bool_]:
+    """(n,) whether a pump is switched faster than a recording of each second shows."""
+    nominal_hz = plain.plant.nominal_frequency_hz[:, None]
+    moved = np.abs(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1])) / nominal_hz
+    return np.asarray(np.any(moved > STEP, axis=0))
+
+
+def _unresolved(expected: Floats, is_step: npt.NDArray[np.bool_]) -> Floats:
+    """(n,) how far a right model may be off since nobody knows when within a second a pump was switched."""
+    jumps = np.abs(np.diff(expected, prepend=expected[:1])) * is_step
+    return np.asarray(np.convolve(jumps, UNRESOLVED)[: expected.size], dtype=np.float64)
+
+
 def _pump_misfit(
     name: str,
     pump: int,
     recorded: Floats,
     expected: Floats,
+    unresolved: Floats,
     regimes: Regimes,
     noise: Noise,
     pattern: Pattern | None,
@@ -135,7 +157,7 @@ def _pump_misfit(
     slope = np.gradient(expected)
     size = np.abs(np.where(counted, recorded, 0.0))
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
-    late = TIMING_S * seconds.means(slope)
+    late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
     deviation = np.sqrt(noise_alone**2 + (FLOOR * rated) ** 2 / np.maximum(seconds.counts, 4.0) + late**2)
     return SignalMisfit(
         bins=Bins(
@@ -167,12 +189,17 @@ def level_misfit(
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
     follow_s = UNKNOWN_INFLOW_TIME_S if traces.inflow_m3h is None else LEVEL_TIME_S
     rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
-    balance_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * follow_s
+    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * follow_s
+    flow_m3h = plain.signals["flow_m3h"].sum(axis=0) if "flow_m3h" in plain.signals else np.zeros(regime.size)
+    jumps_m3h = np.abs(np.diff(flow_m3h, prepend=flow_m3h[:1])) * _steps(traces, plain)
+    forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * follow_s) / follow_s)
+    open_m = np.convolve(jumps_m3h, forgotten)[: regime.size] / 3600.0 / station.sump.area_m2
+    balance_m = np.hypot(off_m, seconds.means(open_m))
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
     if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know
         error_m = np.abs(seconds.means_of(traces.level_m[seconds.second] - plain.level_m[seconds.second]))
         is_idle = seconds.first(regime) == IDLE
-        balance_m = float(np.hypot(balance_m, np.median(error_m[is_idle]) / 0.6745 if is_idle.any() else 0.0))
+        balance_m = np.hypot(balance_m, np.median(error_m[is_idle]) / 0.6745 if is_idle.any() else 0.0)
     return SignalMisfit(
         bins=Bins(
             signal=np.full(seconds.counts.size, LEVEL),

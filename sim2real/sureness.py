@@ -12,6 +12,8 @@ CLIP = 4.0
 STRONG = 40.0
 """Drop of the sum of squares of a cycle that noise does not bring about."""
 MIN_STRONG = 3
+OVERWHELMING = 1000.0
+"""The same of which two cycles are enough: pumps that seldom run together."""
 MOST_LOSS = 0.2
 
 
@@ -29,7 +31,8 @@ def is_sure(by_cycle: Floats) -> bool:
     (True, False, True)
     """
     gain, loss = float(by_cycle[by_cycle > 0.0].sum()), -float(by_cycle[by_cycle < 0.0].sum())
-    if int(np.sum(by_cycle > STRONG)) >= MIN_STRONG and loss < MOST_LOSS * gain:
+    are_strong = int(np.sum(by_cycle > STRONG)) >= MIN_STRONG or int(np.sum(by_cycle > OVERWHELMING)) >= 2
+    if are_strong and loss < MOST_LOSS * gain:
         return True
     size = float(np.median(np.abs(by_cycle))) if by_cycle.size else 0.0
     clipped = np.clip(by_cycle, -CLIP * size, CLIP * size)

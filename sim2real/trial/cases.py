@@ -11,8 +11,8 @@ import numpy as np
 
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS, LIBRARY, OPEN
-from wetwell.sim2real.truth.sampling import case_of
-from wetwell.sim2real.truth.swmm_input import SWMM_LIBRARY, SWMM_OPEN
+from wetwell.sim2real.truth.sampling import RAMPS_S, case_of
+from wetwell.sim2real.truth.swmm_input import SWMM_LIBRARY, SWMM_OPEN, SWMM_RAMPS_S
 
 CaseKind = Literal["single", "pair", "none", "open", "leave_one_out"]
 PlantName = Literal["fine", "swmm"]
@@ -109,6 +109,7 @@ def trial_case(
         rng,
         seconds=seconds,
         slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,
+        ramps_s=SWMM_RAMPS_S if plant == "swmm" else RAMPS_S,
     )
     return TrialCase(number=number, kind=kind, plant=plant, truth=truth)
 

@@ -13,8 +13,13 @@ from wetwell.sim2real.truth.parts import draw_of, rounded
 from wetwell.sim2real.truth.spec import HOUR_S, WATER_N_M3, duty_m3h
 from wetwell.sim2real.truth.truth_plant import passage_of
 
+RAMPS_S = (6, 15)
+"""Shortest and longest ramp of a drive. [s]"""
 
-def station_of(name: str, rng: np.random.Generator, *, needs_two_pumps: bool = False) -> Station:
+
+def station_of(
+    name: str, rng: np.random.Generator, *, needs_two_pumps: bool = False, ramps_s: tuple[int, int] = RAMPS_S
+) -> Station:
     """A plausible station of one to four pumps.
 
     Duty, curve, lift, friction, wet well, levels, ramp and noise are all drawn; the wet well is emptied by one pump
@@ -26,6 +31,8 @@ def station_of(name: str, rng: np.random.Generator, *, needs_two_pumps: bool = F
     rng : numpy.random.Generator
     needs_two_pumps : bool
         Whether at least two pumps with mains of their own are needed.
+    ramps_s : (int, int)
+        Shortest and longest ramp. [s]
     """
     pumps = int(rng.integers(2 if needs_two_pumps else 1, 5))
     flow_m3h, head_m = math.exp(rng.uniform(math.log(60.0), math.log(400.0))), rng.uniform(12.0, 40.0)
@@ -57,7 +64,7 @@ def station_of(name: str, rng: np.random.Generator, *, needs_two_pumps: bool = F
         "control": {
             "start_levels_m": [rounded(stop_m + depth_m + n * start_step_m) for n in range(pumps)],
             "stop_levels_m": [rounded(stop_m + n * stop_step_m) for n in range(pumps)],
-            "ramp_s": float(rng.integers(6, 16)),
+            "ramp_s": float(rng.integers(*ramps_s, endpoint=True)),
         },
         "electrical": {
             "voltage_v": voltage_v,
@@ -99,6 +106,7 @@ def case_of(
     *,
     seconds: int,
     slow_share: float = 0.0,
+    ramps_s: tuple[int, int] = RAMPS_S,
 ) -> TruthCase:
     """A case with deviations of these names, at a new station, with parameters drawn for it.
 
@@ -112,6 +120,8 @@ def case_of(
         [s]
     slow_share : float
         Share of the sensors' variance that is slow. [1]
+    ramps_s : (int, int)
+        Shortest and longest ramp of the station. [s]
 
     Examples
     --------
@@ -122,7 +132,7 @@ def case_of(
     (['flow_meter_gain'], True)
     """
     needs_two = any(DEVIATIONS[name].needs_two_pumps for name in names)
-    station = station_of(station_name, rng, needs_two_pumps=needs_two)
+    station = station_of(station_name, rng, needs_two_pumps=needs_two, ramps_s=ramps_s)
     draw = draw_of(station, rng)
     deviations = tuple(Deviation(name=name, parameters=DEVIATIONS[name].draw(draw)) for name in names)
     control = station.control

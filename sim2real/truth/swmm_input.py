@@ -21,7 +21,6 @@ SWMM_LIBRARY = (
     "unmetered_inflow",
     "pump_wear",
     "check_valve_leak",
-    "ramp_shape",
     "supply_voltage_variation",
     "control_delay",
     "threshold_shift",
@@ -44,6 +43,9 @@ SWMM_OPEN = (
     "speed_hunting",
 )
 """Deviations that SWMM can express, or that lie in control and telemetry."""
+
+SWMM_RAMPS_S = (1, 2)
+"""Ramps of soft starters. In longer ones its pumps move no water at twice the head they need, then let go. [s]"""
 
 ROUTING_STEP_S = 0.5
 SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
