@@ -1,7 +1,7 @@
 """The detector of one station: samples in, verdicts out; the same for a live stream and for a recording."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -112,15 +112,17 @@ class Detector:
 
     def take(self, block: Block) -> list[Verdict]:
         """Verdicts that a block of samples brings; the same as if they came one by one."""
-        verdicts: list[Verdict] = []
+        return list(self.verdicts_on(block))
+
+    def verdicts_on(self, block: Block) -> Iterator[Verdict]:
+        """Yield the verdicts that a block of samples brings, each as soon as it is there; take them all."""
         if not self._gate.state["is_begun"][0] and len(block.time_ns):
             begin_ns = int(block.time_ns[0])
-            verdicts += [self._told(pump, begin_ns, (begin_ns, begin_ns), "begins") for pump in self._every()]
+            yield from [self._told(pump, begin_ns, (begin_ns, begin_ns), "begins") for pump in self._every()]
         row, stop = advance(0, BEGIN, *block, *self._arrays())
         while stop != DONE:
-            verdicts += self._stopped(stop)
+            yield from self._stopped(stop)
             row, stop = advance(row, GOES_ON[stop], *block, *self._arrays())
-        return verdicts
 
     def _stopped(self, stop: int) -> list[Verdict]:
         """Verdicts where the loop over the samples has stopped."""

@@ -4,6 +4,7 @@ import secrets
 import struct
 import threading
 from collections import deque
+from collections.abc import Iterator
 from itertools import accumulate, islice, pairwise
 from typing import Literal, NamedTuple
 
@@ -71,8 +72,42 @@ class Page(NamedTuple):
         return cls(source, first, end, payloads)
 
 
+class LastMessages:
+    """The last messages of a publisher, and the last one in any case.
+
+    Parameters
+    ----------
+    history : int
+        Most messages, >= 1; one that holds many things counts as many.
+    before : LastMessages, optional
+        What to begin with.
+    """
+
+    def __init__(self, history: int, before: "LastMessages | None" = None) -> None:
+        self.payloads: deque[bytes] = deque()
+        self._history = history
+        self._weights: deque[int] = deque()
+        self._weight = 0
+        if before is not None:
+            for payload, weight in before.weighed():
+                self.add(payload, weight)
+
+    def weighed(self) -> Iterator[tuple[bytes, int]]:
+        """Messages with what each counts as."""
+        return zip(self.payloads, self._weights, strict=True)
+
+    def add(self, payload: bytes, weight: int) -> None:
+        """Keep a message that counts as so many."""
+        self.payloads.append(payload)
+        self._weights.append(weight)
+        self._weight += weight
+        while self._weight > self._history and len(self.payloads) > 1:
+            self.payloads.popleft()
+            self._weight -= self._weights.popleft()
+
+
 class KeptMessages:
-    """The last messages of one publisher. Its `source` is new with each life, its numbers count up from 0.
+    """What one publisher keeps. Its `source` is new with each life, its numbers count up from 0.
 
     Parameters
     ----------
@@ -83,14 +118,15 @@ class KeptMessages:
     def __init__(self, history: int) -> None:
         self.source = secrets.token_bytes(SOURCE_BYTES)
         self.end = 0
-        self._payloads: deque[bytes] = deque(maxlen=history)
+        self._last = LastMessages(history)
+        self._payloads = self._last.payloads
         self._lock = threading.Lock()
 
-    def add(self, payload: bytes) -> bytes:
+    def add(self, payload: bytes, weight: int = 1) -> bytes:
         """Keep a message; the mark that goes with it."""
         with self._lock:
             mark = _MARK.pack(self.source, self.end)
-            self._payloads.append(payload)
+            self._last.add(payload, weight)
             self.end += 1
         return mark
 

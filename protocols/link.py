@@ -16,8 +16,11 @@ Keyed = tuple[str, bytes]
 class Publisher(Protocol):
     """Sends the messages of one key, and answers a `get` on it with the last one."""
 
-    def put(self, payload: bytes) -> None:
-        """Send a message. Never waits: a subscriber that cannot keep up loses messages, not the sender time."""
+    def put(self, payload: bytes, weight: int = 1) -> None:
+        """Send a message. Never waits: a subscriber that cannot keep up loses messages, not the sender time.
+
+        It counts as `weight` of those that are kept.
+        """
 
 
 class Subscription(Protocol[T]):

@@ -4,10 +4,10 @@ import asyncio
 import contextlib
 import functools
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Self
 
+from wetwell.protocols.kept import LastMessages
 from wetwell.protocols.link import Keyed, Presence, Request
 from wetwell.protocols.mailbox import Mailbox
 
@@ -34,7 +34,7 @@ class MemoryBus:
 
     def __init__(self) -> None:
         self.alive: set[str] = set()
-        self._kept: dict[str, deque[bytes]] = {}
+        self._kept: dict[str, LastMessages] = {}
         self._subscriptions: list[tuple[str, Callable[[str, bytes], None]]] = []
         self._answerers: list[tuple[str, Mailbox[Request]]] = []
         self._watchers: list[tuple[str, Mailbox[Presence]]] = []
@@ -63,13 +63,13 @@ class MemoryBus:
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with self._lock:
-            self._kept[key] = deque(self._kept.get(key, ()), maxlen=history)
+            self._kept[key] = LastMessages(history, self._kept.get(key))
         return MemoryPublisher(self, key)
 
-    def put(self, key: str, payload: bytes) -> None:
+    def put(self, key: str, payload: bytes, weight: int = 1) -> None:
         """Send a message on a key that has a publisher."""
         with self._lock:
-            self._kept[key].append(payload)
+            self._kept[key].add(payload, weight)
             for expression, take in self._subscriptions:
                 if matches(expression, key):
                     take(key, payload)
@@ -99,7 +99,7 @@ class MemoryBus:
     def _begin(self, expression: str, history: int, take: Callable[[str, bytes], None]) -> None:
         for kept_key, kept in self._kept.items():
             if matches(expression, kept_key):
-                for payload in list(kept)[max(0, len(kept) - history) :]:
+                for payload in list(kept.payloads)[max(0, len(kept.payloads) - history) :]:
                     take(kept_key, payload)
         self._subscriptions.append((expression, take))
 
@@ -107,7 +107,7 @@ class MemoryBus:
         """Last message on a key; None if there was none."""
         with self._lock:
             kept = self._kept.get(key)
-            return kept[-1] if kept else None
+            return kept.payloads[-1] if kept is not None and kept.payloads else None
 
     def answer(self, key: str) -> Mailbox[Request]:
         """Questions that are asked on a key from now on; each is to be answered."""
@@ -119,7 +119,9 @@ class MemoryBus:
     async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
         """Answers to a question, and the last message of each key in it that has a publisher."""
         with self._lock:
-            answers = [kept[-1] for kept_key, kept in self._kept.items() if kept and matches(key, kept_key)]
+            answers = [
+                kept.payloads[-1] for kept_key, kept in self._kept.items() if kept.payloads and matches(key, kept_key)
+            ]
             waiting = [mailbox for asked, mailbox in self._answerers if matches(key, asked) or matches(asked, key)]
         requests = [MemoryRequest(key, payload) for _ in waiting]
         for mailbox, request in zip(waiting, requests, strict=True):
@@ -181,9 +183,9 @@ class MemoryPublisher:
         self._bus = bus
         self._key = key
 
-    def put(self, payload: bytes) -> None:
-        """Send a message."""
-        self._bus.put(self._key, payload)
+    def put(self, payload: bytes, weight: int = 1) -> None:
+        """Send a message, which counts as `weight` kept ones."""
+        self._bus.put(self._key, payload, weight)
 
 
 @functools.lru_cache(maxsize=4096)

@@ -76,8 +76,8 @@ class ZenohPublisher:
         )
         self._queryable = session.declare_queryable(key, at_once(self._ask))
 
-    def put(self, payload: bytes) -> None:
-        """Send a message; without a router it is kept for the time after.
+    def put(self, payload: bytes, weight: int = 1) -> None:
+        """Send a message, which counts as `weight` kept ones; without a router it is kept for the time after.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class ZenohPublisher:
             If the bus is closed.
         """
         with self._lock:  # what is numbered first is sent first
-            mark = self.kept.add(payload)
+            mark = self.kept.add(payload, weight)
             try:  # not `refusal`: this is once a message
                 self._publisher.put(payload, attachment=mark)
             except zenoh.ZError as error:

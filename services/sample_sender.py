@@ -1,15 +1,14 @@
 """Samples of one station onto the bus: each by itself, or gathered into messages of many."""
 
 import asyncio
-import math
 
 from wetwell.protocols.keys import sample_block_key, sample_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import Sample
 from wetwell.protocols.sample_block import MOST_SAMPLES, SampleBlock
 
-KEPT_S = 600
-"""The bus keeps what was sent in so many seconds, at one sample a second, for late joiners."""
+HISTORY = 600
+"""Samples that the bus keeps for late joiners: ten minutes at one a second."""
 
 
 class SampleSender:
@@ -31,11 +30,8 @@ class SampleSender:
         self._gather_s = gather_s
         self._gathered: list[Sample] = []
         self._timer: asyncio.TimerHandle | None = None
-        if gather_s:
-            kept = min(KEPT_S, math.ceil(KEPT_S / gather_s))
-            self._publisher = bus.publisher(sample_block_key(station), history=kept)
-        else:
-            self._publisher = bus.publisher(sample_key(station), history=KEPT_S)
+        key = sample_block_key(station) if gather_s else sample_key(station)
+        self._publisher = bus.publisher(key, history=HISTORY)
 
     def put(self, sample: Sample) -> None:
         """Send a sample, or gather it."""
@@ -56,7 +52,7 @@ class SampleSender:
             self._timer.cancel()
             self._timer = None
         if self._gathered:
-            self._publisher.put(SampleBlock.of(self._gathered).encode())
+            self._publisher.put(SampleBlock.of(self._gathered).encode(), len(self._gathered))
             self._gathered = []
 
 

@@ -43,7 +43,7 @@ class ZenohSettings(Table):
 
     endpoint: Endpoint = "tcp/127.0.0.1:7447"
     upstream: tuple[Endpoint, ...] = ()
-    gather_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
+    gather_s: Annotated[float, Field(ge=0.0, le=30.0)] = 0.0
     user: str | None = None
     password: SecretStr | None = None
     password_file: Path | None = None

@@ -30,13 +30,20 @@ from wetwell.protocols.whole_file import whole_file
 from wetwell.services.executors import let_interrupts
 from wetwell.services.held_out import held_out_summary, hold_out
 from wetwell.services.parallel import Failure, refuse_if_all, work_through
-from wetwell.services.swmm_plant import run_swmm
 from wetwell.services.trial_page import trial_page
+from wetwell.services.twin import is_hidden, recording_of
 from wetwell.sim2real.trial.answer import Answer, answer_of
 from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
-from wetwell.sim2real.trial.scores import CaseScore, Label, chance_level, confusion, score_case, summary
+from wetwell.sim2real.trial.scores import (
+    CaseScore,
+    Label,
+    chance_level,
+    confusion,
+    named_shrinkage,
+    score_case,
+    summary,
+)
 from wetwell.sim2real.trial.seal import digest, labels_text, opened
-from wetwell.sim2real.truth import truth_plant
 
 SCHEMA = "wetwell.trial/1"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
@@ -194,10 +201,9 @@ def publish(case: TrialCase, folder: Path) -> None:
     published, sealed = folder / "published" / case.name, folder / "sealed" / f"{case.name}.json"
     published.mkdir(parents=True, exist_ok=True)
     sealed.parent.mkdir(parents=True, exist_ok=True)
-    run = truth_plant.run if case.plant == "fine" else run_swmm
     with whole_file(published / STATION_FILE) as file:
         tomli_w.dump(case.truth.station.model_dump(mode="json", exclude_none=True), file)
-    write_recording(run(case.truth, truth=False), published / RECORDING_FILE)
+    write_recording(recording_of(case, case.truth), published / RECORDING_FILE)
     labels = {
         "case": case.name,
         "kind": case.kind,
@@ -251,6 +257,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
     names = [name for number in range(plan.count) if (name := f"case-{number:04}") not in failed]
     pairs = [(open_case(name, folder), _answer(folder / REPORTS / name)) for name in names]
     scores = [score_case(label, answer, _answer(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
+    hidden = {score.label.case for score in scores if score.told == "none" and _is_hidden(plan, folder, score)}
     rows, columns, counts = confusion(scores)
     controls: dict[str, Any] = {
         "permuted_labels": chance_level(pairs, np.random.default_rng(plan.seed)),
@@ -268,6 +275,11 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         "failed": [{"case": name, "error": failed[name].error} for name in sorted(failed)],
         "all": summary(scores),
         "kinds_scored": _grouped(scores, lambda score: score.label.kind),
+        "hidden": sorted(hidden),
+        "kinds_scored_without_hidden": _grouped(
+            [score for score in scores if score.label.case not in hidden], lambda score: score.label.kind
+        ),
+        "named_shrinkage": named_shrinkage(scores),
         "plants_scored": _grouped(scores, lambda score: score.label.plant),
         "effects_scored": _grouped(
             [score for score in scores if score.label.kind == "single"], lambda score: score.label.names[0]
@@ -302,6 +314,11 @@ def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
 def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, Any]:
     groups = sorted({key(score) for score in scores})
     return {group: summary([score for score in scores if key(score) == group]) for group in groups}
+
+
+def _is_hidden(plan: TrialPlan, folder: Path, score: CaseScore) -> bool:
+    case = plan.case(int(score.label.case.removeprefix("case-")))
+    return is_hidden(case, folder / "published" / case.name / RECORDING_FILE)
 
 
 def _told_effect(reports: Path) -> bool:

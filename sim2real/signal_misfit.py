@@ -29,7 +29,7 @@ FLOOR = 0.005
 """The same near zero, as a share of the rated value."""
 TIMING_S = 0.2
 """Skew between signals that is nobody's fault: a scan takes its time."""
-STEP = 1.0 / 3.0
+STEP = 0.3
 """Change of a pump's speed from one second to the next, as a share of nominal, that a recording does not resolve."""
 UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
 """Share of a jump of a signal that is open then, and in the seconds after: it began somewhere within a second."""

@@ -1,28 +1,52 @@
 """Samples and orders of many stations from the bus to their judges: one subscription for all of them."""
 
 import asyncio
+import contextlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
 from wetwell.protocols.history_messages import LONGEST_NS
 from wetwell.protocols.keys import order_key, sample_block_key, sample_key
 from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import Sample
+from wetwell.protocols.messages import MessageError, Sample
 from wetwell.protocols.sample_block import SampleBlock
 from wetwell.services.detector.catch_up import missed_samples
-from wetwell.services.detector.judge import StationJudge, behind
+from wetwell.services.detector.judge import StationJudge
 
 SAMPLE_HISTORY = 600
 CAPACITY = 1_000_000
 """Messages that wait to be judged: after a start a thousand publishers send what they keep."""
 BEHIND = 10_000
-"""Samples of one station that wait while it catches up."""
+"""Messages of one station that wait while it catches up."""
 KEPT_S = 2.0
 """Time in which what publishers keep comes, even if some of it is lost on the way once."""
 CATCH_UPS = 8
 """Stations that ask the historian at the same time."""
 SLICE = 500
-"""Messages that are judged before the other tasks have their turn."""
+"""Samples that are judged before the other tasks have their turn."""
+
+Kind = type[Sample | SampleBlock]
+
+
+class Waiting:
+    """Messages of a station that wait while it catches up, as they came, for they are smaller so."""
+
+    def __init__(self) -> None:
+        self.messages: deque[tuple[bytes, Kind]] = deque()
+        self.dropped = 0
+
+    def extend(self, payloads: Sequence[bytes], kind: Kind) -> None:
+        """Add messages; beyond `BEHIND` the oldest go."""
+        self.messages.extend((payload, kind) for payload in payloads)
+        while len(self.messages) > BEHIND:
+            self.messages.popleft()
+            self.dropped += 1
+
+    def samples(self) -> Iterator[Sample]:
+        """The samples in them, which go on waiting."""
+        for payload, kind in self.messages:
+            with contextlib.suppress(MessageError):
+                yield from _samples(kind.decode(payload))
 
 
 class Intake:
@@ -36,20 +60,21 @@ class Intake:
 
     def __init__(self, bus: Bus, judges: Sequence[StationJudge]) -> None:
         self._bus = bus
-        self._judges: dict[str, tuple[StationJudge, type[Sample | SampleBlock]]] = {
+        self._judges: dict[str, tuple[StationJudge, Kind]] = {
             key(judge.station): (judge, kind)
             for judge in judges
             for key, kind in ((sample_key, Sample), (sample_block_key, SampleBlock))
         }
         self._obeying = {order_key(judge.station): judge for judge in judges}
-        self._behind = {judge: deque[Sample](maxlen=BEHIND) for judge in judges if judge.is_restored}
+        self._behind = {judge: Waiting() for judge in judges if judge.is_restored}
+        self._passed_over = 0
         self._samples = bus.collect(list(self._judges), history=SAMPLE_HISTORY, capacity=CAPACITY)
         self._orders = bus.collect(list(self._obeying))
 
     @property
     def dropped(self) -> int:
         """Messages for which there was no room."""
-        return self._samples.dropped
+        return self._samples.dropped + self._passed_over + sum(one.dropped for one in self._behind.values())
 
     async def run(self) -> None:
         """Judge for ever; restored stations take first what they have missed."""
@@ -69,10 +94,9 @@ class Intake:
             for key, payloads in batches.items():
                 judge, kind = self._judges[key]
                 if judge in self._behind:
-                    self._behind[judge].extend(_samples(judge, payloads, kind))
+                    self._behind[judge].extend(payloads, kind)
                     continue
-                judge.take_payloads(payloads, kind)
-                judged += len(payloads)
+                judged += judge.take_payloads(payloads, kind)
                 if judged >= SLICE:
                     judged = 0
                     await asyncio.sleep(0)
@@ -92,21 +116,35 @@ class Intake:
         last = judge.detector.last_heard
         await asyncio.sleep(KEPT_S)
         async with turn:
-            until_ns = min(waiting[0].time, LONGEST_NS) if waiting else LONGEST_NS
+            until_ns = min(next((sample.time for sample in waiting.samples()), LONGEST_NS), LONGEST_NS)
             async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
-                if any((sample.time, sample.seq) == last for sample in waiting):
+                if _place(last, waiting.samples()):
                     break
                 await judge.take(samples)
                 last = samples[-1].time, samples[-1].seq
-        del self._behind[judge]
-        judge.take_samples(behind(last, list(waiting)))
+            await _take(judge, waiting, _place(last, waiting.samples()))
+            self._passed_over += self._behind.pop(judge).dropped
 
 
-def _samples(judge: StationJudge, payloads: Iterable[bytes], kind: type[Sample | SampleBlock]) -> Iterator[Sample]:
-    """What is in payloads, one by one."""
-    for payload in payloads:
-        message = judge.decoded(payload, kind)
-        if isinstance(message, SampleBlock):
-            yield from message.samples()
-        elif message is not None:
-            yield message
+async def _take(judge: StationJudge, waiting: Waiting, place: int) -> None:
+    """Judge what waits from a place on, and what comes meanwhile, until nothing waits."""
+    judged = 0
+    while waiting.messages:
+        message = judge.decoded(*waiting.messages.popleft())
+        samples = [] if message is None else _samples(message)
+        judge.take_samples(samples[place:])
+        place = max(place - len(samples), 0)
+        judged += len(samples)
+        if judged >= SLICE and waiting.messages:
+            judged = 0
+            await asyncio.sleep(0)
+
+
+def _place(last: tuple[int, int], samples: Iterable[Sample]) -> int:
+    """Place behind the last sample of this time and number; 0 if it is not there."""
+    return max((place for place, one in enumerate(samples, 1) if (one.time, one.seq) == last), default=0)
+
+
+def _samples(message: Sample | SampleBlock) -> list[Sample]:
+    """What is in a message, one by one."""
+    return [message] if isinstance(message, Sample) else message.samples()

@@ -4,7 +4,7 @@ import asyncio
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import islice
 
 import numpy as np
@@ -75,16 +75,20 @@ class StationJudge:
             for verdict in told.verdicts:
                 self._publish(verdict)
 
-    def take_payloads(self, payloads: Iterable[bytes], kind: type[Sample | SampleBlock] = Sample) -> None:
-        """Judge what has come from the bus. A payload that is not of its kind is counted and left out."""
+    def take_payloads(self, payloads: Iterable[bytes], kind: type[Sample | SampleBlock] = Sample) -> int:
+        """Judge what has come from the bus; how many samples. What is not of its kind is counted and left out."""
+        samples = 0
         self._quarantine.enter(self.station)
         for payload in payloads:
             message = self.decoded(payload, kind)
             if isinstance(message, SampleBlock):
                 self._judge_block(message)
+                samples += len(message.seq)
             elif message is not None:
                 self._judge(message)
+                samples += 1
         self._quarantine.leave()
+        return samples
 
     async def take(self, samples: Iterable[Sample]) -> None:
         """Judge samples that come another way, such as from the historian."""
@@ -141,16 +145,18 @@ class StationJudge:
             pumps=len(message.pumps),
             is_bad=message.quality == "bad",
         )
+        verdicts, rest = list[Verdict](), list[Sample]()
         try:
-            verdicts = self.detector.take(block)
+            for verdict in self.detector.verdicts_on(block):
+                verdicts.append(verdict)
         except Exception:  # one odd run must not take the station off
             self._counts["failures"] += 1
             log.exception("station '%s': samples from %d on could not be judged", self.station, message.seq[0])
-            for sample in behind(self.detector.last_heard, message.samples()):
-                self._judge(sample)
-            return
+            rest = behind(self.detector.last_heard, message.samples())
         for verdict in verdicts:
             self._publish(verdict)
+        for sample in rest:
+            self._judge(sample)
 
     def _judge(self, sample: Sample) -> None:
         try:
@@ -197,7 +203,7 @@ class StationJudge:
         self._last[verdict.pump] = verdict
 
 
-def behind(last: tuple[int, int], samples: Sequence[Sample]) -> Sequence[Sample]:
+def behind(last: tuple[int, int], samples: list[Sample]) -> list[Sample]:
     """Those behind the sample of this time and number; all if it is not among them.
 
     The detector takes a long row of samples that it has had for a clock that was set back.

@@ -16,7 +16,6 @@ from wetwell.services.settings import Settings
 log = logging.getLogger(__name__)
 
 SAMPLE_HISTORY = 600
-BLOCK_HISTORY = 60
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
 CAPACITY = 1_000_000
@@ -56,7 +55,7 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
     """Take, commit, maintain, answer and report for ever."""
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
         "samples": bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
-        "blocks": bus.subscribe(sample_block_key("*"), history=BLOCK_HISTORY, capacity=CAPACITY),
+        "blocks": bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
         "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
         "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
     }

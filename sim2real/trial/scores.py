@@ -192,6 +192,15 @@ def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
     }
 
 
+def named_shrinkage(scores: Sequence[CaseScore]) -> dict[str, float] | None:
+    """Median and 10th percentile of the shrinkage where what is told first is true; None without any."""
+    found = [score.shrinkage for score in scores if score.top_1 and score.shrinkage is not None]
+    if not found:
+        return None
+    low, middle = np.quantile(found, [0.1, 0.5])
+    return {"cases": float(len(found)), "median": float(middle), "tenth": float(low)}
+
+
 def share(answers: Sequence[bool | None]) -> dict[str, Any] | None:
     """Share of yes among those that are not None, with Wilson's 95 % interval; None without any.
 

@@ -11,8 +11,11 @@ from wetwell.protocols.sample_block import MOST_SAMPLES, SampleBlock
 from wetwell.services.alarms.keeper import AlarmKeeper
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.dashboard.site_view import SiteView
-from wetwell.services.detector.intake import Intake
+from wetwell.services.detector.intake import Intake, Waiting
 from wetwell.services.detector.judge import StationJudge
+from wetwell.services.historian.core import Historian
+from wetwell.services.historian.daemon import keep
+from wetwell.services.historian.folder_store import FolderStore
 from wetwell.services.presets import find_scenario
 from wetwell.services.sample_sender import SampleSender
 from wetwell.services.settings import AlarmSettings
@@ -64,6 +67,48 @@ def test_without_a_time_to_gather_each_sample_goes_out_by_itself(samples):
     assert [Sample.decode(payload) for payload in asyncio.run(sent())] == samples[:3]
 
 
+def test_a_late_joiner_gets_the_last_600_samples_whatever_number_of_messages_they_came_in(samples):
+    async def kept(qualities: list[str]) -> list[Sample]:
+        with MemoryBus() as bus:
+            sender = SampleSender(bus, "alpha", 30.0)
+            for sample, quality in zip(samples, qualities, strict=False):
+                sender.put(sample.model_copy(update={"quality": quality}))
+            sender.flush()
+            late = bus.subscribe(sample_block_key("alpha"), history=600)
+            return [sample for payload in await late.receive() for sample in SampleBlock.decode(payload).samples()]
+
+    assert len(asyncio.run(kept(["good", "uncertain"] * 500))) == 600
+    assert len(asyncio.run(kept(["good"] * 1_800))) == 600
+
+
+def test_a_historian_takes_all_that_a_source_of_small_blocks_has_kept(samples, tmp_path):
+    async def taken() -> float:
+        with MemoryBus() as bus:
+            sender = SampleSender(bus, "alpha", 1.0)
+            for sample in samples[:300]:
+                sender.put(sample)
+                sender.flush()
+            store = FolderStore(tmp_path)
+            historian = Historian(store)
+            keeping = asyncio.create_task(keep(bus, historian, 60.0, 60.0, 60.0))
+            while historian.figures(0)["taken"] < 300.0:  # noqa: ASYNC110 - nothing else tells it
+                await asyncio.sleep(0.0)
+            keeping.cancel()
+            store.close()
+            return historian.figures(0)["taken"]
+
+    assert asyncio.run(taken()) == 300.0
+
+
+def test_what_waits_while_a_station_catches_up_is_bounded_and_what_goes_is_counted(samples, monkeypatch):
+    monkeypatch.setattr("wetwell.services.detector.intake.BEHIND", 5)
+    waiting = Waiting()
+    waiting.extend([sample.encode() for sample in samples[:4]], Sample)
+    waiting.extend([*payloads(samples[4:24], 10), b"{}"], SampleBlock)
+    assert waiting.dropped == 2
+    assert [sample.seq for sample in waiting.samples()] == list(range(2, 24))
+
+
 def payloads(samples: list[Sample], size: int) -> list[bytes]:
     """Blocks of so many samples; where their kind changes one ends."""
     blocks, block = [], list[Sample]()
@@ -95,21 +140,28 @@ async def verdicts_of(alpha, messages: list[tuple[str, bytes]]) -> tuple[list[by
 def test_verdicts_on_gathered_samples_are_those_on_single_ones_to_the_byte(alpha, samples):
     single = [(sample_key("alpha"), sample.encode()) for sample in samples]
     right, state = asyncio.run(verdicts_of(alpha, single))
-    assert {Verdict.decode(payload).state for payload in right} >= {"learning", "normal"}
+    assert {Verdict.decode(payload).state for payload in right} >= {"learning", "normal", "pump_fault"}
     for size in (10, 600):
         blocks = [(sample_block_key("alpha"), payload) for payload in payloads(samples, size)]
         assert asyncio.run(verdicts_of(alpha, blocks)) == (right, state)
 
 
 def test_a_sample_that_cannot_be_judged_takes_none_of_its_block_along(alpha, samples, monkeypatch, caplog):
-    with MemoryBus() as bus:
-        judge = StationJudge(bus, alpha)
-        monkeypatch.setattr(judge.detector, "_stopped", lambda _: 1 / 0)
-        judge.take_payloads(payloads(samples[:3_000], 600), SampleBlock)
-    figures = judge.figures()
-    assert figures["failures"] > 0
-    assert figures["samples"] == 3_000
+    told = []
+    single = [sample.encode() for sample in samples[:3_000]]
+    for kind, messages in ((Sample, single), (SampleBlock, payloads(samples[:3_000], 600))):
+        with MemoryBus() as bus:
+            verdicts = bus.subscribe(verdict_key("alpha"))
+            judge = StationJudge(bus, alpha)
+            monkeypatch.setattr(judge.detector, "_stopped", lambda _: 1 / 0)
+            judge.take_payloads(messages, kind)
+            told.append(asyncio.run(verdicts.receive()))
+        figures = judge.figures()
+        assert figures["failures"] > 0
+        assert figures["samples"] == 3_000
     assert "on could not be judged" in caplog.text
+    assert len(told[0]) == 3  # that each pump begins
+    assert told[1] == told[0]
 
 
 def test_foreign_and_malformed_blocks_are_counted_and_left_out(alpha, samples):

@@ -3,17 +3,20 @@
 import hashlib
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
-from wetwell.protocols.recording import read_recording
+from wetwell.protocols.recording import read_recording, write_recording
 from wetwell.protocols.station import load_station
 from wetwell.services import trial
 from wetwell.services.cli import main
 from wetwell.services.swmm_plant import run_swmm
+from wetwell.services.twin import is_hidden, recording_of
+from wetwell.sim2real.trial.cases import trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
@@ -167,6 +170,21 @@ def test_every_effect_takes_its_turn():
     assert names[:25] == names[25:]
     other = trial.TrialPlan(seed=6, count=25, kinds=("single",), seconds=3600)
     assert [other.case(number).names[0] for number in range(25)] != names[:25]
+
+
+def test_stations_of_swmm_have_soft_starters():
+    cases = [trial_case(9, number, kinds=("none",), plants=("fine", "swmm"), seconds=600) for number in range(8)]
+    assert {case.truth.station.control.ramp_s for case in cases if case.plant == "swmm"} <= {1.0, 2.0}
+    assert min(case.truth.station.control.ramp_s for case in cases if case.plant == "fine") >= 6.0
+
+
+@pytest.mark.parametrize(("cutoff_m3h", "is_seen"), [(1e-3, False), (60.0, True)])
+def test_a_case_whose_deviation_never_acts_is_told_apart(cutoff_m3h, is_seen, tmp_path):
+    case = trial_case(9, 0, kinds=("none",), plants=("fine",), seconds=7200)
+    cutoff = Deviation(name="flow_low_cutoff", parameters={"cutoff_m3h": cutoff_m3h})
+    case = replace(case, kind="single", truth=replace(case.truth, deviations=(cutoff,)))
+    write_recording(recording_of(case, case.truth), tmp_path / "recording.parquet")
+    assert is_hidden(case, tmp_path / "recording.parquet") is not is_seen
 
 
 def test_command_line(folder, monkeypatch, capsys):
