@@ -55,6 +55,14 @@ def test_a_single_effect_is_named_with_its_size(alpha, name):
     assert GapReport.model_validate_json(report.model_dump_json(by_alias=True)) == report
 
 
+def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
+    ragging = {"name": "ragging", "speed_loss": 0.1, "growth_s": 200.0}
+    cutoff = {"name": "flow_low_cutoff", "cutoff_m3h": 60.0}
+    report = report_of(diagnose(record(alpha, [ragging, cutoff]), alpha))
+    assert [effect.name for effect in report.effects] == ["ragging", "flow_low_cutoff"]
+    assert report.effects[1].parameters["cutoff_m3h"].value == pytest.approx(60.0, rel=0.15)
+
+
 def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     recording = record(alpha, [{"name": "flow_meter_gain", "factor": 0.94}])
     report = report_of(diagnose(recording, alpha, without=["flow_meter_gain"]))
