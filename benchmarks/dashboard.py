@@ -26,7 +26,7 @@ from typing import Any
 import httpx
 
 from wetwell.detector.nominal import nominal_of
-from wetwell.detector.station_model import station_model
+from wetwell.detector.station_model import StationModel
 from wetwell.protocols.keys import model_key, sample_key, verdict_key
 from wetwell.protocols.messages import PumpReading, Sample, Verdict
 from wetwell.protocols.zenoh_link import ZenohBus, connect_client
@@ -82,9 +82,8 @@ class Fleet:
                 window=(now_ns(), now_ns()),
             )
             bus.publisher(verdict_key(name, 1)).put(verdict.encode())
-        model = station_model(
-            station.model_copy(update={"name": names[0]}), (None,) * nominal_of(station).pumps, {}, now_ns()
-        )
+        first = StationModel(station.model_copy(update={"name": names[0]}))
+        model = first.message((None,) * nominal_of(station).pumps, {}, now_ns())
         bus.publisher(model_key(names[0])).put(model.encode())
 
     async def run(self) -> None:

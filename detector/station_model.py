@@ -21,35 +21,44 @@ FLOW_SHARE = 0.98
 """Curves are drawn from no flow to this share of the flow at which the pump gives no head."""
 
 
-def station_model(
-    station: Station, baselines: Sequence[Baseline | None], told: Mapping[int, Verdict], time_ns: int
-) -> Model:
-    """Model of a station as a message.
+class StationModel:
+    """Model of a station; of each pump it is worked out anew only when its baseline or its verdict is another."""
 
-    Parameters
-    ----------
-    station : Station
-    baselines : sequence of Baseline or None
-        What was learnt of each pump.
-    told : mapping
-        Last verdict with a shift on each pump, by its number from 1.
-    time_ns : int
-        Stamp of the message.
-    """
-    nominal = nominal_of(station)
-    return Model(
-        time=time_ns,
-        station=station.name,
-        nominal_frequency_hz=nominal.frequencies_hz[0],
-        start_levels_m=station.control.start_levels_m,
-        stop_levels_m=station.control.stop_levels_m,
-        floor_area_m2=nominal.area_m2,
-        is_common_header=nominal.is_common_header,
-        pumps=tuple(
-            pump_model(index, nominal, baseline, told[index + 1].evidence if index + 1 in told else {})
-            for index, baseline in enumerate(baselines)
-        ),
-    )
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self._nominal = nominal_of(station)
+        self._known: dict[int, tuple[Baseline | None, Verdict | None, PumpModel]] = {}
+
+    def message(self, baselines: Sequence[Baseline | None], told: Mapping[int, Verdict], time_ns: int) -> Model:
+        """As a message.
+
+        Parameters
+        ----------
+        baselines : sequence of Baseline or None
+            What was learnt of each pump.
+        told : mapping
+            Last verdict with a shift on each pump, by its number from 1.
+        time_ns : int
+            Stamp of the message.
+        """
+        return Model(
+            time=time_ns,
+            station=self._station.name,
+            nominal_frequency_hz=self._nominal.frequencies_hz[0],
+            start_levels_m=self._station.control.start_levels_m,
+            stop_levels_m=self._station.control.stop_levels_m,
+            floor_area_m2=self._nominal.area_m2,
+            is_common_header=self._nominal.is_common_header,
+            pumps=tuple(self._pump(index, baseline, told.get(index + 1)) for index, baseline in enumerate(baselines)),
+        )
+
+    def _pump(self, index: int, baseline: Baseline | None, verdict: Verdict | None) -> PumpModel:
+        known = self._known.get(index)
+        if known is not None and known[0] is baseline and known[1] is verdict:
+            return known[2]
+        model = pump_model(index, self._nominal, baseline, {} if verdict is None else verdict.evidence)
+        self._known[index] = baseline, verdict, model
+        return model
 
 
 def pump_model(index: int, nominal: Nominal, baseline: Baseline | None, evidence: Mapping[str, Any]) -> PumpModel:

@@ -1,7 +1,7 @@
 """Publishes the curves that the detector believes in, when they change."""
 
 from wetwell.detector.pipeline import Detector
-from wetwell.detector.station_model import station_model
+from wetwell.detector.station_model import StationModel
 from wetwell.protocols.keys import model_key
 from wetwell.protocols.link import Bus
 from wetwell.protocols.messages import Verdict
@@ -13,7 +13,7 @@ class ModelPublisher:
     """Publishes the model of a station: at the beginning, after each run that was judged, and after each order."""
 
     def __init__(self, bus: Bus, station: Station, detector: Detector) -> None:
-        self._station = station
+        self._model = StationModel(station)
         self._detector = detector
         self._publisher = bus.publisher(model_key(station.name))
         self._told: dict[int, Verdict] = {}
@@ -31,5 +31,5 @@ class ModelPublisher:
         self._publish(verdict.time)
 
     def _publish(self, time_ns: int) -> None:
-        model = station_model(self._station, self._detector.baselines, self._told, time_ns)
+        model = self._model.message(self._detector.baselines, self._told, time_ns)
         self._publisher.put(model.encode())

@@ -8,7 +8,7 @@ import pytest
 from wetwell.detector.nominal import duty_flows, nominal_of
 from wetwell.detector.open_runs import new_pumps
 from wetwell.detector.pipeline import Detector
-from wetwell.detector.station_model import station_model
+from wetwell.detector.station_model import StationModel
 from wetwell.protocols.keys import model_key
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.services.model_publisher import ModelPublisher
@@ -21,7 +21,7 @@ def head_at(curve, flow_m3h, values=None):
 
 
 def test_before_learning_only_the_datasheet_is_known(alpha) -> None:
-    model = station_model(alpha, (None, None, None), {}, 0)
+    model = StationModel(alpha).message((None, None, None), {}, 0)
     assert model.start_levels_m == (1.6, 1.8, 2.0)
     assert not model.is_common_header
     for pump in model.pumps:
@@ -31,7 +31,7 @@ def test_before_learning_only_the_datasheet_is_known(alpha) -> None:
 
 
 def test_the_learnt_curves_of_a_healthy_station_are_the_datasheets(alpha, learnt) -> None:
-    model = station_model(alpha, learnt.baselines, {}, 0)
+    model = StationModel(alpha).message(learnt.baselines, {}, 0)
     nominal = nominal_of(alpha)
     duty = new_pumps(nominal)
     duty["duty_speed"] = (1.0, 0.0, 0.0)
@@ -57,7 +57,7 @@ def test_the_learnt_curves_of_a_healthy_station_are_the_datasheets(alpha, learnt
 )
 def test_a_fault_moves_the_curve_that_it_concerns(alpha, learnt, judge_after_learning, fault, component) -> None:
     told = {verdict.pump: verdict for verdict in judge_after_learning(fault) if "shift_m" in verdict.evidence}
-    pump = station_model(alpha, learnt.baselines, told, 0).pumps[0]
+    pump = StationModel(alpha).message(learnt.baselines, told, 0).pumps[0]
     flow_m3h = 170.0  # between the duty points of both faults
     moved_m = {
         "pump": head_at(pump.now_pump, flow_m3h) - head_at(pump.learnt_pump, flow_m3h),
