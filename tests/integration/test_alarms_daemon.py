@@ -11,6 +11,7 @@ from wetwell.protocols.keys import alarm_act_key, alarm_key, alive_key
 from wetwell.protocols.link import Presence
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S, from_iso
 from wetwell.services.alarms.asking import list_alarms, new_act, report, send_act
 from wetwell.services.alarms.keeper import AlarmKeeper
@@ -85,6 +86,40 @@ class Site:
         while mailbox._messages:
             self.told.append(Alarm.decode(mailbox._messages.popleft()))
         return [(alarm.id, alarm.state) for alarm in self.told]
+
+
+    def block(self, size) -> None:
+        """The samples of so many seconds until now."""
+        samples = [
+            Sample(
+                station="alpha",
+                seq=second,
+                time=START_NS + second * NS_PER_S,
+                level_m=1.0,
+                pumps=(PumpReading(),),
+            )
+            for second in range(round(self.wall_s) - size + 1, round(self.wall_s) + 1)
+        ]
+        self.keeper.take_sample_block(SampleBlock.of(samples).encode())
+
+
+@pytest.mark.parametrize("size", [1, 10, 60])
+def test_delays_are_as_long_with_gathered_samples_as_with_single_ones(size):
+    rules = {"detector_silent": {"on_delay_s": 120.0}, "pump_fault": {"on_delay_s": 300.0}}
+    site = Site(stale_after_s=90.0, rules=rules)
+    news: dict[str, float] = {}
+    for second in range(1, 600):
+        site.wall_s = float(second)
+        if second % size == 0:
+            site.block(size)
+        if second == 60:
+            site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+            site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
+        if second >= 120 and second % 60 == 0:  # on a run that ended within the last block
+            news |= {name: site.wall_s for name, _ in site.verdict("pump_fault", at_s=second - 25.0)}
+        news |= {name: site.wall_s for name, _ in site.look()}
+    assert news["detector_silent"] == pytest.approx(60.0 + 30.0 + 120.0, abs=2.0)
+    assert news["pump2.pump_fault"] == pytest.approx(95.0 + 300.0, abs=size)
 
 
 def test_a_verdict_raises_with_its_advice_unknown_changes_nothing_and_normal_clears():
