@@ -87,7 +87,6 @@ class Site:
             self.told.append(Alarm.decode(mailbox._messages.popleft()))
         return [(alarm.id, alarm.state) for alarm in self.told]
 
-
     def block(self, size) -> None:
         """The samples of so many seconds until now."""
         samples = [
