@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
-from wetwell.protocols.keys import alarm_act_key, alarm_key, alive_key
+from wetwell.protocols.keys import alarm_act_key, alarm_key, alive_key, sample_block_key
 from wetwell.protocols.link import Presence
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
@@ -433,6 +433,35 @@ def test_over_a_bus_alarms_are_listed_acted_on_and_reported():
             assert answer.alarm.state == "acknowledged"
             assert (await list_alarms(bus, "alpha"))[0] == answer.alarm
             assert (await report(bus)).standing == {"acknowledged": 1}
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+    asyncio.run(day())
+
+
+def test_over_a_bus_samples_come_gathered_too_those_that_were_sent_before_and_those_that_come():
+    def block(first: int, level_m: float) -> bytes:
+        return SampleBlock.of(
+            [
+                Sample(station="alpha", seq=seq, time=START_NS + seq * NS_PER_S, level_m=level_m, pumps=())
+                for seq in range(first, first + 10)
+            ]
+        ).encode()
+
+    async def day() -> None:
+        with MemoryBus() as bus:
+            publisher = bus.publisher(sample_block_key("alpha"), history=10)
+            publisher.put(block(0, 1.0))
+            keeper = AlarmKeeper(bus, AlarmSettings(high_level_m=2.0), (), lambda: Now(START_NS, 0.0))
+            running = asyncio.create_task(keep(bus, keeper, 10.0))
+            await asyncio.sleep(0.01)
+            assert keeper.figures()["samples"] == 10.0
+            assert await list_alarms(bus) == []
+            publisher.put(block(10, 9.0))
+            publisher.put(block(20, 9.0))
+            await asyncio.sleep(0.01)
+            assert keeper.figures()["samples"] == 30.0
+            assert [alarm.id for alarm in await list_alarms(bus)] == ["level_high"]
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
 
