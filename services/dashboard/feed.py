@@ -57,9 +57,12 @@ class Feed:
 
     async def run(self) -> None:
         """Take and send for ever, from the last sample of each station on."""
-        for payload in await self._bus.ask(sample_key("*"), timeout_s=FIRST_S):
+        samples, blocks = await asyncio.gather(
+            self._bus.ask(sample_key("*"), timeout_s=FIRST_S), self._bus.ask(sample_block_key("*"), timeout_s=FIRST_S)
+        )
+        for payload in samples:
             self._view.take_sample(payload)
-        for payload in await self._bus.ask(sample_block_key("*"), timeout_s=FIRST_S):
+        for payload in blocks:
             self._view.take_sample_block(payload)
         async with asyncio.TaskGroup() as group:
             for subscription, take in self._messages:

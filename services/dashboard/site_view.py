@@ -50,10 +50,13 @@ class SiteView:
             self._take_samples(sample.station, [sample])
 
     def take_sample_block(self, payload: bytes) -> None:
-        """Take many samples of a station."""
+        """Take many samples of a station; the block that came last is left out."""
         block = self._decoded(SampleBlock, payload)
-        if block is not None:
-            self._take_samples(block.station, block.samples())
+        if block is None:
+            return
+        samples = block.samples()
+        if not self._station(block.station).is_last(samples[-1]):
+            self._take_samples(block.station, samples)
 
     def _take_samples(self, name: str, samples: list[Sample]) -> None:
         station = self._station(name)
@@ -105,7 +108,7 @@ class SiteView:
                 self._with_news[station.name] = self._changed[station.name] = station
         self.frame_id += 1
         with_news, self._with_news = self._with_news, {}
-        frames = {name: station.frame() for name, station in with_news.items()}
+        frames = {name: station.frame(self.frame_id) for name, station in with_news.items()}
         return {name: f'{{"id":{self.frame_id},{frame}}}' for name, frame in frames.items() if frame is not None}
 
     def site_frame(self) -> str | None:

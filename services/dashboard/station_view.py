@@ -10,7 +10,7 @@ from wetwell.protocols.model_messages import Model
 from wetwell.services.dashboard.rows import NS_PER_MS, live_figures, sample_row, thinned
 
 ROWS_A_FRAME = 8
-"""Most samples that go into one frame: a station that runs faster than life is drawn in steps."""
+"""Most samples for each frame since the last with some: a station that runs faster than life is drawn in steps."""
 VERDICTS = 60
 """Verdicts that are kept of each pump."""
 LATE_SAMPLES = 120
@@ -52,6 +52,7 @@ class StationView:
         self._rows: deque[str] = deque(maxlen=rows)
         self._late = 0
         self._begins = False
+        self._framed: int | None = None
         self._fresh_samples: list[Sample] = []
         self._fresh: dict[str, Any] = {}
         self._model: str | None = None
@@ -70,6 +71,10 @@ class StationView:
     @kept_rows.setter
     def kept_rows(self, rows: int) -> None:
         self._rows = deque(self._rows, maxlen=rows)
+
+    def is_last(self, sample: Sample) -> bool:
+        """Whether this is the last sample once more."""
+        return self.sample is not None and (sample.time, sample.seq) == (self.sample.time, self.sample.seq)
 
     def take_sample(self, sample: Sample, now_s: float) -> bool:
         """Take a sample that is not older than the last; whether it was one."""
@@ -143,9 +148,17 @@ class StationView:
         self._fresh["stale"] = True
         return True
 
-    def frame(self) -> str | None:
-        """JSON of what is new since the last frame, without the closing brace's `id`; None if nothing is."""
-        rows = [sample_row(sample) for sample in thinned(self._fresh_samples, ROWS_A_FRAME)]
+    def frame(self, number: int) -> str | None:
+        """JSON of what is new since the last frame, without the closing brace's `id`; None if nothing is.
+
+        Parameters
+        ----------
+        number : int
+            Of the frame; frames without news are counted too, so that gathered samples have the room of single ones.
+        """
+        rows = [sample_row(sample) for sample in thinned(self._fresh_samples, self._most_rows(number))]
+        if rows:
+            self._framed = number
         fresh, self._fresh, self._fresh_samples = self._fresh, {}, []
         self._rows.extend(rows)
         begins, self._begins = self._begins, False
@@ -164,6 +177,10 @@ class StationView:
         if "alive" in fresh:
             parts.append(f'"alive":{json.dumps(sorted(self._alive))}')
         return ",".join(parts)
+
+    def _most_rows(self, number: int) -> int:
+        kept = self._rows.maxlen or 0
+        return kept if self._framed is None else min((number - self._framed) * ROWS_A_FRAME, kept)
 
     def state(self) -> str:
         """JSON of all that is known, in the form of a frame."""

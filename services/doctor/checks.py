@@ -1,6 +1,7 @@
 """From what a site shows to what is wrong with it. Pure."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from wetwell.protocols.keys import SITE
 from wetwell.protocols.messages import Sample, Status
@@ -10,6 +11,7 @@ from wetwell.services.doctor.survey import Survey
 from wetwell.services.health.board import figure_faults
 
 MAX_SKEW_S = 60.0
+LEAST_STRETCH_S = 1.0
 MAX_VERDICT_AGE_S = 86_400.0
 LEAST_FREE_BYTES = 1_000_000_000
 SITE_SERVICES = {
@@ -46,19 +48,16 @@ def findings_of(survey: Survey, expected: Sequence[str], max_sample_age_s: float
 
 
 def _samples(survey: Survey, station: str) -> Iterator[Finding]:
-    heard = survey.samples.get(station, [])
+    heard = survey.samples.get(station)
     if not heard:
-        source = next((name for name in ("gateway", "simulator", "replay") if (station, name) in survey.alive), None)
-        advice = f"the {source} runs: look at its log" if source else "nothing publishes it: start its gateway"
-        text = f"station '{station}': no sample within {survey.seconds:g} s"
-        yield Finding("samples", "error", text, advice)
+        yield from _unheard(survey, station)
         return
-    rate = len(heard) / survey.seconds
     last_ns, last = heard[-1]
-    yield Finding("samples", "ok", f"station '{station}': {rate:.1f} samples a second, last {to_iso(last.time)}")
-    span_s = (last.time - heard[0][1].time) / NS_PER_S
-    if span_s > 2.0 * survey.seconds + 2.0:
-        text = f"station '{station}': its time runs {span_s / survey.seconds:.0f} times as fast as life"
+    stretch = _stretch(heard, survey.seconds)
+    told = f"{len(heard)} samples in one message" if stretch is None else f"{stretch.rate:.1f} samples a second"
+    yield Finding("samples", "ok", f"station '{station}': {told}, last {to_iso(last.time)}")
+    if stretch is not None and stretch.is_fast:
+        text = f"station '{station}': its time runs {stretch.pace:.0f} times as fast as life"
         yield Finding("clock", "ok", f"{text}, so its clock is not compared")
     else:
         skew_s = (last.time - last_ns) / NS_PER_S
@@ -66,8 +65,64 @@ def _samples(survey: Survey, station: str) -> Iterator[Finding]:
         advice = (
             "" if level == "ok" else "set the clock of PLC or gateway (NTP), or let the gateway stamp the samples"
         )
+        if advice and stretch is None:
+            advice += "; if it runs faster than life, --seconds long enough for two of its messages show it"
         yield Finding("clock", level, f"station '{station}': samples are {skew_s:+.1f} s from this clock", advice)
     yield from _quality(station, [sample for _, sample in heard])
+
+
+def _unheard(survey: Survey, station: str) -> Iterator[Finding]:
+    """No message came: a station that gathers its samples may be between two of them."""
+    advice = "nothing publishes it: start its gateway"
+    source = next((name for name in ("gateway", "simulator", "replay") if (station, name) in survey.alive), None)
+    if source:
+        advice = f"the {source} runs: look at its log"
+    if gathered := survey.gathered.get(station):
+        (asked_ns, first), (_, last) = gathered[0], gathered[-1]
+        age_s = survey.seconds + (asked_ns - last.time) / NS_PER_S
+        if -MAX_SKEW_S <= age_s <= (last.time - first.time) / NS_PER_S + MAX_SKEW_S:
+            text = f"station '{station}': {len(gathered)} samples in its last message, last {to_iso(last.time)}"
+            yield Finding("samples", "ok", text)
+            yield from _quality(station, [sample for _, sample in gathered])
+            return
+        advice += f"; its last message ends {to_iso(last.time)}: if it gathers for longer, listen longer: --seconds"
+    yield Finding("samples", "error", f"station '{station}': no sample within {survey.seconds:g} s", advice)
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """So many samples came within a time of the wall, and how long that was for the station."""
+
+    samples: int
+    wall_s: float
+    station_s: float
+
+    @property
+    def rate(self) -> float:
+        return self.samples / self.wall_s
+
+    @property
+    def pace(self) -> float:
+        return self.station_s / self.wall_s
+
+    @property
+    def is_fast(self) -> bool:
+        return self.station_s > 2.0 * self.wall_s + 2.0
+
+
+def _stretch(heard: Sequence[tuple[int, Sample]], seconds: float) -> _Stretch | None:
+    """Of single samples all the time of listening; of gathered ones that between the first message and the last.
+
+    None where only one message was heard: nobody knows how long its samples were gathered.
+    """
+    (first_ns, first), (last_ns, last) = heard[0], heard[-1]
+    if len({heard_ns for heard_ns, _ in heard}) == len(heard):
+        return _Stretch(len(heard), seconds, (last.time - first.time) / NS_PER_S)
+    wall_s = (last_ns - first_ns) / NS_PER_S
+    if wall_s < LEAST_STRETCH_S:
+        return None
+    in_first = sum(heard_ns == first_ns for heard_ns, _ in heard)
+    return _Stretch(len(heard) - in_first, wall_s, (last.time - heard[in_first - 1][1].time) / NS_PER_S)
 
 
 def _quality(station: str, samples: Sequence[Sample]) -> Iterator[Finding]:
@@ -98,9 +153,9 @@ def _detector(survey: Survey, station: str) -> Iterator[Finding]:
     if not verdicts:
         text = f"station '{station}': no verdict yet"
         yield Finding("verdicts", "warning", text, "it comes with the end of the first run of a pump")
-    heard = survey.samples.get(station)
+    last = survey.last_sample(station)
     for verdict in verdicts:
-        age_s = 0.0 if not heard else (heard[-1][1].time - verdict.time) / NS_PER_S
+        age_s = 0.0 if last is None else (last.time - verdict.time) / NS_PER_S
         text = f"station '{station}' pump {verdict.pump}: {verdict.state}, {max(age_s, 0.0) / 3600:.1f} h ago"
         if age_s > MAX_VERDICT_AGE_S:
             advice = "has the pump run? is the detector the one of this station?"

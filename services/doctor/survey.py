@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TypeVar
 
 from wetwell.protocols.alarm_messages import AlarmReport
@@ -34,10 +33,15 @@ HOUR_NS = 3600 * NS_PER_S
 
 @dataclass
 class Survey:
-    """What was heard, by station. `samples` are with the time of day at which each came."""
+    """What was heard, by station.
+
+    `samples` are with the time of day at which each came, the same for all of a message; `gathered` those of the last
+    message that a station which gathers them had sent before, with the time of day at which it was asked for.
+    """
 
     seconds: float
     samples: dict[str, list[tuple[int, Sample]]] = field(default_factory=dict)
+    gathered: dict[str, list[tuple[int, Sample]]] = field(default_factory=dict)
     verdicts: dict[tuple[str, int], Verdict] = field(default_factory=dict)
     statuses: dict[tuple[str, str], Status] = field(default_factory=dict)
     alive: set[tuple[str, str]] = field(default_factory=set)
@@ -47,8 +51,13 @@ class Survey:
     @property
     def stations(self) -> set[str]:
         """Stations of which anything was heard."""
-        heard = {*self.samples, *(station for station, _ in [*self.alive, *self.statuses, *self.verdicts])}
-        return heard - {SITE}
+        others = (station for station, _ in [*self.alive, *self.statuses, *self.verdicts])
+        return {*self.samples, *self.gathered, *others} - {SITE}
+
+    def last_sample(self, station: str) -> Sample | None:
+        """Its newest sample; None if there is none."""
+        heard = self.samples.get(station) or self.gathered.get(station)
+        return heard[-1][1] if heard else None
 
 
 async def listen(bus: Bus, seconds: float) -> Survey:
@@ -58,7 +67,11 @@ async def listen(bus: Bus, seconds: float) -> Survey:
     def take_sample(sample: Sample) -> None:
         survey.samples.setdefault(sample.station, []).append((now_ns(), sample))
 
-    take_block = partial(_each_of_block, take_sample)
+    def take_block(block: SampleBlock) -> None:
+        survey.samples.setdefault(block.station, []).extend(_with_time(block, now_ns()))
+
+    def take_gathered(block: SampleBlock) -> None:
+        survey.gathered[block.station] = _with_time(block, asked_ns)
 
     def take_verdict(verdict: Verdict) -> None:
         last = survey.verdicts.get((verdict.station, verdict.pump))
@@ -74,28 +87,32 @@ async def listen(bus: Bus, seconds: float) -> Survey:
 
     tasks = [
         asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, take_sample))),
-        asyncio.create_task(
-            _each(
-                bus.subscribe(sample_block_key("*")),
-                _decoding(SampleBlock, take_block),
-            )
-        ),
+        asyncio.create_task(_each(bus.subscribe(sample_block_key("*")), _decoding(SampleBlock, take_block))),
         asyncio.create_task(_each(bus.subscribe(verdict_key("*"), history=1), _decoding(Verdict, take_verdict))),
         asyncio.create_task(_each(bus.subscribe(status_key("*", "*"), history=1), _decoding(Status, take_status))),
         asyncio.create_task(_each(bus.watch(alive_key("*", "*")), take_presence)),
     ]
+    asked_ns = now_ns()
+    asking = asyncio.create_task(bus.ask(sample_block_key("*"), timeout_s=ANSWER_S))
     await asyncio.sleep(seconds)
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
+    for payload in await asking:
+        _decoding(SampleBlock, take_gathered)(payload)
+    await _ask(bus, survey)
+    return survey
+
+
+async def _ask(bus: Bus, survey: Survey) -> None:
     survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=ANSWER_S))
     for station in sorted(survey.stations):
-        last_ns = survey.samples[station][-1][1].time if station in survey.samples else now_ns()
+        last = survey.last_sample(station)
+        last_ns = now_ns() if last is None else last.time
         query = HistoryQuery(kind="samples", start=last_ns - HOUR_NS, end=last_ns, points=10)
         history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S))
         if history is not None:
             survey.histories[station] = history
-    return survey
 
 
 async def _each(subscription: Subscription[T], take: Callable[[T], None]) -> None:
@@ -104,9 +121,8 @@ async def _each(subscription: Subscription[T], take: Callable[[T], None]) -> Non
             take(message)
 
 
-def _each_of_block(take: Callable[[Sample], None], block: SampleBlock) -> None:
-    for sample in block.samples():
-        take(sample)
+def _with_time(block: SampleBlock, heard_ns: int) -> list[tuple[int, Sample]]:
+    return [(heard_ns, sample) for sample in block.samples()]
 
 
 def _decoding(message: type[M], take: Callable[[M], None]) -> Callable[[bytes], None]:

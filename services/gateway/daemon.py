@@ -39,11 +39,10 @@ async def poll_all(
     """Poll PLCs for ever, one task each; they begin spread over a second, so that not all are asked at once."""
     senders = [SampleSender(bus, plc.station, gather_s) for plc in plcs]
     pollers = [PlcPoller(plc, sender.put, longest_wait_s) for plc, sender in zip(plcs, senders, strict=True)]
-    try:
-        await _poll(bus, pollers, health_s)
-    finally:
+    with contextlib.ExitStack() as stack:
         for sender in senders:
-            sender.flush()
+            stack.callback(sender.flush)
+        await _poll(bus, pollers, health_s)
 
 
 async def _poll(bus: Bus, pollers: Sequence[PlcPoller], health_s: float) -> None:

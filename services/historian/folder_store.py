@@ -68,9 +68,14 @@ class FolderStore:
         Raises
         ------
         StoreError
-            If another holds it.
+            If another holds it, or it cannot be held.
         """
-        with (self._folder / "lock").open("w") as file:
+        lock = self._folder / "lock"
+        try:
+            opened = lock.open("w")
+        except OSError as error:
+            raise StoreError(f"{lock}: cannot be written: {error.strerror or error}") from error
+        with opened as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import pytest
 
 from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
-from wetwell.protocols.keys import alarm_act_key, alarm_key, alive_key
+from wetwell.protocols.keys import alarm_act_key, alarm_key, alive_key, sample_block_key
 from wetwell.protocols.link import Presence
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S, from_iso
 from wetwell.services.alarms.asking import list_alarms, new_act, report, send_act
 from wetwell.services.alarms.keeper import AlarmKeeper
@@ -85,6 +86,39 @@ class Site:
         while mailbox._messages:
             self.told.append(Alarm.decode(mailbox._messages.popleft()))
         return [(alarm.id, alarm.state) for alarm in self.told]
+
+    def block(self, size) -> None:
+        """The samples of so many seconds until now."""
+        samples = [
+            Sample(
+                station="alpha",
+                seq=second,
+                time=START_NS + second * NS_PER_S,
+                level_m=1.0,
+                pumps=(PumpReading(),),
+            )
+            for second in range(round(self.wall_s) - size + 1, round(self.wall_s) + 1)
+        ]
+        self.keeper.take_sample_block(SampleBlock.of(samples).encode())
+
+
+@pytest.mark.parametrize("size", [1, 10, 60])
+def test_delays_are_as_long_with_gathered_samples_as_with_single_ones(size):
+    rules = {"detector_silent": {"on_delay_s": 120.0}, "pump_fault": {"on_delay_s": 300.0}}
+    site = Site(stale_after_s=90.0, rules=rules)
+    news: dict[str, float] = {}
+    for second in range(1, 600):
+        site.wall_s = float(second)
+        if second % size == 0:
+            site.block(size)
+        if second == 60:
+            site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+            site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
+        if second >= 120 and second % 60 == 0:  # on a run that ended within the last block
+            news |= {name: site.wall_s for name, _ in site.verdict("pump_fault", at_s=second - 25.0)}
+        news |= {name: site.wall_s for name, _ in site.look()}
+    assert news["detector_silent"] == pytest.approx(60.0 + 30.0 + 120.0, abs=2.0)
+    assert news["pump2.pump_fault"] == pytest.approx(95.0 + 300.0, abs=size)
 
 
 def test_a_verdict_raises_with_its_advice_unknown_changes_nothing_and_normal_clears():
@@ -399,6 +433,35 @@ def test_over_a_bus_alarms_are_listed_acted_on_and_reported():
             assert answer.alarm.state == "acknowledged"
             assert (await list_alarms(bus, "alpha"))[0] == answer.alarm
             assert (await report(bus)).standing == {"acknowledged": 1}
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+    asyncio.run(day())
+
+
+def test_over_a_bus_samples_come_gathered_too_those_that_were_sent_before_and_those_that_come():
+    def block(first: int, level_m: float) -> bytes:
+        return SampleBlock.of(
+            [
+                Sample(station="alpha", seq=seq, time=START_NS + seq * NS_PER_S, level_m=level_m, pumps=())
+                for seq in range(first, first + 10)
+            ]
+        ).encode()
+
+    async def day() -> None:
+        with MemoryBus() as bus:
+            publisher = bus.publisher(sample_block_key("alpha"), history=10)
+            publisher.put(block(0, 1.0))
+            keeper = AlarmKeeper(bus, AlarmSettings(high_level_m=2.0), (), lambda: Now(START_NS, 0.0))
+            running = asyncio.create_task(keep(bus, keeper, 10.0))
+            await asyncio.sleep(0.01)
+            assert keeper.figures()["samples"] == 10.0
+            assert await list_alarms(bus) == []
+            publisher.put(block(10, 9.0))
+            publisher.put(block(20, 9.0))
+            await asyncio.sleep(0.01)
+            assert keeper.figures()["samples"] == 30.0
+            assert [alarm.id for alarm in await list_alarms(bus)] == ["level_high"]
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
 

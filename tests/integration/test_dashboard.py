@@ -10,10 +10,11 @@ import pytest
 from wetwell.protocols.alarm_messages import Alarm, AlarmAct, AlarmAnswer
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.keys import alarm_act_key, history_key, sample_key
+from wetwell.protocols.keys import alarm_act_key, history_key, sample_block_key, sample_key
 from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample
 from wetwell.protocols.recording import read_recording
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.dashboard.app import Desk, dashboard_app
 from wetwell.services.dashboard.daemon import serve_dashboard
@@ -293,6 +294,38 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
     events, state = asyncio.run(run())
     assert [row[0] for event in events for row in event["rows"]] == [1000]
     assert state["rows"] == events[0]["rows"]
+
+
+class SlowBus(MemoryBus):
+    """Answers only when two questions are on the way."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.both = asyncio.Barrier(2)
+
+    async def ask(self, key, payload=b"", *, timeout_s=5.0):
+        await self.both.wait()
+        return await super().ask(key, payload, timeout_s=timeout_s)
+
+
+def test_stations_that_have_spoken_before_are_there_at_once_single_and_gathered() -> None:
+    async def run():
+        bus = SlowBus()
+        bus.publisher(sample_key("alpha")).put(a_sample(7).encode())
+        gathered = SampleBlock.of([a_sample(second, "beta") for second in range(200)]).encode()
+        beta = bus.publisher(sample_block_key("beta"))
+        beta.put(gathered)
+        desk = desk_with(bus)
+        feed = Feed(bus, desk.view, desk.hub)
+        beta.put(gathered)  # while the feed begins: it comes as an answer, too
+        feeding = asyncio.create_task(feed.run())
+        async with asyncio.timeout(5.0):
+            while desk.view.frame_id < 2:  # noqa: ASYNC110 - nothing else tells it
+                await asyncio.sleep(0.01)
+        feeding.cancel()
+        return {name: [row[0] for row in rows_of(desk, name)] for name in ("alpha", "beta")}
+
+    assert asyncio.run(run()) == {"alpha": [7000], "beta": [1000 * second for second in range(200)]}
 
 
 def past_of(payload):

@@ -1,6 +1,7 @@
 """Gathered samples: the same verdicts, alarms and pages as one by one, at any place of the service."""
 
 import asyncio
+import json
 
 import pytest
 
@@ -185,16 +186,23 @@ def test_alarms_and_page_know_from_blocks_what_they_know_from_samples(alpha, sam
         with MemoryBus() as bus:
             keeper = AlarmKeeper(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
             view = SiteView(stale_s=10.0)
+            view.advance(0.0)
+            size = 10 if kind == "take_sample_block" else 1
             messages = payloads(high, 10) if kind == "take_sample_block" else [sample.encode() for sample in high]
-            for payload in messages:
+            for number, payload in enumerate(messages, start=1):
                 getattr(keeper, kind)(payload)
                 getattr(view, kind)(payload)
+                for quarter in range(4 * size):
+                    view.advance(number * size + quarter / 4.0)
             keepers.append(keeper)
             views.append(view)
     for keeper in keepers:
         assert keeper.figures()["samples"] == 200.0
         assert keeper.book.is_wanted("alpha", "level_high")
     assert views[0].stations["alpha"].sample == views[1].stations["alpha"].sample == replace_none(high[-1])
+    single, gathered = (json.loads(view.station_state("alpha"))["rows"] for view in views)
+    assert len(single) == 200
+    assert gathered == single
 
 
 def replace_none(sample: Sample) -> Sample:

@@ -94,6 +94,19 @@ def test_a_delay_starts_anew_when_the_condition_goes_and_no_clock_can_use_it_up(
     assert [delay.update(False, at * NS_PER_S, 0.0, 5.0) for at in (62, 66, 67)] == [True, True, False]
 
 
+def test_the_same_seconds_count_once_and_a_clock_that_is_set_back_is_followed():
+    delay = Delay()
+    looks = [(True, 0), (True, 10), (True, 1), (True, 10), (True, 11), (True, 2), (True, 20), (True, 21)]
+    assert [delay.update(wanted, at * NS_PER_S, 21.0, 0.0) for wanted, at in looks] == [False] * 7 + [True]
+    delay = Delay()
+    looks = [(True, 1_000), (True, 1_010), (True, 900), (True, 910), (True, 911)]
+    assert [delay.update(wanted, at * NS_PER_S, 21.0, 0.0) for wanted, at in looks] == [False] * 4 + [True]
+    delay = Delay()
+    looks = [(True, 50), (True, 60), (False, 60), (True, 20), (True, 29), (True, 30)]  # begins where it is seen anew
+    assert [delay.update(wanted, at * NS_PER_S, 10.5, 0.0) for wanted, at in looks] == [False] * 6
+    assert delay.update(True, 31 * NS_PER_S, 10.5, 0.0)
+
+
 def test_a_flood_begins_above_ten_calls_in_ten_minutes_and_ends_below_five():
     rates = AlarmRates()
     for second in range(10):

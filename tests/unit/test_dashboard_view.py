@@ -8,6 +8,7 @@ from wetwell.protocols.alarm_messages import Alarm
 from wetwell.protocols.history_messages import History
 from wetwell.protocols.link import Presence
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.dashboard.rows import past_rows, sample_row, thinned
 from wetwell.services.dashboard.site_view import ROWS, SiteView
@@ -67,12 +68,48 @@ def test_a_frame_holds_the_new_samples_and_then_no_more(view) -> None:
 
 
 def test_many_samples_are_thinned_and_the_last_one_stays(view) -> None:
-    for second in range(100):
+    view.take_sample(sample(0).encode())
+    view.advance(0.25)
+    for second in range(1, 100):
         view.take_sample(sample(second).encode())
-    times_ms = [row[0] for row in frame_of(view, 0.25)["rows"]]
+    times_ms = [row[0] for row in frame_of(view, 0.5)["rows"]]
     assert len(times_ms) == ROWS_A_FRAME
     assert times_ms[-1] == 99_000
     assert times_ms == sorted(times_ms)
+
+
+@pytest.mark.parametrize("size", [1, 10, 60, 600])
+def test_the_chart_keeps_of_a_station_in_real_time_each_sample_however_many_come_in_a_message(view, size) -> None:
+    for frame in range(1, 4 * 600 + 1):
+        second, rest = divmod(frame, 4)
+        if rest == 0 and second % size == 0:
+            view.take_sample_block(
+                SampleBlock.of([sample(number) for number in range(second - size, second)]).encode()
+            )
+        view.advance(frame / 4.0)
+    rows = json.loads(view.station_state("alpha"))["rows"]
+    assert [row[0] for row in rows] == [1000 * second for second in range(600)]
+
+
+@pytest.mark.parametrize("size", [25, 100, 600])
+def test_of_a_station_that_runs_faster_than_life_as_many_samples_are_drawn_from_blocks_as_one_by_one(view, size):
+    for frame in range(1, 73):  # a hundred samples a second
+        if frame * 25 % size == 0:
+            block = [sample(number) for number in range(frame * 25 - size, frame * 25)]
+            view.take_sample_block(SampleBlock.of(block).encode())
+        view.advance(frame / 4.0)
+    first = min(size, view.stations["alpha"].kept_rows)
+    rows = json.loads(view.station_state("alpha"))["rows"]
+    assert len(rows) == first + (72 - size // 25) * ROWS_A_FRAME
+
+
+def test_a_block_that_comes_by_two_ways_is_taken_once(view) -> None:
+    block = SampleBlock.of([sample(second) for second in range(300)]).encode()
+    for now_s in (0.25, 0.5):
+        view.take_sample_block(block)
+        view.advance(now_s)
+    state = json.loads(view.station_state("alpha"))
+    assert [row[0] for row in state["rows"]] == [1000 * second for second in range(300)]
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 1000])

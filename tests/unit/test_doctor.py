@@ -1,14 +1,19 @@
 """What the doctor says of a site, by what is broken in it."""
 
+import asyncio
+
 import pytest
 
 from wetwell.protocols.alarm_messages import AlarmFigure, AlarmReport
 from wetwell.protocols.history_messages import History
+from wetwell.protocols.keys import sample_block_key
+from wetwell.protocols.memory_link import MemoryBus
 from wetwell.protocols.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.sample_block import SampleBlock
 from wetwell.protocols.stamps import NS_PER_S
 from wetwell.services.doctor.checks import findings_of
 from wetwell.services.doctor.finding import exit_code
-from wetwell.services.doctor.survey import Survey
+from wetwell.services.doctor.survey import Survey, listen
 
 NOW_NS = 1_800_000_000 * NS_PER_S
 READING = PumpReading(frequency_hz=50.0, flow_m3h=200.0, head_m=20.0)
@@ -142,3 +147,87 @@ def test_a_missing_station_and_an_empty_bus_are_errors_and_fast_time_is_no_skew(
     fast.samples["alpha"] = [sample(number, shift_s=600.0 * number) for number in range(5)]
     (clock,) = [finding for finding in findings_of(fast, ["alpha"], 60.0) if finding.check == "clock"]
     assert (clock.level, "481 times as fast as life" in clock.text) == ("ok", True)
+
+
+def gathered(message_s: int, seconds: float = 5.0, start_s: float = 3.0, pace: int = 1) -> Survey:
+    """What is heard of a station that sends the samples of so many seconds in a message, from `start_s` on.
+
+    A message of it had gone out before.
+    """
+    survey = site()
+    survey.seconds = seconds
+    survey.samples.clear()
+    samples = message_s * pace
+    first = sample(0)[1]
+    for number in range(-1, 1 + int((seconds - start_s) // message_s)):
+        heard_s = start_s + number * message_s
+        times_ns = [NOW_NS + round(heard_s * pace - place) * NS_PER_S for place in range(samples)][::-1]
+        message = [first.model_copy(update={"time": time_ns}) for time_ns in times_ns]
+        if number < 0:
+            survey.gathered["alpha"] = [(NOW_NS, each) for each in message]
+        else:
+            heard_ns = NOW_NS + round(heard_s * NS_PER_S)
+            survey.samples.setdefault("alpha", []).extend((heard_ns, each) for each in message)
+    return survey
+
+
+@pytest.mark.parametrize(
+    ("survey", "said"),
+    [
+        (gathered(30), "30 samples in one message"),
+        (gathered(10), "10 samples in one message"),
+        (gathered(10, start_s=8.0), "10 samples in its last message"),
+        (gathered(60, start_s=50.0), "60 samples in its last message"),
+        (gathered(2, start_s=0.5), "1.0 samples a second"),
+        (gathered(10, seconds=40.0), "1.0 samples a second"),
+        (gathered(1), "0.6 samples a second"),
+    ],
+)
+def test_a_station_that_gathers_its_samples_is_as_well_as_any_other(survey, said):
+    findings = list(findings_of(survey, ["alpha"], 60.0))
+    assert exit_code(findings) == 0, findings
+    (samples,) = [finding for finding in findings if finding.check == "samples"]
+    assert said in samples.text
+    assert "as fast as life" not in str(findings)
+
+
+def test_the_pace_of_gathered_samples_is_that_between_two_messages():
+    findings = list(findings_of(gathered(10, seconds=40.0, pace=60), ["alpha"], 60.0))
+    assert exit_code(findings) == 0
+    assert "60.0 samples a second" in str(findings)
+    assert "60 times as fast as life" in str(findings)
+    wrong = gathered(10)
+    wrong.samples["alpha"] = [(heard_ns - 3600 * NS_PER_S, each) for heard_ns, each in wrong.samples["alpha"]]
+    (clock,) = [finding for finding in findings_of(wrong, ["alpha"], 60.0) if finding.check == "clock"]
+    assert (clock.level, "+3600.0 s from this clock" in clock.text) == ("warning", True)
+    assert "--seconds" in clock.advice
+
+
+def test_a_station_that_has_ceased_to_gather_is_an_error():
+    survey = gathered(10, start_s=8.0)
+    survey.gathered["alpha"] = [(heard_ns + 3600 * NS_PER_S, each) for heard_ns, each in survey.gathered["alpha"]]
+    findings = list(findings_of(survey, ["alpha"], 60.0))
+    (told,) = [finding for finding in findings if finding.check == "samples"]
+    assert (told.level, told.text) == ("error", "station 'alpha': no sample within 5 s")
+    assert "its last message ends 2027-01-15T07:59:58Z" in told.advice
+
+
+def test_a_survey_takes_the_message_that_was_there_and_those_that_come():
+    def block(first: int) -> bytes:
+        return SampleBlock.of([sample(number)[1] for number in range(first, first + 10)]).encode()
+
+    async def survey() -> Survey:
+        with MemoryBus() as bus:
+            publisher = bus.publisher(sample_block_key("alpha"))
+            publisher.put(block(0))
+            bus.publisher(sample_block_key("beta")).put(b"no block")
+            listening = asyncio.create_task(listen(bus, 0.3))
+            await asyncio.sleep(0.1)
+            publisher.put(block(10))
+            return await listening
+
+    heard = asyncio.run(survey())
+    assert heard.stations == {"alpha"}
+    assert [each.seq for _, each in heard.gathered["alpha"]] == list(range(10))
+    assert [each.seq for _, each in heard.samples["alpha"]] == list(range(10, 20))
+    assert len({heard_ns for heard_ns, _ in heard.samples["alpha"]}) == 1

@@ -234,6 +234,16 @@ def test_a_database_of_version_1_is_not_upgraded_beside_its_historian(tmp_path: 
         assert database.execute("PRAGMA user_version").fetchone() == (1,)
 
 
+def test_who_may_not_write_the_lock_cannot_upgrade_a_database_of_version_1(tmp_path: Path) -> None:
+    of_version_1(tmp_path / "live.sqlite", 10)
+    (tmp_path / "lock").mkdir()  # root may write any file, but no folder
+    with pytest.raises(StoreError, match=r"lock: cannot be written: Is a directory$"):
+        FolderStore(tmp_path)
+    (tmp_path / "lock").rmdir()
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert len(store.samples("alpha", 0, DAY_NS)) == 10
+
+
 def test_a_database_of_a_later_version_is_refused(tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(tmp_path / "live.sqlite")) as database:
         database.execute("PRAGMA user_version = 3")
