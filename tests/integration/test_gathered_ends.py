@@ -20,7 +20,7 @@ from wetwell.services.simulator import serve_simulator
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-GATHER_S = 60.0
+GATHER_S = 30.0
 SETTINGS = Settings.model_validate({"zenoh": {"gather_s": GATHER_S}})
 
 
@@ -122,10 +122,10 @@ def test_a_gateway_that_is_cancelled_sends_what_it_has_gathered(tmp_path):
 @pytest.mark.parametrize("broken", ["alpha", "beta"])
 def test_what_cannot_be_sent_of_one_station_keeps_no_other_from_being_sent(broken, tmp_path):
     class BrokenBus(MemoryBus):
-        def put(self, key, payload):
+        def put(self, key, payload, weight=1):
             if key == sample_block_key(broken):
                 raise RuntimeError("the link is broken")
-            super().put(key, payload)
+            super().put(key, payload, weight)
 
     async def run():
         with BrokenBus() as bus:
