@@ -1,7 +1,7 @@
 """A fleet beside one detector process on the same load, and a worker that is killed. Prints one JSON object.
 
 python benchmarks/fleet.py --stations 200 --seconds 60
-python benchmarks/fleet.py --stations 200 --seconds 12000 --accelerate 1000 --gather 60 --health-s 1    # no pause
+python benchmarks/fleet.py --stations 200 --seconds 6000 --accelerate 1000 --gather 60 --health-s 1    # no pause
 
 Router, detector and fleet run as users start them; one more process plays the stations. Every verdict is compared,
 byte for byte, with what a detector says that takes the same samples from its checkpoint on without a bus.
@@ -29,6 +29,7 @@ from wetwell.detector.nominal import nominal_of
 from wetwell.detector.pipeline import Detector
 from wetwell.protocols.station import load_station
 from wetwell.protocols.zenoh_link import connect_client
+from wetwell.services.charts.bar_chart import bar_chart
 
 KILLED_HEALTH_S = 0.5
 """How often a judge says how many samples it has had while a worker is killed; the time is found to this."""
@@ -148,6 +149,14 @@ def compared(site: Site, right: Told) -> dict[str, int]:
     return counts | {"missing": len(right.keys() - heard.keys())}
 
 
+def chart(runs: dict[str, Any]) -> str:
+    """Samples a second that each way has judged."""
+    ways = {name: figures for name, figures in runs.items() if "cpu_us_a_sample" in figures}
+    judged = [figures["judged_per_s"] / 1000.0 for figures in ways.values()]
+    names = [name.replace("_", " ") for name in ways]
+    return bar_chart("Judged samples a second", names, {"thousands": judged}, y_label="thousands a second")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stations", type=int, default=200)
@@ -157,6 +166,7 @@ def main() -> None:
     parser.add_argument(
         "--health-s", type=float, default=5.0, help="a judge says how far it is; the rate is found to this"
     )
+    parser.add_argument("--plots", type=Path, help="folder for fleet.svg")
     given = parser.parse_args()
     load_before = os.getloadavg()[0]
     folder = Path(tempfile.mkdtemp(prefix="wetwell-fleet-"))
@@ -173,6 +183,8 @@ def main() -> None:
         runs = {name: asyncio.run(run(folder, load, given, words, kill_s)) for name, (words, kill_s) in ways.items()}
     finally:
         shutil.rmtree(folder)
+    if given.plots is not None:
+        (given.plots / "fleet.svg").write_text(chart(runs))
     result = {
         "stations": given.stations,
         "seconds": given.seconds,
