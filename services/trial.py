@@ -31,7 +31,7 @@ from wetwell.services.executors import let_interrupts
 from wetwell.services.held_out import held_out_summary, hold_out
 from wetwell.services.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.trial_page import trial_page
-from wetwell.services.twin import is_hidden, recording_of
+from wetwell.services.twin import hidden_names, recording_of
 from wetwell.sim2real.trial.answer import Answer, answer_of
 from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
 from wetwell.sim2real.trial.scores import (
@@ -257,7 +257,8 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
     names = [name for number in range(plan.count) if (name := f"case-{number:04}") not in failed]
     pairs = [(open_case(name, folder), _answer(folder / REPORTS / name)) for name in names]
     scores = [score_case(label, answer, _answer(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
-    hidden = {score.label.case for score in scores if score.told == "none" and _is_hidden(plan, folder, score)}
+    missed = [score for score in scores if score.told == "none" or score.top_2 is False]
+    hidden = {score.label.case: names for score in missed if (names := _hidden_names(plan, folder, score))}
     rows, columns, counts = confusion(scores)
     controls: dict[str, Any] = {
         "permuted_labels": chance_level(pairs, np.random.default_rng(plan.seed)),
@@ -275,7 +276,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         "failed": [{"case": name, "error": failed[name].error} for name in sorted(failed)],
         "all": summary(scores),
         "kinds_scored": _grouped(scores, lambda score: score.label.kind),
-        "hidden": sorted(hidden),
+        "hidden": hidden,
         "kinds_scored_without_hidden": _grouped(
             [score for score in scores if score.label.case not in hidden], lambda score: score.label.kind
         ),
@@ -316,9 +317,9 @@ def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> di
     return {group: summary([score for score in scores if key(score) == group]) for group in groups}
 
 
-def _is_hidden(plan: TrialPlan, folder: Path, score: CaseScore) -> bool:
+def _hidden_names(plan: TrialPlan, folder: Path, score: CaseScore) -> list[str]:
     case = plan.case(int(score.label.case.removeprefix("case-")))
-    return is_hidden(case, folder / "published" / case.name / RECORDING_FILE)
+    return hidden_names(case, folder / "published" / case.name / RECORDING_FILE, score.told_names)
 
 
 def _told_effect(reports: Path) -> bool:

@@ -15,7 +15,7 @@ from wetwell.protocols.station import load_station
 from wetwell.services import trial
 from wetwell.services.cli import main
 from wetwell.services.swmm_plant import run_swmm
-from wetwell.services.twin import is_hidden, recording_of
+from wetwell.services.twin import hidden_names, recording_of
 from wetwell.sim2real.trial.cases import trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
@@ -184,7 +184,8 @@ def test_a_case_whose_deviation_never_acts_is_told_apart(cutoff_m3h, is_seen, tm
     cutoff = Deviation(name="flow_low_cutoff", parameters={"cutoff_m3h": cutoff_m3h})
     case = replace(case, kind="single", truth=replace(case.truth, deviations=(cutoff,)))
     write_recording(recording_of(case, case.truth), tmp_path / "recording.parquet")
-    assert is_hidden(case, tmp_path / "recording.parquet") is not is_seen
+    assert hidden_names(case, tmp_path / "recording.parquet", ()) == ([] if is_seen else ["flow_low_cutoff"])
+    assert hidden_names(case, tmp_path / "recording.parquet", ["flow_low_cutoff"]) == []
 
 
 def test_command_line(folder, monkeypatch, capsys):
