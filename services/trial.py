@@ -258,7 +258,8 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
     pairs = [(open_case(name, folder), _answer(folder / REPORTS / name)) for name in names]
     scores = [score_case(label, answer, _answer(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
     missed = [score for score in scores if score.told == "none" or score.top_2 is False]
-    hidden = {score.label.case: names for score in missed if (names := _hidden_names(plan, folder, score))}
+    unfound = {score.label.case: _hidden_names(plan, folder, score) for score in missed}
+    hidden = {case: effects for case, effects in unfound.items() if effects}
     rows, columns, counts = confusion(scores)
     controls: dict[str, Any] = {
         "permuted_labels": chance_level(pairs, np.random.default_rng(plan.seed)),
