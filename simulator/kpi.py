@@ -22,6 +22,8 @@ MIN_GAP_S = 10.0
 GAP_STEPS = 3.0
 """Without `max_gap_s`, an interval of more than so many usual ones, and of more than `MIN_GAP_S`, is a gap."""
 
+MOST_RATE_PER_H = 1e12
+"""No flow and no power is as large: such a reading is none."""
 _HOUR_S = 3600
 _DAY_S = 86_400
 
@@ -224,7 +226,7 @@ def _starts(running: Floats) -> npt.NDArray[np.int64]:
 
 def _sums(rate_per_h: Floats, held_ns: Integers, stamps_ns: Integers, begin_ns: Integers, period_s: int) -> Floats:
     """Integral of a rate over each period; an interval across a boundary is shared in proportion to time."""
-    known = np.isfinite(rate_per_h)
+    known = np.abs(rate_per_h) < MOST_RATE_PER_H
     if not known.any():
         return np.full(begin_ns.size, np.nan)
     rate_per_ns = np.where(known, np.maximum(rate_per_h, 0.0), 0.0) / (3600.0 * NS_PER_S)
