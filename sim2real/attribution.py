@@ -235,9 +235,8 @@ class Attributor:
         bins = self._misfit.bins
         floor, signal = bins.floor[self.held], bins.signal[self.held]
         excess = left[self.held] ** 2 - floor
-        group = signal * len(REGIMES) + bins.regime[self.held]
-        counts = np.bincount(group, minlength=len(SIGNALS) * len(REGIMES))
-        means = np.bincount(group, excess, counts.size) / np.maximum(counts, 1)
+        counts = self._by_cell(np.ones(bins.size))
+        means = self._by_cell(left**2 - bins.floor) / np.maximum(counts, 1.0)
         is_worth = np.any(((counts >= MIN_BINS) & (means > WORTH)).reshape(len(SIGNALS), -1), axis=1)
         now = np.bincount(signal, excess, len(SIGNALS))
         was = np.bincount(signal, self.plain[self.held] ** 2 - floor, len(SIGNALS))
@@ -362,10 +361,8 @@ class Attributor:
         """Whether a gain is beyond chance, and beyond what is worth a name, in some group of bins."""
         if not ranked.is_sure or ranked.gain < LEAST_GAIN:
             return False
-        gains = (before**2 - ranked.fit.residuals**2)[self.held]
-        group = self._misfit.bins.signal[self.held] * len(REGIMES) + self._misfit.bins.regime[self.held]
-        counts = np.bincount(group, minlength=len(SIGNALS) * len(REGIMES))
-        means = np.bincount(group, gains, counts.size) / np.maximum(counts, 1)
+        counts = self._by_cell(np.ones(self._misfit.bins.size))
+        means = self._by_cell(before**2 - ranked.fit.residuals**2) / np.maximum(counts, 1.0)
         return bool(np.max(means[counts >= 10], initial=0.0) > visible)
 
 
