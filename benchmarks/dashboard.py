@@ -1,11 +1,12 @@
 """Cost of the control-room page: one JSON object on standard output.
 
-    python benchmarks/dashboard.py [--stations 1000] [--seconds 20]
+    python benchmarks/dashboard.py [--stations 1000] [--seconds 20] [--followers 200]
 
 Router and dashboard run as processes of their own on free ports of this machine. The server's share of a core is its
 time on the processor over the time on the wall, while so many stations send a sample a second and one page follows
 the overview. The browser (Debian's chromium, by playwright) opens the overview and one station; of first paints the
-least and the median of several are told, each with an empty cache. Without chromium its figures are null.
+least and the median of several are told, each with an empty cache. Without chromium its figures are null. Last,
+so many followers look at one station: their delay is from the stamp of a sample to the frame that has it.
 """
 
 import argparse
@@ -115,6 +116,28 @@ async def follow(url: str, counts: dict[str, int]) -> None:
             counts["frames"] += data.count(b"data: ")
 
 
+async def frame_delays_s(url: str, followers: int, seconds: float) -> list[float]:
+    """Delay of each frame at each of so many followers of a station, in order. [s]."""
+    delays_s: list[float] = []
+
+    async def look(client: httpx.AsyncClient) -> None:
+        async with client.stream("GET", f"{url}/events", params={"station": "station-0000"}) as stream:
+            async for line in stream.aiter_lines():
+                rows = json.loads(line.removeprefix("data: ")).get("rows") if line.startswith("data: {") else None
+                if rows:
+                    delays_s.append(time.time() - rows[-1][0] / 1000)
+
+    async with httpx.AsyncClient(timeout=None, limits=httpx.Limits(max_connections=None)) as client:  # noqa: S113
+        looking = [asyncio.create_task(look(client)) for _ in range(followers)]
+        await asyncio.sleep(WARM_UP_S)
+        delays_s.clear()
+        await asyncio.sleep(seconds)
+        for task in looking:
+            task.cancel()
+        await asyncio.gather(*looking, return_exceptions=True)
+    return sorted(delays_s)
+
+
 def paints(url: str) -> dict[str, Any] | None:
     """First paints of a page and what it transfers."""
     if not CHROMIUM.exists():
@@ -147,7 +170,7 @@ def paints(url: str) -> dict[str, Any] | None:
     }
 
 
-async def measured(stations: int, seconds: float) -> dict[str, Any]:
+async def measured(stations: int, seconds: float, followers: int) -> dict[str, Any]:
     endpoint, port = f"tcp/127.0.0.1:{free_port()}", free_port()
     url = f"http://127.0.0.1:{port}"
     with (
@@ -174,6 +197,7 @@ async def measured(stations: int, seconds: float) -> dict[str, Any]:
             name: await asyncio.to_thread(paints, url + path)
             for name, path in {"overview": "/", "station": "/station/station-0000"}.items()
         }
+        delays_s = await frame_delays_s(url, followers, seconds)
         sending.cancel()
     return {
         "stations": stations,
@@ -182,6 +206,12 @@ async def measured(stations: int, seconds: float) -> dict[str, Any]:
         "stream_kb_per_s": round(stream["bytes"] / 1000, 1),
         "stream_frames_per_s": round(stream["frames"], 2),
         "pages": pages,
+        "followers": {
+            "number": followers,
+            "frames": len(delays_s),
+            "delay_median_s": round(statistics.median(delays_s), 3),
+            "delay_p99_s": round(delays_s[int(0.99 * len(delays_s))], 3),
+        },
     }
 
 
@@ -196,8 +226,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stations", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--followers", type=int, default=200)
     arguments = parser.parse_args()
-    figures = asyncio.run(measured(arguments.stations, arguments.seconds))
+    figures = asyncio.run(measured(arguments.stations, arguments.seconds, arguments.followers))
     figures["machine"] = {
         "processors": os.cpu_count(),
         "load": os.getloadavg()[0],
