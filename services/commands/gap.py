@@ -48,7 +48,9 @@ def gap_trial(
     import shlex
 
     from wetwell.services.executors import check_scheduler
-    from wetwell.services.trial import DIAGNOSE, REPLAY, TrialPlan, brief, parse_kinds, run_trial
+    from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds
+    from wetwell.services.trial.result import brief
+    from wetwell.services.trial.run import run_trial
 
     check_scheduler(scheduler)
     plan = TrialPlan(

@@ -1,7 +1,8 @@
 """The cases of a trial: which truth, which kind, each from the seed and its number alone.
 
 Case k of seed S does not depend on how many there are. Kinds take turns; within a kind the names take turns in an
-order that the seed shuffles, so that each is met as often as any other.
+order that the seed shuffles, so that each is met as often as any other. Its truth can be drawn anew: another attempt
+has the same names with another station, inflow and size.
 """
 
 from dataclasses import dataclass
@@ -36,21 +37,29 @@ SLOW_SHARE = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialCase:
-    """One sealed case.
+    """What one sealed case is, in an attempt to draw its truth.
 
     Attributes
     ----------
-    number : int
-        k, from 0.
+    seed, number : int
+        S of the trial, and k, from 0.
     kind : CaseKind
     plant : PlantName
-    truth : TruthCase
+    names : tuple of str
+        Of its deviations, the same in all attempts.
+    seconds : int
+        Length of its recording. [s]
+    attempt : int
+        From 0.
     """
 
+    seed: int
     number: int
     kind: CaseKind
     plant: PlantName
-    truth: TruthCase
+    names: tuple[str, ...]
+    seconds: int
+    attempt: int = 0
 
     @property
     def name(self) -> str:
@@ -58,13 +67,8 @@ class TrialCase:
         return f"case-{self.number:04}"
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of its deviations."""
-        return tuple(deviation.name for deviation in self.truth.deviations)
-
-    @property
     def components(self) -> tuple[str, ...]:
-        """Components in which they lie."""
+        """Components in which its deviations lie."""
         return tuple(DEVIATIONS[name].component for name in self.names)
 
     @property
@@ -77,11 +81,28 @@ class TrialCase:
         """Effects that are taken out of the library for it."""
         return self.names if self.kind == "leave_one_out" else ()
 
+    def truth(self) -> TruthCase:
+        """Draw station, inflow and deviations: of `SeedSequence(S, spawn_key=(k,))`, of `(k, attempt)` later."""
+        if self.attempt:
+            rng = _stream(self.seed, self.number, self.attempt)
+        else:
+            rng = _stream(self.seed, self.number)
+            if self.kind == "pair":
+                _other(self.names[0], _HELD[self.plant, False], rng)  # this stream has drawn the name, too
+        return case_of(
+            self.names,
+            f"station-{rng.integers(16**6):06x}",
+            rng,
+            seconds=self.seconds,
+            slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,
+            ramps_s=SWMM_RAMPS_S if self.plant == "swmm" else RAMPS_S,
+        )
+
 
 def trial_case(
     seed: int, number: int, *, kinds: tuple[CaseKind, ...], plants: tuple[PlantName, ...], seconds: int
 ) -> TrialCase:
-    """Case `number` of the trial of a seed.
+    """Case `number` of the trial of a seed, in its first attempt.
 
     Parameters
     ----------
@@ -101,26 +122,24 @@ def trial_case(
     turn, place = divmod(number, len(kinds))
     kind = kinds[place]
     plant = plants[turn % len(plants)]
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-    names = _names(seed, kind, plant, turn // len(plants), rng)
-    truth = case_of(
-        names,
-        f"station-{rng.integers(16**6):06x}",
-        rng,
-        seconds=seconds,
-        slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,
-        ramps_s=SWMM_RAMPS_S if plant == "swmm" else RAMPS_S,
-    )
-    return TrialCase(number=number, kind=kind, plant=plant, truth=truth)
+    names = _names(seed, number, kind, plant, turn // len(plants))
+    return TrialCase(seed=seed, number=number, kind=kind, plant=plant, names=names, seconds=seconds)
 
 
-def _names(seed: int, kind: CaseKind, plant: PlantName, turn: int, rng: np.random.Generator) -> tuple[str, ...]:
+def _names(seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int) -> tuple[str, ...]:
     if kind == "none":
         return ()
     held = _HELD[plant, kind == "open"]
-    order = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(KINDS.index(kind), len(held), 0)))
+    order = _stream(seed, KINDS.index(kind), len(held), 0)
     first = held[int(order.permutation(len(held))[turn % len(held)])]
-    if kind != "pair":
-        return (first,)
+    return (first, _other(first, held, _stream(seed, number))) if kind == "pair" else (first,)
+
+
+def _other(first: str, held: tuple[str, ...], rng: np.random.Generator) -> str:
+    """Second name of a pair, which lies in another component."""
     others = [name for name in held if DEVIATIONS[name].component != DEVIATIONS[first].component]
-    return first, others[int(rng.integers(len(others)))]
+    return others[int(rng.integers(len(others)))]
+
+
+def _stream(seed: int, *key: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))

@@ -30,6 +30,8 @@ class Label:
         Some are the library's, by name and unit.
     inherent : tuple of str
         Effects that this plant always has to some degree: to tell them is neither right nor wrong.
+    attempt : int
+        Which draw of the case is published, from 0.
     """
 
     case: str
@@ -39,6 +41,7 @@ class Label:
     components: tuple[str, ...]
     parameters: Mapping[str, Mapping[str, Any]]
     inherent: tuple[str, ...] = ()
+    attempt: int = 0
 
     @property
     def title(self) -> str:

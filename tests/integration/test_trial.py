@@ -2,21 +2,23 @@
 
 import hashlib
 import json
+import shutil
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
-from wetwell.protocols.recording import read_recording, write_recording
+from wetwell.protocols.recording import read_recording
 from wetwell.protocols.station import load_station
-from wetwell.services import trial
 from wetwell.services.cli import main
 from wetwell.services.swmm_plant import run_swmm
-from wetwell.services.twin import hidden_names, recording_of
-from wetwell.sim2real.trial.cases import trial_case
+from wetwell.services.trial.diagnosis import RECALIBRATION
+from wetwell.services.trial.plan import TrialPlan
+from wetwell.services.trial.run import run_trial
+from wetwell.services.trial.sealed_case import publish
+from wetwell.sim2real.trial.cases import KINDS, trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
@@ -26,24 +28,24 @@ COUNT = 10
 def run_fake(mode, folder, monkeypatch, **changes):
     monkeypatch.setenv("FAKE_MODE", mode)
     monkeypatch.setenv("FAKE_FOLDER", str(folder))
-    plan = trial.TrialPlan(**{"seed": 3, "count": COUNT, "seconds": 3600, "command": FAKE} | changes)
-    return plan, trial.run_trial(plan, folder, workers=1)
+    plan = TrialPlan(**{"seed": 3, "count": COUNT, "seconds": 3600, "command": FAKE} | changes)
+    return plan, run_trial(plan, folder, workers=1)
 
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory):
     """Folder of published cases."""
     folder = tmp_path_factory.mktemp("trial")
-    plan = trial.TrialPlan(seed=3, count=COUNT, seconds=3600)
+    plan = TrialPlan(seed=3, count=COUNT, seconds=3600)
     for number in range(COUNT):
-        trial.publish(plan.case(number), folder)
+        publish(plan.case(number), folder)
     return folder
 
 
 @pytest.fixture
 def folder(cases, tmp_path):
     """A copy of them for one test."""
-    trial.shutil.copytree(cases, tmp_path / "trial")
+    shutil.copytree(cases, tmp_path / "trial")
     return tmp_path / "trial"
 
 
@@ -55,7 +57,7 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     assert result["all"]["shrinkage"] == {"median": 1.0, "mean": 1.0}
     assert result["all"]["parameter_error"]["median"] == 0.0
     assert result["all"]["failed"] == 0
-    assert {kind: scores["cases"] for kind, scores in result["kinds_scored"].items()} == dict.fromkeys(trial.KINDS, 2)
+    assert {kind: scores["cases"] for kind, scores in result["kinds_scored"].items()} == dict.fromkeys(KINDS, 2)
     assert result["controls"]["permuted_labels"]["verdict_right"] < 0.6
     page = (folder / "trial.html").read_text()
     assert "<script" not in page
@@ -64,8 +66,8 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
 
 
 def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_path):
-    plan = trial.TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
-    result = trial.run_trial(plan, tmp_path, workers=1)
+    plan = TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
+    result = run_trial(plan, tmp_path, workers=1)
     single, none = (plan.case(number).name for number in range(2))
     reports = {name: json.loads((tmp_path / "reports" / name / "report.json").read_text()) for name in (single, none)}
     assert [reports[name]["verdict"] for name in (single, none)] == ["effect", "none"]
@@ -108,7 +110,7 @@ def test_the_diagnosis_gets_two_files_without_truth_and_the_missing_effect_only(
     held_out = sorted(name for number in range(COUNT) for name in plan.case(number).without)
     assert sorted(name for seen in spied for name in seen["without"]) == held_out
     assert len(held_out) == 2
-    assert sum(seen["only"] == list(trial.RECALIBRATION) for seen in spied) == 4
+    assert sum(seen["only"] == list(RECALIBRATION) for seen in spied) == 4
     for number in range(COUNT):
         published = folder / "published" / f"case-{number:04}"
         assert {path.name for path in published.iterdir()} == {"station.toml", "recording.parquet", "seal.sha256"}
@@ -130,8 +132,8 @@ def test_what_was_changed_after_sealing_is_refused(changed, folder, monkeypatch)
 
 
 def test_salts_differ_and_cases_do_not_depend_on_their_number(folder, tmp_path):
-    plan = trial.TrialPlan(seed=3, count=2, seconds=3600)
-    trial.publish(plan.case(1), tmp_path / "again")
+    plan = TrialPlan(seed=3, count=2, seconds=3600)
+    publish(plan.case(1), tmp_path / "again")
     one, other = (json.loads((path / "sealed/case-0001.json").read_text()) for path in (folder, tmp_path / "again"))
     assert one["salt"] != other["salt"]
     assert one["sha256"] == other["sha256"]
@@ -141,7 +143,7 @@ def test_salts_differ_and_cases_do_not_depend_on_their_number(folder, tmp_path):
 def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
     plan, first = run_fake("perfect", folder, monkeypatch)
     runs = len((folder / "spy.jsonl").read_text().splitlines())
-    again = trial.run_trial(plan, folder, workers=1)
+    again = run_trial(plan, folder, workers=1)
     assert again | {"date": ""} == first | {"date": ""}
     assert len((folder / "spy.jsonl").read_text().splitlines()) == runs == COUNT
     with pytest.raises(ConfigError, match="holds a trial with another seed"):
@@ -164,28 +166,18 @@ def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
 
 
 def test_every_effect_takes_its_turn():
-    plan = trial.TrialPlan(seed=5, count=50, kinds=("single",), seconds=3600)
+    plan = TrialPlan(seed=5, count=50, kinds=("single",), seconds=3600)
     names = [plan.case(number).names[0] for number in range(50)]
     assert len(set(names[:25])) == 25
     assert names[:25] == names[25:]
-    other = trial.TrialPlan(seed=6, count=25, kinds=("single",), seconds=3600)
+    other = TrialPlan(seed=6, count=25, kinds=("single",), seconds=3600)
     assert [other.case(number).names[0] for number in range(25)] != names[:25]
 
 
 def test_stations_of_swmm_have_soft_starters():
     cases = [trial_case(9, number, kinds=("none",), plants=("fine", "swmm"), seconds=600) for number in range(8)]
-    assert {case.truth.station.control.ramp_s for case in cases if case.plant == "swmm"} <= {1.0, 2.0}
-    assert min(case.truth.station.control.ramp_s for case in cases if case.plant == "fine") >= 6.0
-
-
-@pytest.mark.parametrize(("cutoff_m3h", "is_seen"), [(1e-3, False), (60.0, True)])
-def test_a_case_whose_deviation_never_acts_is_told_apart(cutoff_m3h, is_seen, tmp_path):
-    case = trial_case(9, 0, kinds=("none",), plants=("fine",), seconds=7200)
-    cutoff = Deviation(name="flow_low_cutoff", parameters={"cutoff_m3h": cutoff_m3h})
-    case = replace(case, kind="single", truth=replace(case.truth, deviations=(cutoff,)))
-    write_recording(recording_of(case, case.truth), tmp_path / "recording.parquet")
-    assert hidden_names(case, tmp_path / "recording.parquet", ()) == ([] if is_seen else ["flow_low_cutoff"])
-    assert hidden_names(case, tmp_path / "recording.parquet", ["flow_low_cutoff"]) == []
+    assert {case.truth().station.control.ramp_s for case in cases if case.plant == "swmm"} <= {1.0, 2.0}
+    assert min(case.truth().station.control.ramp_s for case in cases if case.plant == "fine") >= 6.0
 
 
 def test_command_line(folder, monkeypatch, capsys):

@@ -31,6 +31,7 @@ def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[
     Parameters
     ----------
     case : TrialCase
+        In the attempt that is published.
     published, reports : Path
         Folders with station and recording as published, and with the diagnosed station.
     command : sequence of str
@@ -38,8 +39,9 @@ def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[
     """
     if (reports / HELD_OUT_FILE).is_file() or not (reports / "station.toml").is_file():
         return
-    truth = replace(case.truth, seed=case.truth.seed + 1)
-    passage = passage_of(truth) if case.plant == "fine" else swmm_passage_of(truth)
+    truth = case.truth()
+    unseen_truth = replace(truth, seed=truth.seed + 1)
+    passage = (passage_of if case.plant == "fine" else swmm_passage_of)(unseen_truth)
     recorded, oracle = passage.recording(truth=False), passage.oracle()
     with tempfile.TemporaryDirectory(prefix="held-out-") as room:
         unseen = Path(room) / "unseen.parquet"
@@ -50,7 +52,7 @@ def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[
     if before is None or after is None or first is None:
         return
     bound = corrected(first, read_recording(published / "recording.parquet"), before)
-    sensors = case.truth.station.sensors
+    sensors = truth.station.sensors
     gaps = {
         name: gap(whitened(predicted, recorded, sensors))
         for name, predicted in (("before", before), ("after", after), ("oracle", oracle), ("regressor", bound))

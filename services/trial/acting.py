@@ -1,0 +1,62 @@
+"""A case whose deviations all act: drawn anew where the recording would be the same without one of them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from wetwell.protocols.errors import WetwellError
+from wetwell.protocols.recording import Recording
+from wetwell.services.swmm_plant import run_swmm
+from wetwell.sim2real.trial.cases import PlantName, TrialCase
+from wetwell.sim2real.truth import truth_plant
+from wetwell.sim2real.truth.case import TruthCase
+from wetwell.sim2real.truth.deviations import DEVIATIONS
+
+ATTEMPTS = 24
+"""So many since with SWMM, whose starts last 1 or 2 s, most low cutoffs of the flow never act in a day."""
+
+
+def acting_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
+    """The case in its first attempt in which every deviation changes a recorded value, with truth and recording.
+
+    Only deviations of a kind that may never act are looked at, by a twin that is made without them.
+
+    Raises
+    ------
+    WetwellError
+        If there is none among `ATTEMPTS`, or its plant is not installed.
+    """
+    idle = ""
+    for attempt in range(ATTEMPTS):
+        case = replace(case, attempt=attempt)
+        truth = case.truth()
+        recording = recording_of(truth, case.plant)
+        idle = idle_name(truth, case.plant, recording)
+        if not idle:
+            return case, truth, recording
+    raise WetwellError(
+        f"{case.name}: '{idle}' changes no recorded value of plant '{case.plant}' in any of {ATTEMPTS} draws: "
+        "a longer recording may show it"
+    )
+
+
+def recording_of(truth: TruthCase, plant: PlantName) -> Recording:
+    """What a plant records of a truth."""
+    return (truth_plant.run if plant == "fine" else run_swmm)(truth, truth=False)
+
+
+def idle_name(truth: TruthCase, plant: PlantName, recording: Recording) -> str:
+    """First deviation without which the plant records the same, value by value; empty if all act."""
+    for deviation in truth.deviations:
+        if DEVIATIONS[deviation.name].may_never_act:
+            others = tuple(other for other in truth.deviations if other is not deviation)
+            if _is_same(recording, recording_of(replace(truth, deviations=others), plant)):
+                return deviation.name
+    return ""
+
+
+def _is_same(recording: Recording, twin: Recording) -> bool:
+    return all(
+        np.allclose(values, twin.column(name), rtol=1e-6, atol=1e-9, equal_nan=True)
+        for name, values in recording.columns.items()
+    )

@@ -1,0 +1,111 @@
+"""What a trial is made from, and the folder that holds it."""
+
+import json
+import shlex
+import sys
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.whole_file import whole_file
+from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
+
+SCHEMA = "wetwell.trial/1"
+DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
+REPLAY = (sys.executable, "-m", "wetwell.services", "gap", "replay")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialPlan:
+    """What a trial is made from.
+
+    Attributes
+    ----------
+    seed, count : int
+    kinds : tuple of CaseKind
+    plants : tuple of PlantName
+    seconds : int
+        Length of each recording. [s]
+    command : tuple of str
+        The diagnosis; it gets `--station FILE --recording FILE --out DIR`, and `--without NAME` or `--only NAME`.
+    timeout_s : float
+        For one diagnosis. [s]
+    replay : tuple of str
+        Replays a recording under a station: gets `--station FILE --recording FILE --out FILE`; empty for no figures
+        on unseen recordings.
+    has_recalibration : bool
+        Whether each case is diagnosed once more with the library of `RECALIBRATION` alone.
+    """
+
+    seed: int
+    count: int
+    kinds: tuple[CaseKind, ...] = KINDS
+    plants: tuple[PlantName, ...] = ("fine",)
+    seconds: int = 86_400
+    command: tuple[str, ...] = DIAGNOSE
+    replay: tuple[str, ...] = ()
+    timeout_s: float = 1800.0
+    has_recalibration: bool = False
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What decides which case k is, and who diagnoses it."""
+        return {
+            "schema": SCHEMA,
+            "version": version("wetwell"),
+            "seed": self.seed,
+            "kinds": list(self.kinds),
+            "plants": list(self.plants),
+            "length_s": self.seconds,
+            "diagnoser": "wetwell gap diagnose" if self.command == DIAGNOSE else shlex.join(self.command),
+        }
+
+    def case(self, number: int) -> TrialCase:
+        """Case `number`, from 0."""
+        return trial_case(self.seed, number, kinds=self.kinds, plants=self.plants, seconds=self.seconds)
+
+
+def parse_kinds(text: str) -> tuple[CaseKind, ...]:
+    """Kinds in a list with commas, each once, in their own order.
+
+    Raises
+    ------
+    ConfigError
+        If one is not known.
+
+    Examples
+    --------
+    >>> parse_kinds("none,single")
+    ('single', 'none')
+    """
+    named = {part.strip() for part in text.split(",")}
+    if unknown := sorted(named - set(KINDS)):
+        raise ConfigError(f"--kinds: got '{unknown[0]}', must be of {', '.join(KINDS)}")
+    return tuple(kind for kind in KINDS if kind in named)
+
+
+def take_folder(plan: TrialPlan, folder: Path) -> None:
+    """Make the folder of a trial, or find that it holds the same one.
+
+    Raises
+    ------
+    ConfigError
+        If it holds another trial.
+    RecordingError
+        If it cannot be written.
+    """
+    path = folder / "plan.json"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        before = json.loads(path.read_bytes()) if path.is_file() else plan.header
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    except ValueError as error:
+        raise ConfigError(f"{path}: is not JSON: {error}") from error
+    for key, value in plan.header.items():
+        if before.get(key) != value:
+            raise ConfigError(f"{folder}: holds a trial with another {key.replace('_', ' ')}; take another folder")
+    with whole_file(path) as file:
+        file.write(json.dumps(plan.header, indent=1).encode() + b"\n")

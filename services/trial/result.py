@@ -1,0 +1,79 @@
+"""The result of a trial: seals opened, answers scored, `trial.json` and `trial.html` written."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wetwell.protocols.whole_file import whole_file
+from wetwell.services.parallel import Failure
+from wetwell.services.trial.diagnosis import RECALIBRATED, REPORTS, WHOLE_LIBRARY, answer_in
+from wetwell.services.trial.held_out import held_out_summary
+from wetwell.services.trial.page import trial_page
+from wetwell.services.trial.plan import TrialPlan
+from wetwell.services.trial.sealed_case import open_case
+from wetwell.sim2real.trial.scores import CaseScore, chance_level, confusion, named_shrinkage, score_case, summary
+
+
+def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) -> dict[str, Any]:
+    """Open all seals but those of the cases that failed, score the reports, write `trial.json` and `trial.html`."""
+    names = [name for number in range(plan.count) if (name := f"case-{number:04}") not in failed]
+    pairs = [(open_case(name, folder), answer_in(folder / REPORTS / name)) for name in names]
+    scores = [score_case(label, answer, answer_in(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
+    rows, columns, counts = confusion(scores)
+    controls: dict[str, Any] = {
+        "permuted_labels": chance_level(pairs, np.random.default_rng(plan.seed)),
+    }
+    if plan.has_recalibration:
+        again = [
+            score_case(label, answer_in(folder / RECALIBRATED / label.case))
+            for label, _ in pairs
+            if label.kind in {"single", "pair"}
+        ]
+        controls["recalibration_only"] = summary(again)
+    result = plan.header | {
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "count": plan.count,
+        "failed": [{"case": name, "error": failed[name].error} for name in sorted(failed)],
+        "all": summary(scores),
+        "kinds_scored": _grouped(scores, lambda score: score.label.kind),
+        "named_shrinkage": named_shrinkage(scores),
+        "plants_scored": _grouped(scores, lambda score: score.label.plant),
+        "effects_scored": _grouped(
+            [score for score in scores if score.label.kind == "single"], lambda score: score.label.names[0]
+        ),
+        "unseen": held_out_summary([folder / REPORTS / name for name in names]),
+        "controls": controls,
+        "confusion": {"rows": rows, "columns": columns, "counts": counts.tolist()},
+    }
+    cases = [asdict(score) for score in scores]
+    with whole_file(folder / "trial.json") as file:
+        file.write(json.dumps(result | {"cases": cases}, indent=1).encode() + b"\n")
+    with whole_file(folder / "trial.html") as file:
+        file.write(trial_page(result, cases).encode())
+    return result
+
+
+def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
+    """What is printed for people: right answers of how many, by kind."""
+    names = ("verdict_right", "top_1", "top_2", "component_right", "false_attribution")
+    rows = [
+        {"kind": kind, "cases": scores["cases"]}
+        | {name: f"{scores[name]['value']:.2f}" if scores[name] else "-" for name in names}
+        for kind, scores in (result["kinds_scored"] | {"all": result["all"]}).items()
+    ]
+    return {
+        "page": str(folder / "trial.html"),
+        "without an answer": result["all"]["failed"],
+        "failed": result["failed"],
+        "scores": rows,
+    }
+
+
+def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, Any]:
+    groups = sorted({key(score) for score in scores})
+    return {group: summary([score for score in scores if key(score) == group]) for group in groups}

@@ -1,0 +1,87 @@
+"""A case in the folder of a trial: two files published, its labels sealed."""
+
+import secrets
+from pathlib import Path
+
+import tomli_w
+
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.recording import write_recording
+from wetwell.protocols.whole_file import whole_file
+from wetwell.services.trial.acting import acting_case
+from wetwell.sim2real.trial.cases import TrialCase
+from wetwell.sim2real.trial.scores import Label
+from wetwell.sim2real.trial.seal import digest, labels_text, opened
+
+STATION_FILE, RECORDING_FILE, SEAL_FILE = "station.toml", "recording.parquet", "seal.sha256"
+
+
+def is_published(case: TrialCase, folder: Path) -> bool:
+    """Whether the folder of a trial holds a case with its seal."""
+    sealed = folder / "sealed" / f"{case.name}.json"
+    return (folder / "published" / case.name / SEAL_FILE).is_file() and sealed.is_file()
+
+
+def publish(case: TrialCase, folder: Path) -> None:
+    """Write station file and recording of a case, its labels under seal, and the hash of the seal.
+
+    Raises
+    ------
+    WetwellError
+        If one of its deviations never acts (`acting_case`), or its plant is not installed.
+    """
+    case, truth, recording = acting_case(case)
+    published, sealed = folder / "published" / case.name, folder / "sealed" / f"{case.name}.json"
+    published.mkdir(parents=True, exist_ok=True)
+    sealed.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(published / STATION_FILE) as file:
+        tomli_w.dump(truth.station.model_dump(mode="json", exclude_none=True), file)
+    write_recording(recording, published / RECORDING_FILE)
+    labels = {
+        "case": case.name,
+        "kind": case.kind,
+        "plant": case.plant,
+        "attempt": case.attempt,
+        "names": list(case.names),
+        "components": list(case.components),
+        "parameters": {deviation.name: dict(deviation.parameters) for deviation in truth.deviations},
+        "inherent": list(case.inherent),
+        "truth_seed": truth.seed,
+        "slow_share": truth.slow_share,
+        "sha256": {name: digest((published / name).read_bytes()) for name in (STATION_FILE, RECORDING_FILE)},
+    }
+    text = labels_text(labels, secrets.token_hex(16))
+    with whole_file(sealed) as file:
+        file.write(text)
+    with whole_file(published / SEAL_FILE) as file:
+        file.write(digest(text).encode() + b"\n")
+
+
+def open_case(name: str, folder: Path) -> Label:
+    """Labels of a case, once seal and published files are found to be what they were.
+
+    Raises
+    ------
+    RecordingError
+        If one has been changed or is missing.
+    """
+    published, sealed = folder / "published" / name, folder / "sealed" / f"{name}.json"
+    try:
+        labels = opened(sealed.read_bytes(), (published / SEAL_FILE).read_text(encoding="ascii"))
+        changed = [part for part, was in labels["sha256"].items() if digest((published / part).read_bytes()) != was]
+    except OSError as error:
+        raise RecordingError(f"{error.filename}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise RecordingError(f"{sealed}: {error}") from error
+    if changed:
+        raise RecordingError(f"{published / changed[0]}: is not what was sealed: its SHA-256 differs")
+    return Label(
+        case=labels["case"],
+        kind=labels["kind"],
+        plant=labels["plant"],
+        names=tuple(labels["names"]),
+        components=tuple(labels["components"]),
+        parameters=labels["parameters"],
+        inherent=tuple(labels["inherent"]),
+        attempt=labels.get("attempt", 0),  # seals without it are of the first
+    )
