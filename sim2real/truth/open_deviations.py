@@ -46,7 +46,7 @@ def _head_sensor_scale(truth: Truth, p: Mapping[str, Any]) -> None:
 
 
 def _second_sump(truth: Truth, p: Mapping[str, Any]) -> None:
-    """A share of the metered inflow comes through a tank upstream, a first-order delay later."""
+    """A share of the metered inflow comes through a tank behind the meter, a first-order delay later."""
     inflow = truth.around.inflow
     share = math.exp(-1.0 / p["tank_s"])
     late = slow_response(inflow, share)

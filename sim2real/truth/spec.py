@@ -114,8 +114,8 @@ class Surroundings:
 
     Attributes
     ----------
-    inflow : (n + 1,) array
-        True inflow, linear between the seconds. [m³/s]
+    inflow, metered_inflow : (n + 1,) arrays
+        True inflow, linear between the seconds, and what passes its meter. [m³/s]
     loss_factor, extra_lift_m, voltage_factor : (n,) arrays
         On the losses of the main, on its lift, on the power. [1, m, 1]
     speed_factor : (pumps, n) array
@@ -125,6 +125,7 @@ class Surroundings:
     """
 
     inflow: Floats
+    metered_inflow: Floats
     loss_factor: Floats
     extra_lift_m: Floats
     voltage_factor: Floats

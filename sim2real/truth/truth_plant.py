@@ -54,7 +54,7 @@ class Passage:
         return self.case.start_ns + NS_PER_S * np.arange(self.case.seconds)
 
     def _columns(self, case: TruthCase, station_record: Floats, rng: np.random.Generator) -> dict[str, Floats]:
-        inflow_m3h = self.made.around.inflow[:-1] * HOUR_S
+        inflow_m3h = self.made.around.metered_inflow[:-1] * HOUR_S
         return recorded(case, self.made.telemetry, inflow_m3h, station_record, self.pump_record, rng)
 
 
@@ -112,6 +112,7 @@ def truth_of(case: TruthCase) -> tuple[Truth, np.random.Generator]:
     seconds, pumps = case.seconds, len(case.station.pump)
     around = Surroundings(
         inflow=inflow / HOUR_S,
+        metered_inflow=inflow / HOUR_S,
         loss_factor=np.ones(seconds),
         extra_lift_m=np.zeros(seconds),
         voltage_factor=np.ones(seconds),
@@ -139,7 +140,7 @@ def truth_of(case: TruthCase) -> tuple[Truth, np.random.Generator]:
 def recorded(
     case: TruthCase,
     telemetry: Telemetry,
-    true_inflow_m3h: Floats,
+    metered_inflow_m3h: Floats,
     station_record: Floats,
     pump_record: Floats,
     rng: np.random.Generator,
@@ -150,7 +151,7 @@ def recorded(
     ----------
     case : TruthCase
     telemetry : Telemetry
-    true_inflow_m3h : (n,) array
+    metered_inflow_m3h : (n,) array
         [m³/h]
     station_record, pump_record : (2, n) and (5, pumps, n) arrays
         Rows as in `kernel`, SI units.
@@ -159,7 +160,9 @@ def recorded(
     """
     sensors = case.station.sensors
     always = np.ones(case.seconds, dtype=np.bool_)
-    inflow_m3h = sensed(true_inflow_m3h, always, sensors.inflow_noise * _noise(case, rng), telemetry.of("inflow_m3h"))
+    inflow_m3h = sensed(
+        metered_inflow_m3h, always, sensors.inflow_noise * _noise(case, rng), telemetry.of("inflow_m3h")
+    )
     columns = {
         "level_m": transmitted(station_record[kernel.LEVEL_READING], telemetry.of("level_m")),
         "inflow_m3h": transmitted(inflow_m3h, telemetry.of("inflow_m3h")),

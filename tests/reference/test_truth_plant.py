@@ -181,6 +181,14 @@ def test_what_moves_the_level_leaves_the_curves_alone(name):
         )
 
 
+@pytest.mark.parametrize("name", ["second_sump", "unmetered_inflow"])
+def test_what_flows_in_beside_the_meter_moves_the_level_alone(name):
+    with_it, without = drawn(name, 4)
+    columns, plain = truth_plant.run(with_it).columns, truth_plant.run(without).columns
+    np.testing.assert_array_equal(columns["inflow_m3h"], plain["inflow_m3h"])
+    assert np.max(np.abs(columns["level_m"] - plain["level_m"])) > 0.01
+
+
 def test_same_case_same_bytes_and_a_blind_recording_has_no_truth():
     case = case_of(("ragging", "flow_meter_lag"), "s", np.random.default_rng(9), seconds=3600, slow_share=0.3)
     one, other = truth_plant.run(case), truth_plant.run(case, truth=False)
