@@ -12,8 +12,8 @@ from wetwell.sim2real.truth import truth_plant
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS
 
-ATTEMPTS = 24
-"""So many since with SWMM, whose starts last 1 or 2 s, most low cutoffs of the flow never act in a day."""
+ATTEMPTS = 8
+"""Draws after which a case is given up: a short recording may have no room for its effect."""
 
 
 def acting_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:

@@ -28,7 +28,6 @@ SWMM_LIBRARY = (
     "level_quantisation",
     "flow_meter_gain",
     "flow_meter_lag",
-    "flow_low_cutoff",
     "head_sensor_offset",
     "channel_delay",
     "report_by_exception",

@@ -23,14 +23,13 @@ PLAN = TrialPlan(seed=84, count=2, kinds=("single",), seconds=300, command=FAKE)
 
 
 def test_the_first_attempt_is_what_it_was_before_there_were_others():
-    drawn = [trial_case(3, k, kinds=KINDS, plants=("fine", "swmm"), seconds=600) for k in (0, 1, 2, 3, 4, 6)]
+    drawn = [trial_case(3, k, kinds=KINDS, plants=("fine", "swmm"), seconds=600) for k in range(5)]
     assert [(case.kind, case.plant, case.names) for case in drawn] == [
         ("single", "fine", ("load_dependent_power",)),
         ("pair", "fine", ("threshold_shift", "level_quantisation")),
         ("none", "fine", ()),
         ("open", "fine", ("sticking_check_valve",)),
         ("leave_one_out", "fine", ("flow_meter_gain",)),
-        ("pair", "swmm", ("common_header", "flow_meter_lag")),
     ]
     truths = [case.truth() for case in drawn]
     assert [(truth.station.name, truth.seed) for truth in truths] == [  # the name is drawn first, the seed last
@@ -39,7 +38,6 @@ def test_the_first_attempt_is_what_it_was_before_there_were_others():
         ("station-e1e669", 1221850488),
         ("station-870375", 684429724),
         ("station-d3f301", 605003381),
-        ("station-42b5a7", 1988402528),
     ]
 
 
@@ -115,11 +113,3 @@ def test_only_kinds_that_may_never_act_are_looked_at():
     assert acting_case(quiet)[0].attempt == 0
     with pytest.raises(WetwellError, match="'common_header' changes no recorded value"):
         acting_case(replace(quiet, names=("common_header",)))
-
-
-def test_a_low_cutoff_on_swmm_is_drawn_anew():
-    pytest.importorskip("pyswmm", exc_type=ImportError)
-    case = TrialCase(seed=5, number=0, kind="single", plant="swmm", names=("flow_low_cutoff",), seconds=600)
-    case, truth, recording = acting_case(case)
-    assert case.attempt > 0
-    assert idle_name(truth, "swmm", recording) == ""
