@@ -1,6 +1,7 @@
 """Residuals of the controller: the level at which it starts and stops pumps, against its thresholds."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -8,12 +9,12 @@ from scipy.special import ndtr
 
 from wetwell.protocols.station import Station
 from wetwell.sim2real.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
-from wetwell.sim2real.regimes import IDLE, STEADY, Event, Regimes
+from wetwell.sim2real.regimes import START_RAMP, Event, Regimes
 from wetwell.sim2real.replay import Prediction
 from wetwell.sim2real.signal_misfit import QUANTUM_SHARE, level_noise_m
 from wetwell.sim2real.telemetry_misfit import Pattern
 from wetwell.sim2real.traces import Traces
-from wetwell.simulator.channels import LEVEL
+from wetwell.simulator.channels import LEVEL, channels_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,21 +26,73 @@ EVENT_FLOOR = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Stretches:
+    """Straight stretches of the level before each event, to be read at other times than they were recorded.
+
+    `counted` are the seconds of each, (events, `WINDOW_S`), and `is_counted` which of them count; `level_m` is (n,).
+    """
+
+    second: npt.NDArray[np.int64]
+    counted: npt.NDArray[np.int64]
+    is_counted: npt.NDArray[np.bool_]
+    level_m: Floats
+
+    def lines(self, shift_s: float = 0.0) -> tuple[Floats, Floats]:
+        """(events,) level and slope at each event for a level that was recorded `shift_s` late. [m, m/s].
+
+        Where too few values are left the line of the unshifted stretch is gone on with.
+        """
+        level_m, slope_m_s = self._fitted(0)
+        if shift_s == 0.0:
+            return level_m, slope_m_s
+        whole = int(np.floor(shift_s))
+        share = shift_s - whole
+        near, far = self._fitted(whole), self._fitted(whole + 1)
+        shifted_m, shifted_m_s = ((1.0 - share) * a + share * b for a, b in zip(near, far, strict=True))
+        is_known = np.isfinite(shifted_m)
+        level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
+        return level_m, np.where(is_known, shifted_m_s, slope_m_s)
+
+    def _fitted(self, later_s: int) -> tuple[Floats, Floats]:
+        place = self.counted + later_s
+        values_m = self.level_m[np.clip(place, 0, self.level_m.size - 1)]
+        is_known = self.is_counted & (place >= 0) & (place < self.level_m.size) & np.isfinite(values_m)
+        count = is_known.sum(axis=1)
+        enough = np.where(count >= MIN_POINTS, count, np.nan)  # NaN is "no line"
+        time_s, values_m = (
+            np.where(is_known, self.counted - self.second[:, None], 0),
+            np.where(is_known, values_m, 0.0),
+        )
+        middle_s, middle_m = time_s.sum(axis=1) / enough, values_m.sum(axis=1) / enough
+        about_s = np.where(is_known, time_s - middle_s[:, None], 0.0)
+        slope_m_s = (about_s * values_m).sum(axis=1) / enough / ((about_s**2).sum(axis=1) / enough)
+        return middle_m - slope_m_s * middle_s, slope_m_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EventMisfit:
     """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0."""
 
     bins: Bins
     number: npt.NDArray[np.int64]
-    level_m: Floats
-    slope_m_s: Floats
+    stretches: Stretches
+    noise_m: float
     pattern: Pattern | None
 
     def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
-        """(events,) level that the controller saw, minus its threshold, over the standard deviation."""
+        """(events,) level that the controller saw, minus its threshold, over the standard deviation.
+
+        A late level shows afterwards what the controller saw; under a late frequency the event was before its record.
+        """
         plant = prediction.plant
-        late_s = float(plant.sensors.delay_s[LEVEL]) - plant.control_delay_s
-        seen_m = self.level_m + self.slope_m_s * late_s
+        frequency = channels_of("frequency_hz", plant.nominal_frequency_hz.size)[0]
+        level_m, slope_m_s = self.stretches.lines(
+            float(plant.sensors.delay_s[LEVEL] - plant.sensors.delay_s[frequency])
+        )
         is_start = self.bins.signal == START_LEVEL
+        early_m = self.noise_m * _earliness(np.abs(slope_m_s) / self.noise_m)
+        level_m = level_m + np.where(is_start, 1.0, -1.0) * (0.7 * early_m - 0.5 * SCAN_S * np.abs(slope_m_s))
+        seen_m = level_m - slope_m_s * plant.control_delay_s
         wanted_m = np.where(is_start, plant.start_levels_m[self.number], plant.stop_levels_m[self.number])
         error_m = seen_m - wanted_m
         if self.pattern is not None:
@@ -52,28 +105,26 @@ class EventMisfit:
 def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pattern | None) -> EventMisfit:
     """Of every start and stop that follows a straight stretch of the level."""
     noise_m = level_noise_m(traces, station)
-    rows: list[tuple[Event, float, float]] = []
+    events: list[Event] = []
+    calm: list[npt.NDArray[np.bool_]] = []
     last = -WINDOW_S
+    ahead = np.arange(1 - WINDOW_S, 1)
     for event in regimes.events:
-        begin = max(event.second - WINDOW_S + 1, last + 1)
-        window = np.arange(begin, event.second + 1)
-        calm = (
-            window[(regimes.of_station[window] == IDLE) | (regimes.of_station[window] >= STEADY)]
-            if begin >= 0
-            else window[:0]
-        )
+        window = event.second + ahead
+        is_calm = (window > last) & (regimes.of_station[window] != START_RAMP)
         last = event.second
-        known = calm[np.isfinite(traces.level_m[calm])]
-        if known.size < MIN_POINTS or not 1 <= event.number <= len(station.control.start_levels_m):
-            continue
-        slope_m_s, level_m = np.polyfit(known - event.second, traces.level_m[known], 1)
-        if slope_m_s * (1.0 if event.is_start else -1.0) <= 0.0:
-            continue
-        rows.append((event, float(level_m), float(slope_m_s)))
-    sign = np.array([1.0 if event.is_start else -1.0 for event, _, _ in rows])
-    slope_m_s = np.array([slope for _, _, slope in rows])
-    early_m = noise_m * np.array([_earliness(abs(slope) / noise_m) for slope in slope_m_s])
-    second = np.array([event.second for event, _, _ in rows], dtype=np.int64)
+        if window[0] >= 0 and 1 <= event.number <= len(station.control.start_levels_m):
+            events.append(event)
+            calm.append(is_calm)
+    second = np.array([event.second for event in events], dtype=np.int64)
+    counted, is_counted = second[:, None] + ahead, np.array(calm, dtype=np.bool_).reshape(-1, WINDOW_S)
+    stretches = Stretches(second=second, counted=counted, is_counted=is_counted, level_m=traces.level_m)
+    sign = np.array([1.0 if event.is_start else -1.0 for event in events])
+    kept = stretches.lines()[1] * sign > 0.0
+    second, sign = second[kept], sign[kept]
+    stretches = Stretches(second=second, counted=counted[kept], is_counted=is_counted[kept], level_m=traces.level_m)
+    slope_m_s = stretches.lines()[1]
+    early_m = noise_m * _earliness(np.abs(slope_m_s) / noise_m)
     deviation = np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2)
     return EventMisfit(
         bins=Bins(
@@ -86,14 +137,25 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
             floor=np.full(second.size, EVENT_FLOOR),
             tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
         ),
-        number=np.array([event.number - 1 for event, _, _ in rows], dtype=np.int64),
-        level_m=np.array([level for _, level, _ in rows]) + sign * (0.7 * early_m - 0.5 * np.abs(slope_m_s)),
-        slope_m_s=slope_m_s,
+        number=np.array([event.number - 1 for event in events], dtype=np.int64)[kept],
+        stretches=stretches,
+        noise_m=noise_m,
         pattern=pattern,
     )
 
 
-def _earliness(slope_ratio: float) -> float:
+def _earliness(slope_ratio: Floats) -> Floats:
+    """(events,) how far before its threshold a level with noise crosses it, in standard deviations of the noise."""
+    return np.asarray(np.interp(slope_ratio, *_earliness_table()), dtype=np.float64)
+
+
+@cache
+def _earliness_table() -> tuple[Floats, Floats]:
+    ratios = np.r_[0.0, np.geomspace(1e-3, 10.0, 100)]
+    return ratios, np.array([_earliness_at(float(ratio)) for ratio in ratios])
+
+
+def _earliness_at(slope_ratio: float) -> float:
     r"""How far before its threshold a level with noise is taken to cross it, in standard deviations of the noise.
 
     The m at which the expected number of crossings before reaches ln 2, $\sum_{k \ge 0} \Phi(-m - k s) = \ln 2$.

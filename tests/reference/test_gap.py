@@ -93,6 +93,15 @@ def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):
     assert report.where[0].component == "controller"
 
 
+def test_a_late_frequency_is_no_late_controller(alpha):
+    """What was switched, was switched before its record: at the configured levels."""
+    recording = record(alpha, [{"name": "channel_delay", "channel": "frequency_hz", "delay_s": 12.0}])
+    report = report_of(diagnose(recording, alpha))
+    assert (report.verdict, [effect.name for effect in report.effects]) == ("effect", ["channel_delay"])
+    assert report.effects[0].parameters["delay_s"].value == pytest.approx(12.0, abs=0.6)
+    assert report.gap.by_signal["start_level"].after < 1.5
+
+
 @pytest.mark.parametrize("missing", ["inflow_m3h", "power_kw", "head_m"])
 def test_it_works_without_a_channel(alpha, missing):
     recording = record(alpha, [{"name": "friction_bias", "factor": 1.3}])
