@@ -21,6 +21,8 @@ Floats = npt.NDArray[np.float64]
 WINDOW_S = 30
 MIN_POINTS = 8
 SCAN_S = 1.0
+WAITING_S = 2.0
+"""Scans that a timer may take beside its delay."""
 TOLERANCE_M = 0.002
 EVENT_FLOOR = 0.5
 
@@ -71,10 +73,14 @@ class Stretches:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventMisfit:
-    """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0."""
+    """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0.
+
+    `since_s` is the time since the event before.
+    """
 
     bins: Bins
     number: npt.NDArray[np.int64]
+    since_s: npt.NDArray[np.int64]
     stretches: Stretches
     noise_m: float
     pattern: Pattern | None
@@ -83,6 +89,8 @@ class EventMisfit:
         """(events,) level that the controller saw, minus its threshold, over the standard deviation.
 
         A late level shows afterwards what the controller saw; under a late frequency the event was before its record.
+        Whether the timers of a late controller run side by side or one after the other is open: an event that follows
+        another within the delay may find the level past its threshold.
         """
         plant = prediction.plant
         frequency = channels_of("frequency_hz", plant.nominal_frequency_hz.size)[0]
@@ -95,6 +103,9 @@ class EventMisfit:
         seen_m = level_m - slope_m_s * plant.control_delay_s
         wanted_m = np.where(is_start, plant.start_levels_m[self.number], plant.stop_levels_m[self.number])
         error_m = seen_m - wanted_m
+        if plant.control_delay_s > 0.0:
+            is_past = np.where(is_start, error_m > 0.0, error_m < 0.0)
+            error_m[is_past & (self.since_s <= plant.control_delay_s + WAITING_S)] = 0.0
         if self.pattern is not None:
             held_m = min(float(plant.sensors.deadband[LEVEL]), self.pattern.deadband)
             rounded_m = QUANTUM_SHARE * min(float(plant.sensors.quantum[LEVEL]), self.pattern.quantum)
@@ -106,15 +117,18 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
     """Of every start and stop that follows a straight stretch of the level."""
     noise_m = level_noise_m(traces, station)
     events: list[Event] = []
+    waited_s: list[int] = []
     calm: list[npt.NDArray[np.bool_]] = []
     last = -WINDOW_S
     ahead = np.arange(1 - WINDOW_S, 1)
     for event in regimes.events:
         window = event.second + ahead
         is_calm = (window > last) & (regimes.of_station[window] != START_RAMP)
+        since_s = event.second - last
         last = event.second
         if window[0] >= 0 and 1 <= event.number <= len(station.control.start_levels_m):
             events.append(event)
+            waited_s.append(since_s)
             calm.append(is_calm)
     second = np.array([event.second for event in events], dtype=np.int64)
     counted, is_counted = second[:, None] + ahead, np.array(calm, dtype=np.bool_).reshape(-1, WINDOW_S)
@@ -138,6 +152,7 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
             tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
         ),
         number=np.array([event.number - 1 for event in events], dtype=np.int64)[kept],
+        since_s=np.array(waited_s, dtype=np.int64)[kept],
         stretches=stretches,
         noise_m=noise_m,
         pattern=pattern,

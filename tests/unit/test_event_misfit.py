@@ -1,9 +1,14 @@
 """The level at which something was switched, where one of the two is recorded late."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from wetwell.sim2real.event_misfit import WINDOW_S, Stretches
+from wetwell.sim2real.bins import START_LEVEL, Bins
+from wetwell.sim2real.event_misfit import WINDOW_S, EventMisfit, Stretches
+from wetwell.sim2real.replay import Prediction
+from wetwell.simulator.plant import plant_parameters
 
 TURN_S = 100
 
@@ -36,3 +41,29 @@ def test_a_stretch_with_few_values_has_no_line():
     short = stretches(TURN_S)
     short.is_counted[:, :-3] = False
     assert np.isnan(short.lines()[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "since_s", "above_m", "is_excused"),
+    [(28.0, 29, 0.3, True), (28.0, 60, 0.3, False), (28.0, 29, -0.3, False), (0.0, 1, 0.3, False)],
+)
+def test_a_timer_may_begin_after_the_event_before(alpha, delay_s, since_s, above_m, is_excused):
+    """Then the level is past its threshold already, though not short of it."""
+    start, plant = stretches(TURN_S), replace(plant_parameters(alpha), control_delay_s=delay_s)
+    one = np.ones(1)
+    misfit = EventMisfit(
+        bins=Bins(
+            **dict.fromkeys(("regime", "cycle", "pump", "second"), np.zeros(1, dtype=np.int64)),
+            **dict.fromkeys(("deviation", "floor", "tolerance"), one),
+            signal=np.array([START_LEVEL]),
+        ),
+        number=np.array([0]),
+        since_s=np.array([since_s]),
+        stretches=replace(start, level_m=start.level_m - 1.6 + plant.start_levels_m[0] + above_m),
+        noise_m=0.002,
+        pattern=None,
+    )
+    residual = misfit.residuals(Prediction(level_m=one, signals={}, plant=plant))[0]
+    assert residual == pytest.approx(
+        0.0 if is_excused else above_m - 0.002 * delay_s, abs=0.0 if is_excused else 0.01
+    )
