@@ -158,8 +158,6 @@ def diagnose(
     gap = shrinkage_of(found.plain, accepted_residuals, bins, found.held, np.random.default_rng(seed))
     if gap.before < FLOOR + NOTHING or gap.shrinkage < LITTLE:
         found = replace(found, accepted=None, equivalent=(), ends=np.zeros((0, 2)))
-    over = gap.before - FLOOR, gap.after - FLOOR
-    is_wide = found.accepted is not None and over[1] > max(UNCLOSED, UNCLOSED_SHARE * over[0])
     before = _repeating_gap(found.plain, bins, found, pumps)
     accepted = found.accepted
     after_residuals = found.plain if accepted is None else accepted.residuals
@@ -167,7 +165,7 @@ def diagnose(
     verdict: Verdict = "none" if accepted is None else "effect"
     told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it
     if (
-        is_wide
+        _is_wide(bins, found, told)
         or _is_unexplained(before, after, after_residuals, bins, found, told)
         or _is_unclosed(bins, found, told)
     ):
@@ -250,6 +248,15 @@ def _is_unexplained(
         if is_left and left > KEPT * was:
             return True
     return False
+
+
+def _is_wide(bins: Bins, found: Attribution, told: set[int]) -> bool:
+    """Whether accepted effects leave too much of the whole gap in the `told` signals, but for excused transients."""
+    rows = found.held & np.isin(bins.signal, sorted(told))
+    if found.accepted is None or not rows.any():
+        return False
+    gap = shrinkage_of(found.plain, found.left, bins, rows, np.random.default_rng(0))
+    return gap.after - FLOOR > max(UNCLOSED, UNCLOSED_SHARE * (gap.before - FLOOR))
 
 
 def _is_unclosed(bins: Bins, found: Attribution, told: set[int]) -> bool:
