@@ -200,17 +200,21 @@ class Attributor:
             others = self._joined(current, _names(singles))
             if not others:
                 break
+            own = [one for one in others if self._is_own(current.fit.residuals**2 - one.fit.residuals**2, best)]
             tried = next(
-                (one for one in others if self._is_own(current.fit.residuals**2 - one.fit.residuals**2, best)),
-                others[0],
+                (one for one in (others[0], *own[:1]) if self._is_further(one, current, best, is_open)), None
             )
-            extra = self._rank(current.fit.residuals, tried.fit)
-            is_enough = extra.gain >= JOIN_SHARE * first_gain or self._open(self._left(tried.fit)) < is_open
-            is_enough |= self._is_own(current.fit.residuals**2 - tried.fit.residuals**2, best)
-            if not is_enough or not self._is_real(current.fit.residuals, extra, CLEAR):
+            if tried is None:
                 break
             current = self._swapped(tried, singles)
         return current
+
+    def _is_further(self, tried: Ranked, current: Ranked, first: Ranked, is_open: set[int]) -> bool:
+        """Whether the last of the effects that are tried adds enough to the current ones, and surely."""
+        extra = self._rank(current.fit.residuals, tried.fit)
+        is_enough = extra.gain >= JOIN_SHARE * first.gain or self._open(self._left(tried.fit)) < is_open
+        is_enough = is_enough or self._is_own(current.fit.residuals**2 - tried.fit.residuals**2, first)
+        return is_enough and self._is_real(current.fit.residuals, extra, CLEAR)
 
     def _left(self, fit: Fit | None) -> Floats:
         """Residuals under a fit; with short transients in ramps excused unless all of it can be seen."""
