@@ -20,8 +20,8 @@ GRID_S = 20.0
 FULL = 0.98
 REFERENCES = (0.0, 1.0, 3.0, 8.0)
 """Levels at which a lift may be right, in middles between the first start and stop."""
-BENCH = 0.8
-"""Share of its height up to which the walls of a bench stand upright."""
+BENCH = 8.0
+"""Exponent of a sump's area with a bench."""
 EDGES = (0.25, 0.5, 0.75)
 """Heights of a bench's edge, as shares of the way from the first stop to the first start."""
 FINER = 4
@@ -50,10 +50,10 @@ def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Fl
         hints |= _swing(misfit.bins, replay.traces.time_s, residuals)
     if "reference_level_m" in names:
         return [hints | {"reference_level_m": far * middle_m} for far in REFERENCES]
-    if "upright_share" in names:
+    if "exponent" in names:
         low_m, high_m = control.stop_levels_m[0], control.start_levels_m[0]
         edges_m = [low_m + share * (high_m - low_m) for share in EDGES]
-        return [hints, *(hints | {"upright_share": BENCH, "height_m": edge_m} for edge_m in edges_m)]
+        return [hints, *(hints | {"exponent": BENCH, "height_m": edge_m} for edge_m in edges_m)]
     return [hints]
 
 

@@ -10,15 +10,18 @@ from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.plant import PlantParameters
 from wetwell.simulator.wet_well import profile_of
 
+SHARES = np.linspace(0.0, 1.0, 13) ** 2
+"""Of the growth of the area up to h, at which the profile has its points."""
+
 
 class SumpAreaProfile(Effect):
     r"""The wet well is a cone, has benches at its floor, or walls that lean.
 
     $$A(L) = A_0(L)
-    \begin{cases} b & L < s h \\ b + (1 - b)\, (L / h - s) / (1 - s) & s h \le L < h \\
-    1 + (t - 1) \min(L / h - 1,\ 1) & L \ge h \end{cases}$$
+    \begin{cases} b + (1 - b) (L / h)^p & L < h \\ 1 + (t - 1) \min(L / h - 1,\ 1) & L \ge h \end{cases}$$
 
-    Of a configured profile the area is scaled at its points, and stays linear between them.
+    Of a configured profile the area is scaled at its points, and stays linear between them; so it does between 13
+    points of curved walls, within half a per cent of the volume.
 
     Parameters
     ----------
@@ -26,8 +29,8 @@ class SumpAreaProfile(Effect):
         b, area at the floor over the configured one. [1]
     height_m : float
         h, level at which the area is the configured one. [m]
-    upright_share : float
-        s, share of h up to which the walls stand upright: 0 for a cone, towards 1 for a bench. [1]
+    exponent : float
+        p; 1 for walls that lean evenly, 2 for a cone with a narrow floor, large for a bench with its edge at h. [1]
     top_factor : float
         t, area at 2 h and above over the configured one; with 2 - b the walls lean evenly. [1]
 
@@ -43,15 +46,17 @@ class SumpAreaProfile(Effect):
     name: Literal["sump_area_profile"] = "sump_area_profile"
     bottom_factor: Annotated[float, limits(0.1, 4.0, "1")]
     height_m: Annotated[float, limits(0.1, 10.0, "m")] = 1.0
-    upright_share: Annotated[float, limits(0.0, 0.95, "1")] = 0.0
+    exponent: Annotated[float, limits(1.0, 20.0, "1")] = 1.0
     top_factor: Annotated[float, limits(0.1, 4.0, "1")] = 1.0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Scale the area along the profile."""
         if self.bottom_factor == self.top_factor == 1.0:
             return parameters
-        knots_m = self.height_m * np.array([0.0, self.upright_share, 1.0, 2.0])
+        grown = SHARES if self.exponent > 1.0 else SHARES[[0, -1]]
+        knots_m = self.height_m * np.r_[grown ** (1.0 / self.exponent), 2.0]
+        factors = np.r_[self.bottom_factor + (1.0 - self.bottom_factor) * grown, self.top_factor]
         levels_m = np.union1d(parameters.profile[at.PROFILE_LEVEL], knots_m)
         areas_m2 = np.interp(levels_m, parameters.profile[at.PROFILE_LEVEL], parameters.profile[at.PROFILE_AREA])
-        areas_m2 *= np.interp(levels_m, knots_m, [self.bottom_factor, self.bottom_factor, 1.0, self.top_factor])
+        areas_m2 *= np.interp(levels_m, knots_m, factors)
         return replace(parameters, profile=profile_of(list(zip(levels_m, areas_m2, strict=True))))

@@ -65,10 +65,10 @@ def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
 
 def test_a_bench_in_the_sump_is_found(alpha):
     """Its edge is within a few centimetres, unlike a cone's wall."""
-    bench = {"name": "sump_area_profile", "bottom_factor": 0.5, "height_m": 1.2, "upright_share": 0.9}
+    bench = {"name": "sump_area_profile", "bottom_factor": 0.5, "height_m": 1.2, "exponent": 10.0}
     report = report_of(diagnose(record(alpha, [bench]), alpha))
     assert (report.verdict, [effect.name for effect in report.effects]) == ("effect", ["sump_area_profile"])
-    assert report.effects[0].parameters["upright_share"].value == pytest.approx(0.9, abs=0.1)
+    assert report.effects[0].parameters["exponent"].value == pytest.approx(10.0, rel=0.2)
     assert report.gap.shrinkage > 0.9
 
 
