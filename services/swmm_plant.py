@@ -133,7 +133,8 @@ def _drive(
         swing = 1.0 + spec.hunting * math.sin(2.0 * math.pi * second / spec.hunting_s)
         inflow = 0.5 * (around.inflow[second] + around.inflow[second + 1]) + spec.hidden_inflow
         standing = sum(flow <= 0.0 and speed <= 0.0 for flow, speed in zip(flows, command, strict=True))
-        well.generated_inflow(inflow + standing * spec.flap_leak * math.sqrt(max(lift_m, 0.0)))
+        behind_m = nodes["HEADER"].head - level_m if spec.shared_loss > 0 else lift_m
+        well.generated_inflow(inflow + standing * spec.flap_leak * math.sqrt(max(behind_m, 0.0)))
         for _ in range(_STEPS):
             for i, machine in enumerate(machines):
                 moved = command[i] + (ROUTING_STEP_S if i in plc.running else -ROUTING_STEP_S) / spec.ramp_s
