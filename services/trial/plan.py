@@ -12,7 +12,7 @@ from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.whole_file import whole_file
 from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
 
-SCHEMA = "wetwell.trial/1"
+SCHEMA = "wetwell.trial/2"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
 REPLAY = (sys.executable, "-m", "wetwell.services", "gap", "replay")
 

@@ -21,7 +21,7 @@ from wetwell.sim2real.trial.scores import CaseScore, chance_level, confusion, na
 
 def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) -> dict[str, Any]:
     """Open all seals but those of the cases that failed, score the reports, write `trial.json` and `trial.html`."""
-    names = [name for number in range(plan.count) if (name := f"case-{number:04}") not in failed]
+    names = [name for number in range(plan.count) if (name := plan.case(number).name) not in failed]
     pairs = [(open_case(name, folder), answer_in(folder / REPORTS / name)) for name in names]
     scores = [score_case(label, answer, answer_in(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
     rows, columns, counts = confusion(scores)

@@ -8,7 +8,7 @@ import tomli_w
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recording import write_recording
 from wetwell.protocols.whole_file import whole_file
-from wetwell.services.trial.acting import acting_case
+from wetwell.services.trial.acting_case import acting_case
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.scores import Label
 from wetwell.sim2real.trial.seal import digest, labels_text, opened
@@ -83,5 +83,5 @@ def open_case(name: str, folder: Path) -> Label:
         components=tuple(labels["components"]),
         parameters=labels["parameters"],
         inherent=tuple(labels["inherent"]),
-        attempt=labels.get("attempt", 0),  # seals without it are of the first
+        attempt=labels["attempt"],
     )

@@ -11,7 +11,7 @@ from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.recording import read_recording
 from wetwell.protocols.station import load_station
 from wetwell.services.trial import run
-from wetwell.services.trial.acting import ATTEMPTS, acting_case, idle_name, recording_of
+from wetwell.services.trial.acting_case import ATTEMPTS, acting_case, idle_name, recording_of
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.sealed_case import open_case, publish
 from wetwell.sim2real.trial.cases import KINDS, TrialCase, trial_case
