@@ -87,5 +87,8 @@ def _profile(fitter: Fitter, fit: Fit, x: Floats, place: int) -> tuple[float, fl
             end = moved[place]
             if fitter.cost(fitter.residuals(fit.candidates, np.split(moved, sizes))) > limit:
                 break
+        else:
+            if side > 0.0:  # away from neutral nothing speaks against it
+                end = float(x[place] > neutral)
         ends.append(float(end))
     return min(ends), max(ends)

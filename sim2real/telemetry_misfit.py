@@ -15,9 +15,14 @@ from wetwell.simulator.channels import Quantity, channels_of
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-MIN_MOVES = 30
+MIN_MOVES, FEWEST = 30, 10
+"""Moves from which their sizes are looked at, and from which a channel is held and not stuck."""
+SMALL = 0.1
+"""Share of the moves that are small."""
 HELD_SHARE = 0.15
 """Share of repeated values from which a channel counts as held; noise repeats nothing."""
+NEARLY_ALL = 0.9
+"""The same where moves are too few, or most too long after another, to have an edge of their sizes."""
 DEAD_ZONE = 0.35
 """Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
 EDGE = 1.5
@@ -26,8 +31,12 @@ FEW = 0.005
 """Share of moves that may be smaller than the deadband: values that were lost, or sent twice."""
 OFTEN_S = 60
 """A value that is held for less was not sent because its time was up."""
-UNSURE = (0.03, 0.4)
-"""Share by which a deadband may be missed: seen in noise or slow moves, and in the steps of ramps alone."""
+SEEN = (0.97, 1.03)
+"""Shares of a deadband that was seen between which it may be: in noise or slow moves."""
+IN_RAMPS = (0.1, 1.4)
+"""The same in the steps of ramps, of which the smallest may be far over it."""
+BY_TIME = (0.6, np.inf)
+"""The same over the largest move of a value whose time was up."""
 LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
 STRENGTH = 12.0
@@ -38,13 +47,18 @@ STRENGTH = 12.0
 class Pattern:
     """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither.
 
-    `unsure` is the share by which that may be missed.
+    `within` are the shares of it between which it may be.
     """
 
     quantity: Quantity
     deadband: float = 0.0
     quantum: float = 0.0
-    unsure: float = 0.0
+    within: tuple[float, float] = (1.0, 1.0)
+
+    def missed(self, acting: float) -> float:
+        """Share by which what acts is beyond the ends of where the pattern may be."""
+        low, high = (share * max(self.deadband, self.quantum) for share in self.within)
+        return max(1.0 - acting / low, acting / high - 1.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +76,7 @@ class TelemetryMisfit:
         for pattern in self.patterns:
             channel = channels_of(pattern.quantity, pumps)[0]
             acting = float(sensors.deadband[channel] if pattern.deadband > 0.0 else sensors.quantum[channel])
-            seen = max(pattern.deadband, pattern.quantum)
-            left.append(STRENGTH * min(max(abs(acting / seen - 1.0) - pattern.unsure, 0.0) / 0.3, 1.0))
+            left.append(STRENGTH * min(pattern.missed(acting) / 0.3, 1.0))
         return np.repeat(np.array(left), self.cycles)
 
 
@@ -111,33 +124,59 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
         moves = np.concatenate([np.diff(part) for part in parts])
         moves = np.abs(moves[np.isfinite(moves)])
         jumps = moves[moves > 0.0]
-        if jumps.size < MIN_MOVES:
+        if jumps.size < FEWEST:
             continue
         quantum = _lattice(np.concatenate(parts))
-        if quantity == "level_m" and quantum >= MIN_QUANTUM_M:
+        if quantity == "level_m" and quantum >= MIN_QUANTUM_M and jumps.size >= MIN_MOVES:
             found.append(Pattern(quantity=quantity, quantum=quantum))
             continue
-        few, smallest, more, middle = (float(q) for q in np.quantile(jumps, [0.05, 0.1, 0.2, 0.5]))
-        has_edge = smallest > DEAD_ZONE * middle or smallest < EDGE * few or more < EDGE * smallest
-        if 1.0 - jumps.size / moves.size > HELD_SHARE and has_edge and smallest > 2.5 * quantum:
-            found.append(_held(quantity, parts, is_ramp, smallest))
+        held_share = 1.0 - jumps.size / moves.size
+        if held_share > HELD_SHARE and float(np.quantile(jumps, SMALL)) > 2.5 * quantum:
+            pattern = _held(quantity, parts, is_ramp, jumps, held_share)
+            found += [pattern] if pattern is not None else []
     return found
 
 
-def _held(quantity: Quantity, parts: list[Floats], is_ramp: Flags, otherwise: float) -> Pattern:
-    """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon."""
-    soon: list[Floats] = []
-    calm = 0
+def _held(
+    quantity: Quantity, parts: list[Floats], is_ramp: Flags, jumps: Floats, held_share: float
+) -> Pattern | None:
+    """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon.
+
+    Where such are few, and nearly all values are held, it lies over the largest move outside ramps, which its time
+    being up has brought about.
+    """
+    soon, is_calm = _soon(parts, is_ramp)
+    calm = np.concatenate([np.abs(np.diff(part))[~ramp[1:]] for part, ramp in zip(parts, is_ramp, strict=False)])
+    calm = calm[calm > 0.0]
+    if held_share > NEARLY_ALL and soon.size < MIN_MOVES and calm.size >= FEWEST:
+        return Pattern(quantity=quantity, deadband=float(calm.max()), within=BY_TIME)
+    if jumps.size < MIN_MOVES or not (_has_edge(jumps) or _has_edge(soon)):
+        return None
+    if soon.size < MIN_MOVES:
+        return Pattern(quantity=quantity, deadband=float(np.quantile(jumps, SMALL)), within=IN_RAMPS)
+    within = SEEN if is_calm.sum() >= MIN_MOVES else IN_RAMPS
+    return Pattern(quantity=quantity, deadband=float(np.quantile(soon, FEW)), within=within)
+
+
+def _soon(parts: list[Floats], is_ramp: Flags) -> tuple[Floats, Flags]:
+    """Sizes of the moves that follow another soon, so were not sent as their time was up; which are in no ramp."""
+    sizes: list[Floats] = []
+    calm: list[Flags] = []
     for part, ramp in zip(parts, is_ramp, strict=False):
         moves = np.diff(part)
         at_s = np.flatnonzero(np.isfinite(moves) & (moves != 0.0))
         at_s = at_s[1:][np.diff(at_s) < OFTEN_S]
-        soon.append(np.abs(moves[at_s]))
-        calm += int(np.sum(~ramp[at_s]))
-    jumps = np.concatenate(soon)
+        sizes.append(np.abs(moves[at_s]))
+        calm.append(~ramp[at_s])
+    return np.concatenate(sizes), np.concatenate(calm)
+
+
+def _has_edge(jumps: Floats) -> bool:
+    """Whether moves under a size are missing, as under a deadband."""
     if jumps.size < MIN_MOVES:
-        return Pattern(quantity=quantity, deadband=otherwise, unsure=UNSURE[1])
-    return Pattern(quantity=quantity, deadband=float(np.quantile(jumps, FEW)), unsure=UNSURE[int(calm < MIN_MOVES)])
+        return False
+    few, smallest, more, middle = (float(q) for q in np.quantile(jumps, [0.05, SMALL, 0.2, 0.5]))
+    return smallest > DEAD_ZONE * middle or smallest < EDGE * few or more < EDGE * smallest
 
 
 def _lattice(values: Floats) -> float:
