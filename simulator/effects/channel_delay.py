@@ -3,7 +3,7 @@
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.channels import Quantity
-from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits, of_channels
 from wetwell.simulator.plant import PlantParameters
 
 
@@ -35,3 +35,7 @@ class ChannelDelay(Effect):
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Delay the channel."""
         return of_channels(parameters, "delay_s", self.channel, self.delay_s)
+
+    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
+        """Whether the delay is a second or more."""
+        return self.delay_s >= RESOLVED_S

@@ -29,6 +29,10 @@ def limits(low: float, high: float, unit: str) -> Any:
     return Field(ge=low, le=high, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
 
+RESOLVED_S = 1.0
+"""What is over sooner no sample a second shows. [s]"""
+
+
 class Effect(Table):
     """Base of the effects: one component of the station that behaves otherwise than the plain model.
 

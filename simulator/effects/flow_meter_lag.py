@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits, of_channels
 from wetwell.simulator.plant import PlantParameters
 
 
@@ -30,3 +30,7 @@ class FlowMeterLag(Effect):
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Damp the flows."""
         return of_channels(parameters, "lag_s", "flow_m3h", self.lag_s)
+
+    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
+        """Whether the lag is a second or more."""
+        return self.lag_s >= RESOLVED_S

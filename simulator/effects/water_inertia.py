@@ -5,10 +5,8 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
 from wetwell.simulator.plant import PlantParameters
-
-SHORTEST_S = 1.0
 
 
 class WaterInertia(Effect):
@@ -43,4 +41,4 @@ class WaterInertia(Effect):
         flow_m3h = parameters.rated_flow_m3h
         c0, c1, c2 = parameters.curves.T
         head_m = c0 + (c1 + c2 * flow_m3h) * flow_m3h
-        return bool(np.any(self.inertia_s2_m2 * flow_m3h / 3600.0 >= SHORTEST_S * head_m))
+        return bool(np.any(self.inertia_s2_m2 * flow_m3h / 3600.0 >= RESOLVED_S * head_m))
