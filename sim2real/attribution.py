@@ -15,6 +15,7 @@ from wetwell.sim2real.intervals import intervals_of
 from wetwell.sim2real.misfit import Misfit, soft
 from wetwell.sim2real.regimes import MULTI_PUMP, REGIMES
 from wetwell.sim2real.replay import Replay
+from wetwell.sim2real.structure import phase
 from wetwell.sim2real.sureness import is_sure
 
 Floats = npt.NDArray[np.float64]
@@ -26,6 +27,8 @@ VISIBLE = 0.2
 """Gain in mean square of a group of bins, in units of noise, under which a gap is not worth a name."""
 CLEAR = 0.5
 """The same for a further effect: small gains are what the form of the first one leaves."""
+NARROW = 1.0
+"""The same in one span of time after switching, for the first effect: a gap of a second or two at each start."""
 LEAST_GAIN = 200.0
 """Drop of the sum of squares that a right model may make by chance."""
 PRICE = 0.006
@@ -48,8 +51,12 @@ LIKELY = 8
 """Further effects that are fitted, the most promising first."""
 JOIN_SHARE = 0.06
 """Least gain of a further effect, as a share of what the first explains, which its form may leave."""
+LEAST_COUNT = 10
+"""Bins without which a group says nothing."""
+CHANCE = 4.0
+"""Standard deviations of a sum of squares that noise does not reach."""
 OWN_SHARE = 0.002
-"""Least gain of a further effect beyond that share of each cell, as a share of what the first explains in all."""
+"""Least gain of a further effect beyond `JOIN_SHARE` of each span, as a share of what the first explains in all."""
 CLASS_SHARE = 0.02
 """Explanations within this share of the best gain are equivalent."""
 NOISY_SHARE = 0.06
@@ -138,6 +145,9 @@ class Attributor:
         self._plant = prediction.plant
         self.plain = soft(misfit.residuals(prediction))
         self.fitted, self.held = halves(misfit.bins, replay.traces.pumps)
+        bins = misfit.bins
+        key = (bins.signal * len(REGIMES) + bins.regime) * 32 + phase(bins)
+        self._span = np.unique(key[self.held], return_inverse=True)[1]
         self._fitter = Fitter(replay, misfit, self.fitted)
         self._rivals: dict[frozenset[str], list[Ranked]] = {}
         self._hints = {candidate: hints_of(candidate, replay, misfit, self.plain) for candidate in candidates}
@@ -186,21 +196,23 @@ class Attributor:
         return _priced(ranked, _plainest)
 
     def _ladders(self, candidate: Candidate, trials: Sequence[float] = TRIALS) -> list[list[Floats]]:
-        return [ladder for hints in self._hints[candidate] for ladder in candidate.ladders(hints, trials)]
+        """Places to begin at, each ladder once: hints that leave the strength open have the same ones."""
+        ladders = [ladder for hints in self._hints[candidate] for ladder in candidate.ladders(hints, trials)]
+        return list({b"".join(place.tobytes() for place in ladder): ladder for ladder in ladders}.values())
 
     def _extend(self, best: Ranked, singles: Sequence[Ranked]) -> Ranked:
-        current, first_gain = best, best.gain
+        current = best
         floor = self._misfit.bins.floor
         for _ in range(MOST_EFFECTS - 1):
             left = self._left(current.fit)
             is_open = self._open(left)
-            is_little = float((left**2 - floor)[self.held].sum()) < JOIN_SHARE * first_gain
+            is_little = float((left**2 - floor)[self.held].sum()) < JOIN_SHARE * best.gain
             if is_little and not is_open and not self._is_own(current.fit.residuals**2 - floor, best):
                 break  # no further effect could gain enough
             others = self._joined(current, _names(singles))
             if not others:
                 break
-            own = [one for one in others if self._is_own(current.fit.residuals**2 - one.fit.residuals**2, best)]
+            own = [one for one in others[1:] if self._adds(one.fit, current.fit, best)]
             tried = next(
                 (one for one in (others[0], *own[:1]) if self._is_further(one, current, best, is_open)), None
             )
@@ -213,8 +225,8 @@ class Attributor:
         """Whether the last of the effects that are tried adds enough to the current ones, and surely."""
         extra = self._rank(current.fit.residuals, tried.fit)
         is_enough = extra.gain >= JOIN_SHARE * first.gain or self._open(self._left(tried.fit)) < is_open
-        is_enough = is_enough or self._is_own(current.fit.residuals**2 - tried.fit.residuals**2, first)
-        return is_enough and self._is_real(current.fit.residuals, extra, CLEAR)
+        is_enough = is_enough or self._adds(tried.fit, current.fit, first)
+        return is_enough and self._is_real(current.fit.residuals, extra, CLEAR, np.inf)
 
     def _left(self, fit: Fit | None) -> Floats:
         """Residuals under a fit; with short transients in ramps excused unless all of it can be seen."""
@@ -222,11 +234,21 @@ class Attributor:
         is_seen = bool(effects) and all(effect.is_seen(self._plant) for effect in effects)
         return self._fitter.left(effects, 0 if is_seen else EXCUSED_S)
 
+    def _adds(self, tried: Fit, before: Fit, first: Ranked) -> bool:
+        """Whether the last effect of a fit can be seen, and explains what the form of the first may not have left."""
+        gains = before.residuals**2 - tried.residuals**2
+        return tried.effects[-1].is_seen(self._plant) and self._is_own(gains, first)
+
     def _is_own(self, gains: Floats, first: Ranked) -> bool:
-        """Whether there is more in some cells than the form of the first effect may have left there."""
-        left_by_form = JOIN_SHARE * np.maximum(self._by_cell(self.plain**2 - first.fit.residuals**2), 0.0)
-        own = float(np.maximum(self._by_cell(gains) - left_by_form, 0.0).sum())
-        return own > max(OWN_SHARE * first.gain, LEAST_GAIN)
+        """Whether there is more in some spans than the form of the first effect may have left there, or chance."""
+        counts = self._by_span(np.ones(self._misfit.bins.size))
+        left_by_form = JOIN_SHARE * np.maximum(self._by_span(self.plain**2 - first.fit.residuals**2), 0.0)
+        own = self._by_span(gains) - left_by_form
+        return float(own[own > CHANCE * np.sqrt(2.0 * counts)].sum()) > max(OWN_SHARE * first.gain, LEAST_GAIN)
+
+    def _by_span(self, values: Floats) -> Floats:
+        """Sums over the held bins of each signal and regime, and span of time since that began."""
+        return np.bincount(self._span, values[self.held]).astype(np.float64)
 
     def _by_cell(self, values: Floats) -> Floats:
         """Sums over the held bins of each signal and regime."""
@@ -361,13 +383,15 @@ class Attributor:
         gain = float(gains.sum())
         return Ranked(fit=fit, gain=gain, score=gain, by_cycle=by_cycle)
 
-    def _is_real(self, before: Floats, ranked: Ranked, visible: float = VISIBLE) -> bool:
+    def _is_real(self, before: Floats, ranked: Ranked, visible: float = VISIBLE, narrow: float = NARROW) -> bool:
         """Whether a gain is beyond chance, and beyond what is worth a name, in some group of bins."""
         if not ranked.is_sure or ranked.gain < LEAST_GAIN:
             return False
-        counts = self._by_cell(np.ones(self._misfit.bins.size))
-        means = self._by_cell(before**2 - ranked.fit.residuals**2) / np.maximum(counts, 1.0)
-        return bool(np.max(means[counts >= 10], initial=0.0) > visible)
+        gains, ones = before**2 - ranked.fit.residuals**2, np.ones(self._misfit.bins.size)
+        return any(
+            float(np.max((sums(gains) / np.maximum(sums(ones), 1.0))[sums(ones) >= LEAST_COUNT], initial=0.0)) > least
+            for sums, least in ((self._by_cell, visible), (self._by_span, narrow))
+        )
 
 
 def _is_equal(best: Ranked, rival: Ranked, share_of: float) -> bool:

@@ -18,7 +18,7 @@ from wetwell.sim2real.misfit import Misfit
 from wetwell.sim2real.plausibility import check_plausible
 from wetwell.sim2real.regimes import IDLE, MULTI_PUMP, REGIMES, STEADY, Regimes, regimes_of
 from wetwell.sim2real.replay import Replay
-from wetwell.sim2real.shrinkage import FLOOR, NOTHING, Interval, Shrinkage, bootstrap, shrinkage_of
+from wetwell.sim2real.shrinkage import FLOOR, NOTHING, Interval, Shrinkage, bootstrap, gaps_of, shrinkage_of
 from wetwell.sim2real.structure import explained, repeating
 from wetwell.sim2real.sureness import is_sure
 from wetwell.sim2real.traces import Traces, traces_of
@@ -255,8 +255,8 @@ def _is_wide(bins: Bins, found: Attribution, told: set[int]) -> bool:
     rows = found.held & np.isin(bins.signal, sorted(told))
     if found.accepted is None or not rows.any():
         return False
-    gap = shrinkage_of(found.plain, found.left, bins, rows, np.random.default_rng(0))
-    return gap.after - FLOOR > max(UNCLOSED, UNCLOSED_SHARE * (gap.before - FLOOR))
+    before, after = gaps_of(found.plain, found.left, bins, rows)
+    return after - FLOOR > max(UNCLOSED, UNCLOSED_SHARE * (before - FLOOR))
 
 
 def _is_unclosed(bins: Bins, found: Attribution, told: set[int]) -> bool:

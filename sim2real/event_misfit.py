@@ -21,6 +21,8 @@ Floats = npt.NDArray[np.float64]
 WINDOW_S = 30
 MIN_POINTS = 8
 SCAN_S = 1.0
+NEVER_S = 10**6
+"""Since the event before the first one."""
 WAITING_S = 2.0
 """Scans that a timer may take beside its delay."""
 TOLERANCE_M = 0.002
@@ -49,7 +51,8 @@ class Stretches:
             return level_m, slope_m_s
         whole = int(np.floor(shift_s))
         share = shift_s - whole
-        near, far = self._fitted(whole), self._fitted(whole + 1)
+        near = self._fitted(whole)
+        far = self._fitted(whole + 1) if share > 0.0 else near
         shifted_m, shifted_m_s = ((1.0 - share) * a + share * b for a, b in zip(near, far, strict=True))
         is_known = np.isfinite(shifted_m)
         level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
@@ -119,7 +122,7 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
     events: list[Event] = []
     waited_s: list[int] = []
     calm: list[npt.NDArray[np.bool_]] = []
-    last = -WINDOW_S
+    last = -NEVER_S
     ahead = np.arange(1 - WINDOW_S, 1)
     for event in regimes.events:
         window = event.second + ahead

@@ -20,6 +20,8 @@ GRID_S = 20.0
 FULL = 0.98
 REFERENCES = (0.0, 1.0, 3.0, 8.0)
 """Levels at which a lift may be right, in middles between the first start and stop."""
+CUTOFFS = (0.98, 0.85, 0.7, 0.5, 0.35)
+"""Limits that are tried, in least flows that are not 0: a ramp may pass what is between within a second."""
 BENCH = 8.0
 """Exponent of a sump's area with a bench."""
 EDGES = (0.25, 0.5, 0.75)
@@ -41,13 +43,14 @@ def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Fl
     control = replay.station.control
     middle_m = 0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])
     hints |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
-    if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
-        flow_m3h = replay.traces.signals["flow_m3h"]
-        hints["cutoff_m3h"] = 0.98 * float(np.min(flow_m3h[flow_m3h > 0.0], initial=np.inf))
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
         hints["rated_factor"] = _rated_factor(replay)
     if "fast_period_s" in names:
         hints |= _swing(misfit.bins, replay.traces.time_s, residuals)
+    if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
+        flow_m3h = replay.traces.signals["flow_m3h"]
+        least_m3h = float(np.min(flow_m3h[flow_m3h > 0.0], initial=np.inf))
+        return [hints | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [hints]
     if "reference_level_m" in names:
         return [hints | {"reference_level_m": far * middle_m} for far in REFERENCES]
     if "exponent" in names:

@@ -38,6 +38,28 @@ class Shrinkage:
 
 def shrinkage_of(before: Floats, after: Floats, bins: Bins, held: Flags, rng: np.random.Generator) -> Shrinkage:
     """Gap before and after on the held-out bins, from soft residuals, with a bootstrap over whole cycles."""
+    signals, sums = _sums_of(before, after, bins, held)
+    cycles = sums.shape[2]
+    each, (whole_before, whole_after) = _gaps(sums)
+    drawn = [_share(*_gaps(sums[:, :, rng.integers(0, cycles, cycles)])[1]) for _ in range(DRAWN)]
+    low, high = np.quantile(drawn, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0])
+    return Shrinkage(
+        before=float(whole_before),
+        after=float(whole_after),
+        shrinkage=_share(float(whole_before), float(whole_after)),
+        shrinkage_ci=(float(low), float(high)),
+        by_signal={SIGNALS[s]: (float(each[0, k]), float(each[1, k])) for k, s in enumerate(signals)},
+    )
+
+
+def gaps_of(before: Floats, after: Floats, bins: Bins, held: Flags) -> tuple[float, float]:
+    """Gap before and after as of `shrinkage_of`, without interval."""
+    _, (whole_before, whole_after) = _gaps(_sums_of(before, after, bins, held)[1])
+    return float(whole_before), float(whole_after)
+
+
+def _sums_of(before: Floats, after: Floats, bins: Bins, held: Flags) -> tuple[list[int], Floats]:
+    """Signals, and (3, signals, cycles) sums of what is beyond noise before and after, and of bins."""
     signals = [signal for signal in range(len(SIGNALS)) if np.any(held & (bins.signal == signal))]
     cycles, of_bin = np.unique(bins.cycle[held], return_inverse=True)
     sums = np.zeros((3, len(signals), cycles.size))
@@ -47,22 +69,14 @@ def shrinkage_of(before: Floats, after: Floats, bins: Bins, held: Flags, rng: np
             excess = values[held][rows] - bins.floor[held][rows]
             sums[row, k] = np.bincount(of_bin[rows], excess, cycles.size)
         sums[2, k] = np.bincount(of_bin[rows], minlength=cycles.size)
+    return signals, sums
 
-    def gaps(drawn: npt.NDArray[np.int64]) -> tuple[Floats, Floats]:
-        total = sums[:, :, drawn].sum(axis=2)
-        mean = np.maximum(total[:2] / np.maximum(total[2], 1.0), 0.0)
-        return np.sqrt(FLOOR + mean), np.sqrt(FLOOR + mean.mean(axis=1))
 
-    each, (whole_before, whole_after) = gaps(np.arange(cycles.size))
-    drawn = [_share(*gaps(rng.integers(0, cycles.size, cycles.size))[1]) for _ in range(DRAWN)]
-    low, high = np.quantile(drawn, [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0])
-    return Shrinkage(
-        before=float(whole_before),
-        after=float(whole_after),
-        shrinkage=_share(float(whole_before), float(whole_after)),
-        shrinkage_ci=(float(low), float(high)),
-        by_signal={SIGNALS[s]: (float(each[0, k]), float(each[1, k])) for k, s in enumerate(signals)},
-    )
+def _gaps(sums: Floats) -> tuple[Floats, Floats]:
+    """(2, signals) gaps before and after of each signal, and (2,) of all."""
+    total = sums.sum(axis=2)
+    mean = np.maximum(total[:2] / np.maximum(total[2], 1.0), 0.0)
+    return np.sqrt(FLOOR + mean), np.sqrt(FLOOR + mean.mean(axis=1))
 
 
 def bootstrap(squares: Floats, cycle: npt.NDArray[np.int64], rng: np.random.Generator) -> tuple[float, Interval]:

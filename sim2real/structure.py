@@ -29,10 +29,19 @@ def repeating(residuals: Floats, bins: Bins, fitted: Flags, pumps: int) -> Float
     pumps : int
         Cycles over which the drift is averaged, times `NEIGHBOURS`.
     """
-    group = (bins.signal * len(REGIMES) + bins.regime) * 64 + bins.pump + 1
-    phase = np.searchsorted(PHASES_S, _since(bins, group))
-    expected = _table(group * 32 + phase, residuals, fitted)
+    group = _group(bins)
+    expected = _table(group * 32 + phase(bins), residuals, fitted)
     return expected + _drift(group, bins.cycle, residuals - expected, fitted, NEIGHBOURS * pumps)
+
+
+def phase(bins: Bins) -> npt.NDArray[np.int64]:
+    """(bins,) number of the span of `PHASES_S` since the regime of a signal and pump began."""
+    return np.asarray(np.searchsorted(PHASES_S, _since(bins, _group(bins))))
+
+
+def _group(bins: Bins) -> npt.NDArray[np.int64]:
+    """(bins,) number of signal, regime and pump together."""
+    return (bins.signal * len(REGIMES) + bins.regime) * 64 + bins.pump + 1
 
 
 def explained(residuals: Floats, expected: Floats) -> Floats:

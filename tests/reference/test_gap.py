@@ -63,6 +63,43 @@ def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
     assert report.effects[1].parameters["cutoff_m3h"].value == pytest.approx(60.0, rel=0.15)
 
 
+def test_a_cutoff_of_a_second_or_two_a_ramp_is_told_beside_a_rougher_main(alpha):
+    """What the rougher main explains in all is many times more, but not in these seconds."""
+    main, cutoff = {"name": "friction_bias", "factor": 2.5}, {"name": "flow_low_cutoff", "cutoff_m3h": 60.0}
+    report = report_of(diagnose(record(alpha, [main, cutoff], 2 * LENGTH_S), alpha))
+    assert [effect.name for effect in report.effects] == ["friction_bias", "flow_low_cutoff"]
+
+
+def test_a_delay_under_a_second_is_not_told_beside_a_lag(alpha):
+    lag = {"name": "flow_meter_lag", "lag_s": 6.0}
+    delay = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.3}
+    report = report_of(diagnose(record(alpha, [lag, delay]), alpha))
+    assert [effect.name for effect in report.effects] == ["flow_meter_lag"]
+
+
+def test_a_channel_that_is_sent_when_its_time_is_up_is_found(alpha):
+    """With soft starters it hardly moves otherwise: its deadband is at least as wide as what was not sent before."""
+    station = alpha.model_copy(update={"control": alpha.control.model_copy(update={"ramp_s": 1.0})})
+    recording = record(station)
+    names = [f"pump{i}_power_kw" for i in (1, 2, 3)]
+    columns = recording.columns | {name: held(recording.columns[name], 3.0, 240) for name in names}
+    report = report_of(diagnose(replace(recording, columns=columns), station))
+    assert [effect.name for effect in report.effects] == ["report_by_exception"]
+    low_kw, high_kw = report.effects[0].parameters["deadband"].ci
+    assert low_kw < 3.0 < high_kw
+
+
+def held(values, deadband, report_s):
+    sent, since = values.copy(), 0
+    for row in range(1, values.size):
+        since += 1
+        if abs(values[row] - sent[row - 1]) >= deadband or since >= report_s:
+            since = 0
+        else:
+            sent[row] = sent[row - 1]
+    return sent
+
+
 def test_a_bench_in_the_sump_is_found(alpha):
     """Its edge is within a few centimetres, unlike a cone's wall."""
     bench = {"name": "sump_area_profile", "bottom_factor": 0.5, "height_m": 1.2, "exponent": 10.0}
