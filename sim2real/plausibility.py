@@ -86,6 +86,8 @@ def _check_frequency(traces: Traces, station: Station) -> None:
 def _check_unit(name: str, ratio: float, units: dict[str, float], than: str) -> None:
     if not np.isfinite(ratio) or POSSIBLE[0] * np.exp(NEAR) < ratio < POSSIBLE[1]:
         return
+    if ratio <= 0.0:
+        raise ValueError(f"{name} reads {ratio:.3g} times {than}: a meter without a signal, or no water")
     for unit, factor in units.items():
         if abs(np.log(ratio / factor)) < NEAR:
             raise ValueError(

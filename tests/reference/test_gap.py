@@ -162,6 +162,15 @@ def _standing(recording):
     return Recording(time_ns=recording.time_ns, columns=zero)
 
 
+def _dry(recording):
+    """Flow meters that lose their signal after an hour."""
+    flows = [name for name in recording.columns if name.startswith("pump") and name.endswith("flow_m3h")]
+    has_signal = np.arange(len(recording)) < 3600
+    return replace(
+        recording, columns=recording.columns | {name: has_signal * recording.columns[name] for name in flows}
+    )
+
+
 def _single(recording):
     return Recording(
         time_ns=recording.time_ns,
@@ -175,6 +184,7 @@ def _single(recording):
         (lambda r: _rows(r, slice(0, 900)), "is 900 s long, a diagnosis needs at least 1800 s"),
         (lambda r: _rows(r, slice(0, 0)), "has no rows"),
         (_standing, "has 0 starts of pumps"),
+        (_dry, "^flow_m3h reads 0 times what this station gives: a meter without a signal, or no water$"),
         (_single, "the recording has 1 pumps, station 'alpha' 3"),
     ],
 )
