@@ -69,7 +69,10 @@ class Candidate:
         return EFFECTS[self.name].model_validate(dict(self.fixed) | values)
 
     def ladders(self, hints: Mapping[str, float], trials: Sequence[float] = TRIALS) -> list[list[Floats]]:
-        """Places to begin at: the hints, and ladders of rising strength, each strength on both sides of neutral."""
+        """Places to begin at: the hints, and ladders of rising strength, each strength on both sides of neutral.
+
+        A strength that is neutral by the hints has no ladder.
+        """
         base = np.array(
             [free.share(min(max(hints.get(free.name, free.start), free.low), free.high)) for free in self.free]
         )
@@ -77,7 +80,7 @@ class Candidate:
             return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
         ladders = [[base]] if any(free.name in hints for free in self.free) else []
         for k, free in enumerate(self.free):
-            if free.neutral is None:
+            if free.neutral is None or hints.get(free.name) == free.neutral:
                 continue
             neutral = free.share(free.neutral)
             for end in (0.0, 1.0):

@@ -55,8 +55,9 @@ def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Fl
         return [hints | {"reference_level_m": far * middle_m} for far in REFERENCES]
     if "exponent" in names:
         low_m, high_m = control.stop_levels_m[0], control.start_levels_m[0]
+        bench = {"exponent": BENCH, "top_factor": 1.0}
         edges_m = [low_m + share * (high_m - low_m) for share in EDGES]
-        return [hints, *(hints | {"exponent": BENCH, "height_m": edge_m} for edge_m in edges_m)]
+        return [hints, *(hints | bench | {"height_m": edge_m} for edge_m in edges_m)]
     return [hints]
 
 
