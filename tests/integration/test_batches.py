@@ -15,13 +15,15 @@ from distributed import LocalCluster
 
 from wetwell.protocols.errors import ConfigError, LinkError, WetwellError
 from wetwell.protocols.recording import write_recording
-from wetwell.services import executors, trial
+from wetwell.services import executors
 from wetwell.services.backtest import sources_of, write_backtest
 from wetwell.services.cli import main
 from wetwell.services.dataset import make_dataset, plan_of
 from wetwell.services.diagnoses import cases_of, diagnose_all
 from wetwell.services.gap import diagnose_file
 from wetwell.services.parallel import Failure, work_through
+from wetwell.services.trial.plan import TrialPlan
+from wetwell.services.trial.run import run_trial
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -142,8 +144,8 @@ def test_diagnoses_are_those_of_single_recordings_and_a_bad_one_is_told(
 
 def test_a_trial_scores_the_same(scheduler, tmp_path):
     command = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")), "--only", "friction_bias")
-    plan = trial.TrialPlan(seed=3, count=2, kinds=("none",), seconds=3600, command=command)
-    results = [trial.run_trial(plan, tmp_path / name, 1, where) for name, where in (("a", None), ("b", scheduler))]
+    plan = TrialPlan(seed=3, count=2, kinds=("none",), seconds=3600, command=command)
+    results = [run_trial(plan, tmp_path / name, 1, where) for name, where in (("a", None), ("b", scheduler))]
     assert results[0] == results[1]
     assert results[0]["count"] == 2
     assert results[0]["failed"] == []
