@@ -26,14 +26,14 @@ from typing import Any
 
 import httpx
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.station_model import StationModel
-from wetwell.protocols.keys import model_key, sample_key, verdict_key
-from wetwell.protocols.messages import PumpReading, Sample, Verdict
-from wetwell.protocols.zenoh_link import ZenohBus, connect_client
-from wetwell.services.clock import now_ns
-from wetwell.services.daemon import ticks
-from wetwell.services.presets import find_station
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.verdict.station_model import StationModel
+from wetwell.protocols.bus.keys import model_key, sample_key, verdict_key
+from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
+from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.lifecycle import ticks
+from wetwell.services.stations import find_station
 
 CHROMIUM = Path("/usr/bin/chromium")
 WARM_UP_S = 5.0

@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.station import Station
-from wetwell.services.backtest import SimulatedRecording, detector_names, run_backtest
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.batch.backtest import SimulatedRecording, detector_names, run_backtest
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.faults import Fault
-from wetwell.simulator.faults.blockage import Blockage
-from wetwell.simulator.faults.pipe_clogging import PipeClogging
+from wetwell.simulator.faults.pump.blockage import Blockage
+from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.surges import Surges
 from wetwell.simulator.scenario import Scenario

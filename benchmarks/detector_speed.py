@@ -21,15 +21,15 @@ import numpy as np
 import numpy.typing as npt
 from timing import least_s
 
-from wetwell.detector.block import blocks
-from wetwell.detector.nominal import Nominal, nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.detector.pump_record import ROLLING_SAMPLES
-from wetwell.detector.rolling_f_test import LOG_P, RollingFTest, scan
-from wetwell.protocols.messages import Sample
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.station import Station
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.detector.curves.datasheet import Nominal, nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.detector.pump_judge import ROLLING_SAMPLES
+from wetwell.detector.statistics.rolling_f_test import LOG_P, RollingFTest, scan
+from wetwell.detector.stream.block import blocks
+from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 DAY_S = 86_400

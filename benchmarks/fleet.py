@@ -24,12 +24,12 @@ import numpy as np
 from site_load import SETTLE_S, Played, play, prepare
 from site_processes import PATIENCE_S, Site, cpu_and_memory, free_endpoint, started
 
-from wetwell.detector.block import blocks
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.station import load_station
-from wetwell.protocols.zenoh_link import connect_client
-from wetwell.services.charts.bar_chart import bar_chart
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.detector.stream.block import blocks
+from wetwell.protocols.bus.zenoh.link import connect_client
+from wetwell.protocols.station.station_file import load_station
+from wetwell.services.reports.charts.bar_chart import bar_chart
 
 KILLED_HEALTH_S = 0.5
 """How often a judge says how many samples it has had while a worker is killed; the time is found to this."""

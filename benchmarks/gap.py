@@ -18,9 +18,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from wetwell.protocols.recording import write_recording
-from wetwell.protocols.station import EffectTable
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.protocols.recordings.recording import write_recording
+from wetwell.protocols.station.station_file import EffectTable
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 AIMS = {1.5: (15.0, None), 26.0: (90.0, 4.0)}

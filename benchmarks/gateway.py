@@ -17,13 +17,13 @@ from typing import Any
 
 from pymodbus.client import AsyncModbusTcpClient
 
-from wetwell.protocols.device_map import Device, Plc
-from wetwell.protocols.device_signal import Signal
-from wetwell.protocols.link import Bus
-from wetwell.protocols.memory_link import MemoryBus
-from wetwell.protocols.messages import Status
-from wetwell.protocols.registers import register_table
-from wetwell.protocols.zenoh_link import ZenohBus, connect_client, open_router
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.memory_link import MemoryBus
+from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client, open_router
+from wetwell.protocols.messages.messages import Status
+from wetwell.protocols.modbus.device_map import Device, Plc
+from wetwell.protocols.modbus.device_signal import Signal
+from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.gateway.daemon import poll_all
 
 PUMPS = 3

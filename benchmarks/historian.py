@@ -8,15 +8,15 @@ from pathlib import Path
 
 import typer
 
-from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.services.historian.core import Historian, PayloadKind
-from wetwell.services.historian.folder_store import FolderStore
+from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.services.historian.rows import SampleRow, pack
 from wetwell.services.historian.samples import Samples
-from wetwell.services.historian.store import DAY_NS, Batch, Store
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.services.historian.service import Historian, PayloadKind
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import DAY_NS, Batch, Store
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 STATIONS = 1_000

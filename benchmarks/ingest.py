@@ -24,8 +24,8 @@ import numpy as np
 from site_load import SETTLE_S, Played, play, prepare
 from site_processes import PATIENCE_S, Site, cpu_and_memory, free_endpoint, started
 
-from wetwell.protocols.keys import SITE
-from wetwell.protocols.zenoh_link import connect_client
+from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.bus.zenoh.link import connect_client
 
 HEALTH_S = 2.0
 """The rate is found to this."""

@@ -16,18 +16,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.baselines import detector_class
-from wetwell.detector.baselines.run_detector import RunDetector
-from wetwell.detector.block import Block, blocks
-from wetwell.detector.f_distribution import log_f_survival
-from wetwell.detector.nominal import Nominal, nominal_of
-from wetwell.detector.run import Run
-from wetwell.detector.scoring import ScoredRun, confusion, f1, precision_and_recall, scored_runs, without_truth
-from wetwell.detector.tangent import tangent_residuals
-from wetwell.protocols.messages import State
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.station import Station
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.detector.curves.datasheet import Nominal, nominal_of
+from wetwell.detector.evaluation.methods import detector_class
+from wetwell.detector.evaluation.methods.run_detector import RunDetector
+from wetwell.detector.evaluation.scores import (
+    ScoredRun,
+    confusion,
+    f1,
+    precision_and_recall,
+    scored_runs,
+    without_truth,
+)
+from wetwell.detector.runs.run import Run
+from wetwell.detector.statistics.f_distribution import log_f_survival
+from wetwell.detector.statistics.tangent import tangent_residuals
+from wetwell.detector.stream.block import Block, blocks
+from wetwell.protocols.messages.messages import State
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 Floats = npt.NDArray[np.float64]

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.importers.skab import read_skab
-from wetwell.protocols.messages import Verdict
-from wetwell.protocols.readings import PumpRow, Row
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.station import Station
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.readings import PumpRow, Row
+from wetwell.protocols.recordings.importers.skab import read_skab
+from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import NS_PER_S
 
 SKAB_GROUPS = {
     "normal": ["anomaly-free/anomaly-free"],

@@ -31,8 +31,8 @@ import numpy.typing as npt
 from swmm_station import INFLOW_STEP_S, swmm_input
 from timing import least_s
 
-from wetwell.protocols.station import EffectTable, Station
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.protocols.station.station_file import EffectTable, Station
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.plant import Plant, healthy_forcing
 from wetwell.simulator.simulation import Simulation
 

@@ -23,10 +23,10 @@ from site_load import SETTLE_S, Played, play, prepare
 from site_processes import Site, free_endpoint, started
 from site_week import memory_of_a_week
 
-from wetwell.protocols.keys import SITE
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import connect_client
-from wetwell.services.charts import Series, line_chart
+from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.bus.zenoh.link import connect_client
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.reports.charts import Series, line_chart
 
 
 def commands_of(folder: Path) -> dict[str, list[str]]:

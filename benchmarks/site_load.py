@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from wetwell.detector.block import blocks
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import sample_block_key, sample_key
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.protocols.zenoh_link import connect_client
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.detector.stream.block import blocks
+from wetwell.protocols.bus.keys import sample_block_key, sample_key
+from wetwell.protocols.bus.zenoh.link import connect_client
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 LEARNT_S = 28_800

@@ -11,10 +11,10 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from wetwell.protocols.keys import SITE, status_key, verdict_key
-from wetwell.protocols.messages import Status, Verdict
-from wetwell.protocols.zenoh_link import ZenohBus
-from wetwell.services.daemon import PARENT_VARIABLE
+from wetwell.protocols.bus.keys import SITE, status_key, verdict_key
+from wetwell.protocols.bus.zenoh.link import ZenohBus
+from wetwell.protocols.messages.messages import Status, Verdict
+from wetwell.services.runtime.lifecycle import PARENT_VARIABLE
 
 PATIENCE_S = 300.0
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")

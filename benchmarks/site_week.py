@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from site_processes import cpu_and_memory
 
-from wetwell.protocols.keys import alarm_key, sample_key, verdict_key
-from wetwell.protocols.link import Subscription
-from wetwell.protocols.memory_link import MemoryBus
-from wetwell.services.alarms.keeper import AlarmKeeper
+from wetwell.protocols.bus.interface import Subscription
+from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
+from wetwell.protocols.bus.memory_link import MemoryBus
+from wetwell.services.alarms.service import AlarmKeeper
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
-from wetwell.services.detector.judge import StationJudge
-from wetwell.services.historian.core import Historian
-from wetwell.services.historian.folder_store import FolderStore
-from wetwell.services.presets import find_scenario, find_station
-from wetwell.services.settings import AlarmSettings
+from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.runtime.settings import AlarmSettings
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 HOUR_S = 3_600

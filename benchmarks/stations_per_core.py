@@ -15,16 +15,16 @@ from pathlib import Path
 
 from site_load import Played, messages_of, prepare
 
-from wetwell.protocols.memory_link import MemoryBus
-from wetwell.protocols.messages import Sample
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.protocols.station import load_station
-from wetwell.services.charts.bar_chart import bar_chart
+from wetwell.protocols.bus.memory_link import MemoryBus
+from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.station.station_file import load_station
 from wetwell.services.detector.checkpoint import Checkpoint
-from wetwell.services.detector.judge import StationJudge
-from wetwell.services.historian.core import Historian
-from wetwell.services.historian.folder_store import FolderStore
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.reports.charts.bar_chart import bar_chart
+from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
 STATIONS = 100

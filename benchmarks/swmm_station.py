@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.station import Station
+from wetwell.protocols.station.station_file import Station
 
 SECONDS_PER_HOUR = 3600.0
 INFLOW_STEP_S = 300

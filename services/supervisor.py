@@ -7,14 +7,14 @@ import os
 import sys
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 
+from wetwell.protocols.bus.interface import Bus, Subscription
+from wetwell.protocols.bus.keys import status_key, verdict_key
 from wetwell.protocols.errors import WetwellError
-from wetwell.protocols.keys import status_key, verdict_key
-from wetwell.protocols.link import Bus, Subscription
-from wetwell.protocols.messages import MessageError, Status, Verdict
-from wetwell.services.bus import listen
-from wetwell.services.daemon import PARENT_VARIABLE, stop_event, until
-from wetwell.services.health.board import BOARD, HealthBoard
-from wetwell.services.settings import Settings, environment_of
+from wetwell.protocols.messages.messages import MessageError, Status, Verdict
+from wetwell.services.runtime.connection import listen
+from wetwell.services.runtime.health.board import BOARD, HealthBoard
+from wetwell.services.runtime.lifecycle import PARENT_VARIABLE, stop_event, until
+from wetwell.services.runtime.settings import Settings, environment_of
 
 log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from wetwell.protocols.station import Control, EffectTable, Pump, Station
+from wetwell.protocols.station.station_file import Control, EffectTable, Pump, Station
 from wetwell.simulator.duty import check_operable
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.faults import FAULTS

@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
-from wetwell.simulator.channels import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.drive import turned_ratio
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
-from wetwell.simulator.sensors import delayed, sense
 from wetwell.simulator.supervision import drive, supervise
-from wetwell.simulator.telemetry import is_plain_telemetry, read_pumps, send, silence
+from wetwell.simulator.telemetry.channels import FIRST_PUMP, INFLOW, LEVEL
+from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_pumps, send, silence
+from wetwell.simulator.telemetry.sensors import delayed, sense
 from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h
 
 Floats = npt.NDArray[np.float64]

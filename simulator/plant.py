@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.station import Station
+from wetwell.protocols.station.station_file import Station
 from wetwell.simulator import layout as at
-from wetwell.simulator.channels import channels
 from wetwell.simulator.control import ROTATIONS
 from wetwell.simulator.kernel import advance
 from wetwell.simulator.power import hydraulic_power_kw
-from wetwell.simulator.sensors import MAX_DELAY_S, SensorParameters, followed_share, sensor_parameters
+from wetwell.simulator.telemetry.channels import channels
+from wetwell.simulator.telemetry.sensors import MAX_DELAY_S, SensorParameters, followed_share, sensor_parameters
 from wetwell.simulator.wet_well import level_at_volume_m, profile_of, volume_at_level_m3
 
 Floats = npt.NDArray[np.float64]

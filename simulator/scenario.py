@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from wetwell.protocols.messages import Stamp
-from wetwell.protocols.station import NAME_PATTERN, NonNegative, Positive, Table
+from wetwell.protocols.messages.messages import Stamp
+from wetwell.protocols.station.station_file import NAME_PATTERN, NonNegative, Positive, Table
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.inflow import Inflow
 from wetwell.simulator.inflow.empirical import EmpiricalInflow

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.station import Station, check_levels
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station, check_levels
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator import layout as at
-from wetwell.simulator.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.plant import Forcing, Plant, Record, healthy_forcing
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
+from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

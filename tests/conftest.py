@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from wetwell.protocols.station import Sensors, Station
-from wetwell.services.presets import find_station
+from wetwell.protocols.station.station_file import Sensors, Station
+from wetwell.services.stations import find_station
 
 # The first call of a kernel compiles it: a time limit for one example says nothing.
 settings.register_profile("wetwell", deadline=None)

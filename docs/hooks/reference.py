@@ -9,12 +9,12 @@ from typing import Any, Literal, get_args, get_origin
 import typer
 from pydantic import BaseModel
 
-import wetwell.protocols
-from wetwell.protocols.messages import Message
-from wetwell.protocols.registers import register_table
+import wetwell.protocols.messages
+from wetwell.protocols.messages.messages import Message
+from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.cli import app
-from wetwell.services.listing import part_table
-from wetwell.services.settings import Settings
+from wetwell.services.reports.part_tables import part_table
+from wetwell.services.runtime.settings import Settings
 from wetwell.simulator.effects import effect_table
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.inflow import INFLOWS
@@ -114,9 +114,9 @@ def _messages() -> str:
 
 
 def _message_models() -> Iterator[type[Message]]:
-    modules = sorted(name for _, name, _ in pkgutil.iter_modules(wetwell.protocols.__path__) if "messages" in name)
+    modules = sorted(name for _, name, _ in pkgutil.iter_modules(wetwell.protocols.messages.__path__))
     for name in sorted(modules, key=lambda name: (name != "messages", name)):
-        module = importlib.import_module(f"wetwell.protocols.{name}")
+        module = importlib.import_module(f"wetwell.protocols.messages.{name}")
         for model in vars(module).values():
             is_own = isinstance(model, type) and model.__module__ == module.__name__
             if is_own and issubclass(model, Message) and model is not Message:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.stamps import to_iso
+from wetwell.protocols.timestamps import to_iso
 
 log = logging.getLogger(__name__)
 

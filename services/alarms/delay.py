@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.timestamps import NS_PER_S
 
 MAX_STEP_S = 60.0
 """Most that the time between two looks counts, so that a clock that is set does not use up a delay.

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Iterable
 
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.timestamps import NS_PER_S
 
 WINDOW_S = 600
 DAY_S = 86_400

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from wetwell.protocols.alarm_messages import Priority
-from wetwell.protocols.messages import Verdict
+from wetwell.protocols.messages.alarm import Priority
+from wetwell.protocols.messages.messages import Verdict
 
 RuleName = Literal[
     "pump_fault",

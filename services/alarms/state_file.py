@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from wetwell.protocols.atomic_file import whole_file
 from wetwell.protocols.errors import RecordingError, first_fault
-from wetwell.protocols.whole_file import whole_file
-from wetwell.services.alarms.book import BookState
-from wetwell.services.kept_file import put_aside, read_kept
+from wetwell.services.alarms.registry import BookState
+from wetwell.services.runtime.state_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)
 

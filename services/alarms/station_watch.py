@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass, field
 
-from wetwell.protocols.keys import SITE
-from wetwell.protocols.messages import Sample, Status, Verdict
-from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
-from wetwell.services.alarms.book import AlarmBook
+from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.messages.messages import Sample, Status, Verdict
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.alarms.registry import AlarmBook
 from wetwell.services.alarms.rules import VERDICT_RULES, RuleName, verdict_advice, verdict_text
 
 KNOWN_VERDICTS = 200

@@ -13,7 +13,7 @@ from wetwell.services.commands.options import (
     run,
     settings_of,
 )
-from wetwell.services.settings import Settings
+from wetwell.services.runtime.settings import Settings
 
 app = typer.Typer(invoke_without_command=True)
 
@@ -36,8 +36,8 @@ def alarms(
     """Raise and clear the alarms of a site after ISA-18.2, and answer the acts of operators."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.services.alarms.serve import serve_alarms
-    from wetwell.services.presets import find_station
+    from wetwell.services.alarms.daemon import serve_alarms
+    from wetwell.services.stations import find_station
 
     settings = settings_of(config, zenoh)
     run(settings, serve_alarms(settings, [find_station(name) for name in station or []]))
@@ -51,8 +51,8 @@ def list_command(
     as_json: JsonOption = False,
 ) -> None:
     """List the alarms that are not normal, the most urgent first."""
-    from wetwell.services.alarms.asking import ask_alarms, list_alarms
-    from wetwell.services.alarms.listing import alarm_lines
+    from wetwell.services.alarms.client import ask_alarms, list_alarms
+    from wetwell.services.alarms.tables import alarm_lines
 
     found = asyncio.run(ask_alarms(settings_of(config, zenoh), lambda bus: list_alarms(bus, station)))
     if as_json:
@@ -64,9 +64,9 @@ def list_command(
 @app.command()
 def report(zenoh: ZenohOption = None, config: ConfigOption = None, as_json: JsonOption = False) -> None:
     """Print the alarm rates beside the targets of ISA-18.2, and the chattering and stale alarms."""
-    from wetwell.services.alarms.asking import ask_alarms
-    from wetwell.services.alarms.asking import report as ask_report
-    from wetwell.services.alarms.listing import report_lines
+    from wetwell.services.alarms.client import ask_alarms
+    from wetwell.services.alarms.client import report as ask_report
+    from wetwell.services.alarms.tables import report_lines
 
     answer = asyncio.run(ask_alarms(settings_of(config, zenoh), ask_report))
     if as_json:
@@ -117,7 +117,7 @@ _add_act("in_service", "Put an alarm into service again.")
 def _act(
     act: str, words: tuple[str, str, str, str], minutes: float | None, settings: Settings, *, as_json: bool
 ) -> None:
-    from wetwell.services.alarms.asking import ask_alarms, new_act, send_act
+    from wetwell.services.alarms.client import ask_alarms, new_act, send_act
 
     station, alarm, by, reason = words
     order = new_act(station, alarm, act, by, minutes, reason)

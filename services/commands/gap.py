@@ -47,7 +47,7 @@ def gap_trial(
     """Check the diagnosis on sealed recordings of other plants; run again to resume."""
     import shlex
 
-    from wetwell.services.executors import check_scheduler
+    from wetwell.services.batch.executors import check_scheduler
     from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds
     from wetwell.services.trial.result import brief
     from wetwell.services.trial.run import run_trial
@@ -97,22 +97,22 @@ def gap_diagnose(
     as_json: JsonOption = False,
 ) -> None:
     """Say where a recording departs from the simulator, which effect causes it, and how far that closes the gap."""
-    from wetwell.services.executors import check_scheduler
-    from wetwell.services.gap_terminal import gap_lines, progress_bar
-    from wetwell.services.presets import find_station
+    from wetwell.services.batch.executors import check_scheduler
+    from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
+    from wetwell.services.stations import find_station
 
     given = recording or []
     if not given and table is None:
         raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
     check_scheduler(scheduler)
     if len(given) > 1 or table is not None or scheduler is not None:
-        from wetwell.services.diagnoses import cases_of, diagnose_all
+        from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 
         cases = cases_of(station, given, table)
         processes = min(workers or os.cpu_count() or 1, max(len(cases), 1))
         result = diagnose_all(cases, out, processes, scheduler, only=only, without=without or ())
         return print_batch(result, as_json=as_json)
-    from wetwell.services.gap import diagnose_file
+    from wetwell.services.batch.gap import diagnose_file
 
     plant = find_station(station)
     with progress_bar("diagnosis") as progress:
@@ -132,7 +132,7 @@ def gap_replay(
     as_json: JsonOption = False,
 ) -> None:
     """Write what the simulator says for a recording, second by second."""
-    from wetwell.services.gap import replay_file
-    from wetwell.services.presets import find_station
+    from wetwell.services.batch.gap import replay_file
+    from wetwell.services.stations import find_station
 
     print_result(replay_file(find_station(station), recording, out, closed_loop=closed_loop), as_json=as_json)

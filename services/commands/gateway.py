@@ -33,7 +33,7 @@ def gateway(
     """Poll PLCs over Modbus TCP and publish their samples on Zenoh."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.protocols.device_map import check_stations, load_plcs
+    from wetwell.protocols.modbus.device_map import check_stations, load_plcs
     from wetwell.services.gateway.daemon import serve_gateway
 
     settings = settings_of(config, zenoh)
@@ -48,7 +48,7 @@ def gateway(
 @app.command()
 def check(file: FileArgument, as_json: JsonOption = False) -> None:
     """Check a file of PLCs, its maps and station files; show what would be read."""
-    from wetwell.protocols.device_map import load_plcs
+    from wetwell.protocols.modbus.device_map import load_plcs
     from wetwell.services.gateway.survey import described
 
     print_result({plc.station: described(plc) for plc in load_plcs(file)}, as_json=as_json)
@@ -57,7 +57,7 @@ def check(file: FileArgument, as_json: JsonOption = False) -> None:
 @app.command()
 def read(file: FileArgument, as_json: JsonOption = False) -> None:
     """Poll the PLCs of a file once and show values and words; exit code 1 if one does not answer."""
-    from wetwell.protocols.device_map import load_plcs
+    from wetwell.protocols.modbus.device_map import load_plcs
     from wetwell.services.gateway.survey import read_all
 
     results = asyncio.run(read_all(load_plcs(file)))

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.history_messages import LONGEST_NS
-from wetwell.protocols.stamps import from_iso
+from wetwell.protocols.messages.history import LONGEST_NS
+from wetwell.protocols.timestamps import from_iso
 from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
@@ -58,8 +58,8 @@ def history(
     as_json: JsonOption = False,
 ) -> None:
     """Ask a running historian for samples, verdicts, alarms or figures; `--kind stations` lists what it knows."""
-    from wetwell.protocols.keys import SITE
-    from wetwell.services.historian.questions import ask_history
+    from wetwell.protocols.bus.keys import SITE
+    from wetwell.services.historian.client import ask_history
     from wetwell.services.historian.tables import history_table
 
     if last is not None and (start is not None or end is not None):
@@ -91,7 +91,7 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Write a recording from the history; needs no running historian."""
-    from wetwell.services.historian.opening import open_store
+    from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import export_recording
 
     settings, span = with_history(settings_of(config), data), _span(start, end)
@@ -109,7 +109,7 @@ def import_(
     as_json: JsonOption = False,
 ) -> None:
     """Fill the history from a recording; what is there already stays as it is."""
-    from wetwell.services.historian.opening import open_store
+    from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import import_recording
 
     settings = with_history(settings_of(config), data)

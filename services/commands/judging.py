@@ -26,9 +26,9 @@ def detect(
     as_json: JsonOption = False,
 ) -> None:
     """Judge a recording with the streaming detector."""
-    from wetwell.protocols.recording import read_recording
-    from wetwell.services.batch import detect as judge
-    from wetwell.services.presets import find_station
+    from wetwell.protocols.recordings.recording import read_recording
+    from wetwell.services.batch.recordings import detect as judge
+    from wetwell.services.stations import find_station
 
     plant = find_station(station)
     rows = read_recording(recording)
@@ -64,9 +64,9 @@ def backtest(
     as_json: JsonOption = False,
 ) -> None:
     """Score verdicts against truth: ours, the paper's two methods and others; run again to resume."""
-    from wetwell.services.backtest import detector_names, overview, sources_of, write_backtest
-    from wetwell.services.executors import check_scheduler
-    from wetwell.services.presets import find_scenario, find_station
+    from wetwell.services.batch.backtest import detector_names, overview, sources_of, write_backtest
+    from wetwell.services.batch.executors import check_scheduler
+    from wetwell.services.stations import find_scenario, find_station
 
     check_scheduler(scheduler)
     names = detector_names(detectors)

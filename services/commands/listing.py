@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wetwell.services.commands.options import ConfigOption, JsonOption, StationOption, print_result
-from wetwell.services.settings import load_settings
+from wetwell.services.runtime.settings import load_settings
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -22,7 +22,7 @@ app.add_typer(config_app, name="config")
 @station_app.command("check")
 def station_check(file: Annotated[str, typer.Argument(help="Station file.")]) -> None:
     """Check a station file; says what is wrong with it, or nothing is."""
-    from wetwell.services.presets import find_station
+    from wetwell.services.stations import find_station
 
     typer.echo(f"{file}: station '{find_station(file).name}' is valid")
 
@@ -32,7 +32,7 @@ def station_show(
     file: Annotated[str, typer.Argument(help="Station file.")] = "alpha", as_json: JsonOption = False
 ) -> None:
     """Print the duty points of a station, for each pump alone and for all together."""
-    from wetwell.services.presets import find_station
+    from wetwell.services.stations import find_station
     from wetwell.simulator.duty import duty_table
 
     print_result(duty_table(find_station(file)), as_json=as_json)
@@ -57,8 +57,8 @@ def modbus_map(
     form: Annotated[Literal["csv"], typer.Option("--format", help="Form of the map.")] = "csv",  # noqa: ARG001
 ) -> None:
     """Print the register map of a station's Modbus server."""
-    from wetwell.protocols.registers import register_csv, register_table
-    from wetwell.services.presets import find_station
+    from wetwell.protocols.modbus.registers import register_csv, register_table
+    from wetwell.services.stations import find_station
 
     plant = find_station(station)
     typer.echo(register_csv(register_table(len(plant.pump), len(plant.control.start_levels_m))), nl=False)
@@ -67,7 +67,7 @@ def modbus_map(
 @app.command()
 def effects(*, as_json: JsonOption = False) -> None:
     """List the effects that a station file may name, with their parameters."""
-    from wetwell.services.terminal import effect_lines
+    from wetwell.services.reports.terminal import effect_lines
     from wetwell.simulator.effects import effect_table
 
     table = effect_table()
@@ -94,7 +94,7 @@ def inflows(*, as_json: JsonOption = False) -> None:
 
 
 def _print_parts(name: str, parts: Mapping[str, "type[BaseModel]"], *, as_json: bool) -> None:
-    from wetwell.services.listing import part_lines, part_table
+    from wetwell.services.reports.part_tables import part_lines, part_table
 
     rows = part_table(parts)
     if as_json:

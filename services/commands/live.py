@@ -26,7 +26,7 @@ from wetwell.services.commands.options import (
     settings_of,
     with_data,
 )
-from wetwell.services.settings import LogSettings, Settings
+from wetwell.services.runtime.settings import LogSettings, Settings
 
 app = typer.Typer()
 
@@ -52,8 +52,8 @@ def up(
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
     """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
+    from wetwell.services.reports.terminal import banner, line_printer
     from wetwell.services.supervisor import serve_all
-    from wetwell.services.terminal import banner, line_printer
 
     settings = settings_of(config, zenoh, modbus, word_order, page=page)
     if settings.log == LogSettings():
@@ -148,8 +148,8 @@ def detector(
     """Judge the samples of stations on Zenoh and publish verdicts."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.services.detector.serve import serve_detector
-    from wetwell.services.presets import find_stations
+    from wetwell.services.detector.daemon import serve_detector
+    from wetwell.services.stations import find_stations
 
     settings = settings_of(config, zenoh)
     run(settings, serve_detector(settings, find_stations(station or ["alpha"])))
@@ -166,8 +166,8 @@ def rebaseline(
     as_json: JsonOption = False,
 ) -> None:
     """Order a running detector to learn a pump anew, after a repair; what it knew is put aside."""
-    from wetwell.services.detector.orders import send_order
-    from wetwell.services.presets import find_station
+    from wetwell.services.detector.client import send_order
+    from wetwell.services.stations import find_station
 
     name = find_station(station).name
     settings = settings_of(config, zenoh)
@@ -197,9 +197,9 @@ def replay(
     config: ConfigOption = None,
 ) -> None:
     """Publish a recording on Zenoh as if it were live, then end."""
-    from wetwell.protocols.recording import read_recording
-    from wetwell.services.presets import find_station
-    from wetwell.services.replay import serve_replay
+    from wetwell.protocols.recordings.recording import read_recording
+    from wetwell.services.replay.daemon import serve_replay
+    from wetwell.services.stations import find_station
 
     settings = settings_of(config, zenoh)
     rows = read_recording(recording)
@@ -209,7 +209,7 @@ def replay(
 @app.command()
 def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
     """Run a Zenoh router, for sites that have none."""
-    from wetwell.services.router import serve_router
+    from wetwell.services.router.daemon import serve_router
 
     settings = settings_of(config, zenoh)
     run(settings, serve_router(settings))
@@ -218,7 +218,7 @@ def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
 def _serve_plant(
     settings: Settings, station: str, scenario: str, seed: int, speed: float | None, *, zenoh: bool, modbus: bool
 ) -> None:
-    from wetwell.services.simulator import serve_simulator
+    from wetwell.services.simulator.daemon import serve_simulator
 
     plant, speed = live_plant(station, scenario, seed, speed)
     run(settings, serve_simulator(settings, plant, speed, zenoh=zenoh, modbus=modbus))

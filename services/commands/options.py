@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.station import Table
-from wetwell.services.settings import HistorianSettings, Settings, load_settings
+from wetwell.protocols.station.station_file import Table
+from wetwell.services.runtime.settings import HistorianSettings, Settings, load_settings
 
 if TYPE_CHECKING:
     from wetwell.simulator.scenario import Scenario
@@ -122,7 +122,7 @@ def _address(flag: str, text: str, example: str) -> dict[str, Any]:
 
 def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":
     """Simulation of a scenario on a station that can run it."""
-    from wetwell.services.presets import find_station
+    from wetwell.services.stations import find_station
     from wetwell.simulator.simulation import Simulation
 
     try:
@@ -133,8 +133,8 @@ def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "S
 
 def live_plant(station: str, scenario: str, seed: int, speed: float | None) -> tuple["Simulation", float]:
     """Simulation and its speed; at the speed of life it starts now, else at a fixed date."""
-    from wetwell.services.clock import this_second_ns
-    from wetwell.services.presets import find_scenario
+    from wetwell.services.runtime.clock import this_second_ns
+    from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 
     plan = find_scenario(scenario)
@@ -151,9 +151,9 @@ def positive(value: float, flag: str) -> float:
 
 def run(settings: Settings, daemon: Coroutine[Any, Any, None]) -> None:
     """Run a service until it ends, with its logs on standard error and its health page if the settings ask for it."""
-    from wetwell.services.health.board import BOARD
-    from wetwell.services.health.page import health_page
-    from wetwell.services.logs import start_logging
+    from wetwell.services.runtime.health.board import BOARD
+    from wetwell.services.runtime.health.page import health_page
+    from wetwell.services.runtime.logs import start_logging
 
     start_logging(settings.log, service=sys.argv[1] if len(sys.argv) > 1 else "wetwell")
     with contextlib.closing(daemon), health_page(settings.health, BOARD):
@@ -162,8 +162,8 @@ def run(settings: Settings, daemon: Coroutine[Any, Any, None]) -> None:
 
 def print_result(result: dict[str, object], *, as_json: bool) -> None:
     """Print a result, for people or as JSON."""
-    from wetwell.services.terminal import as_json as to_json
-    from wetwell.services.terminal import as_lines
+    from wetwell.services.reports.terminal import as_json as to_json
+    from wetwell.services.reports.terminal import as_lines
 
     typer.echo(to_json(result) if as_json else as_lines(result))
 

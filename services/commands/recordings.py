@@ -34,8 +34,8 @@ def simulate(
     as_json: JsonOption = False,
 ) -> None:
     """Write a simulated recording, with truth columns."""
-    from wetwell.services.batch import simulate as write
-    from wetwell.services.presets import find_scenario
+    from wetwell.services.batch.recordings import simulate as write
+    from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 
     plant = plant_of(station, find_scenario(scenario), seed, DEFAULT_START_NS)
@@ -67,9 +67,9 @@ def dataset(
     as_json: JsonOption = False,
 ) -> None:
     """Make a balanced, labelled set of recordings over sampled stations and faults; run again to resume."""
-    from wetwell.services.dataset import check_dataset, make_dataset, plan_of
-    from wetwell.services.executors import check_scheduler
-    from wetwell.services.presets import find_station
+    from wetwell.services.batch.dataset import check_dataset, make_dataset, plan_of
+    from wetwell.services.batch.executors import check_scheduler
+    from wetwell.services.stations import find_station
 
     if (out is None) == (check is None):
         raise ConfigError("dataset: give either --out DIR or --check DIR")
@@ -90,8 +90,8 @@ def convert(
     as_json: JsonOption = False,
 ) -> None:
     """Turn a file of another origin into a recording."""
-    from wetwell.protocols.importers import IMPORTERS
-    from wetwell.protocols.recording import write_recording
+    from wetwell.protocols.recordings.importers import IMPORTERS
+    from wetwell.protocols.recordings.recording import write_recording
 
     recording = IMPORTERS[form](source)
     write_recording(recording, out)
@@ -108,7 +108,7 @@ def prepare(
     as_json: JsonOption = False,
 ) -> None:
     """Prepare a recording from the field: units, offsets, order, doubles; list its gaps."""
-    from wetwell.services.field_data import prepare_file
+    from wetwell.services.batch.field_data import prepare_file
 
     print_result(prepare_file(recording, preparation, out), as_json=as_json)
 
@@ -122,8 +122,8 @@ def calibrate(
     as_json: JsonOption = False,
 ) -> None:
     """Fit a station file to a recording, with intervals; says what the recording cannot tell."""
-    from wetwell.services.field_data import calibrate_file
-    from wetwell.services.presets import find_station
+    from wetwell.services.batch.field_data import calibrate_file
+    from wetwell.services.stations import find_station
 
     print_result(calibrate_file(find_station(station), recording, preparation, out), as_json=as_json)
 
@@ -142,8 +142,8 @@ def validate(
     as_json: JsonOption = False,
 ) -> None:
     """Run the simulator under the inflow of a recording and compare level, starts and run time."""
-    from wetwell.services.field_data import validate_file
-    from wetwell.services.presets import find_station
+    from wetwell.services.batch.field_data import validate_file
+    from wetwell.services.stations import find_station
 
     print_result(validate_file(find_station(station), recording, preparation, out, html), as_json=as_json)
 
@@ -151,8 +151,8 @@ def validate(
 @app.command()
 def kpi(recording: RecordingOption, as_json: JsonOption = False) -> None:
     """Print energy, starts, run time and volume of a recording, by day and in total."""
-    from wetwell.protocols.recording import read_recording
-    from wetwell.services.terminal import kpi_table
-    from wetwell.simulator.kpi import kpis
+    from wetwell.protocols.recordings.kpi import kpis
+    from wetwell.protocols.recordings.recording import read_recording
+    from wetwell.services.reports.terminal import kpi_table
 
     print_result(kpi_table(kpis(read_recording(recording)), with_hours=as_json), as_json=as_json)

@@ -7,8 +7,8 @@ import typer
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.options import ConfigOption, JsonOption, print_result
-from wetwell.services.settings import load_settings
-from wetwell.services.tokens import Role
+from wetwell.services.runtime.settings import load_settings
+from wetwell.services.security.tokens import Role
 
 app = typer.Typer(no_args_is_help=True, help="Tokens of people and programs that use the dashboard.")
 
@@ -28,7 +28,7 @@ def new(
     as_json: JsonOption = False,
 ) -> None:
     """Make a token and print it, this once."""
-    from wetwell.services.tokens import new_token
+    from wetwell.services.security.tokens import new_token
 
     path = _file(file, config)
     token = new_token(path, name, role)
@@ -41,7 +41,7 @@ def new(
 @app.command("list")
 def list_(file: FileOption = None, config: ConfigOption = None, *, as_json: JsonOption = False) -> None:
     """Print who holds a token."""
-    from wetwell.services.tokens import read_holders
+    from wetwell.services.security.tokens import read_holders
 
     holders = read_holders(_file(file, config))
     if as_json:
@@ -54,7 +54,7 @@ def list_(file: FileOption = None, config: ConfigOption = None, *, as_json: Json
 @app.command()
 def revoke(name: NameOption, file: FileOption = None, config: ConfigOption = None) -> None:
     """Take a token out of the file; it is refused from now on."""
-    from wetwell.services.tokens import revoke_token
+    from wetwell.services.security.tokens import revoke_token
 
     revoke_token(_file(file, config), name)
 

@@ -13,12 +13,12 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from wetwell.protocols.link import Bus
+from wetwell.protocols.bus.interface import Bus
 from wetwell.services.dashboard.assets import Asset, Assets
+from wetwell.services.dashboard.client import RefusalError, act_on_alarm, history, recording_pieces
+from wetwell.services.dashboard.event_streams import Hub
 from wetwell.services.dashboard.guard import Guard
-from wetwell.services.dashboard.hub import Hub
 from wetwell.services.dashboard.login import Login, holder_in
-from wetwell.services.dashboard.questions import RefusalError, act_on_alarm, history, recording_pieces
 from wetwell.services.dashboard.reports import find_report, report_names
 from wetwell.services.dashboard.site_view import SiteView
 

@@ -32,7 +32,7 @@ class Assets:
     def __init__(self) -> None:
         services = files("wetwell.services")
         contents = dict(_walk(services / "dashboard" / "static", ""))
-        contents["css/theme.css"] = (services / "theme.css").read_bytes()
+        contents["css/theme.css"] = (services / "reports" / "theme.css").read_bytes()
         digest = hashlib.sha256()
         for name, content in sorted(contents.items()):
             digest.update(name.encode() + b"\0" + content)

@@ -4,16 +4,16 @@ import asyncio
 import logging
 import socket
 
-from wetwell.protocols.keys import SITE
-from wetwell.services.bus import connect
-from wetwell.services.daemon import report_health, stop_event, until
+from wetwell.protocols.bus.keys import SITE
 from wetwell.services.dashboard.app import Desk, dashboard_app
+from wetwell.services.dashboard.event_streams import Hub
 from wetwell.services.dashboard.feed import Feed
-from wetwell.services.dashboard.hub import Hub
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
-from wetwell.services.exposure import check_exposure, is_loopback
-from wetwell.services.settings import Settings
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.settings import Settings
+from wetwell.services.security.exposure import check_exposure, is_loopback
 
 log = logging.getLogger(__name__)
 

@@ -5,7 +5,8 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
-from wetwell.protocols.keys import (
+from wetwell.protocols.bus.interface import Bus, Subscription
+from wetwell.protocols.bus.keys import (
     alarm_key,
     alive_key,
     model_key,
@@ -14,11 +15,10 @@ from wetwell.protocols.keys import (
     status_key,
     verdict_key,
 )
-from wetwell.protocols.link import Bus, Subscription
-from wetwell.services.daemon import ticks
-from wetwell.services.dashboard.hub import Hub
-from wetwell.services.dashboard.past import Past
+from wetwell.services.dashboard.backfill import Past
+from wetwell.services.dashboard.event_streams import Hub
 from wetwell.services.dashboard.site_view import SiteView
+from wetwell.services.runtime.lifecycle import ticks
 
 log = logging.getLogger(__name__)
 

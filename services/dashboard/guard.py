@@ -10,8 +10,8 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.exposure import is_loopback
-from wetwell.services.tokens import Holder, holder_of
+from wetwell.services.security.exposure import is_loopback
+from wetwell.services.security.tokens import Holder, holder_of
 
 COOKIE = "wetwell_token"
 PAGE_POLICY = (

@@ -7,7 +7,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from wetwell.services.dashboard.guard import COOKIE
-from wetwell.services.tokens import Holder, holder_of
+from wetwell.services.security.tokens import Holder, holder_of
 
 KEPT_S = 30 * 24 * 3600
 

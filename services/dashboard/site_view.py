@@ -5,12 +5,12 @@ import logging
 from collections import Counter
 from typing import Any, TypeVar
 
-from wetwell.protocols.alarm_messages import Alarm
-from wetwell.protocols.keys import SITE
-from wetwell.protocols.link import Presence
-from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
-from wetwell.protocols.model_messages import Model
-from wetwell.protocols.sample_block import SampleBlock
+from wetwell.protocols.bus.interface import Presence
+from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.model import Model
+from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.dashboard.station_view import StationView
 
 log = logging.getLogger(__name__)

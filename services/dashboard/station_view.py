@@ -4,10 +4,10 @@ import json
 from collections import deque
 from typing import Any
 
-from wetwell.protocols.alarm_messages import Alarm
-from wetwell.protocols.messages import Sample, State, Status, Verdict
-from wetwell.protocols.model_messages import Model
-from wetwell.services.dashboard.rows import NS_PER_MS, live_figures, sample_row, thinned
+from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.messages import Sample, State, Status, Verdict
+from wetwell.protocols.messages.model import Model
+from wetwell.services.dashboard.sample_row import NS_PER_MS, live_figures, sample_row, thinned
 
 ROWS_A_FRAME = 8
 """Most samples for each frame since the last with some: a station that runs faster than life is drawn in steps."""

@@ -9,7 +9,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from wetwell.protocols.errors import LinkError
-from wetwell.services.dashboard.hub import Hub
+from wetwell.services.dashboard.event_streams import Hub
 
 SHUTDOWN_S = 2
 

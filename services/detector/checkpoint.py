@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from wetwell.detector.pipeline import Detector
-from wetwell.detector.snapshot import SnapshotError
+from wetwell.detector.detector import Detector
+from wetwell.detector.snapshot.codec import SnapshotError
+from wetwell.protocols.atomic_file import whole_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.messages import Verdict
-from wetwell.protocols.whole_file import whole_file
-from wetwell.services.kept_file import put_aside, read_kept
+from wetwell.protocols.messages.messages import Verdict
+from wetwell.services.runtime.state_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)
 

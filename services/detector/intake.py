@@ -5,13 +5,13 @@ import contextlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
-from wetwell.protocols.history_messages import LONGEST_NS
-from wetwell.protocols.keys import order_key, sample_block_key, sample_key
-from wetwell.protocols.link import Bus
-from wetwell.protocols.messages import MessageError, Sample
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.services.detector.catch_up import missed_samples
-from wetwell.services.detector.judge import StationJudge
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import order_key, sample_block_key, sample_key
+from wetwell.protocols.messages.history import LONGEST_NS
+from wetwell.protocols.messages.messages import MessageError, Sample
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.services.detector.backfill import missed_samples
+from wetwell.services.detector.station_detector import StationJudge
 
 SAMPLE_HISTORY = 600
 CAPACITY = 1_000_000

@@ -5,10 +5,10 @@ import logging
 import mmap
 from pathlib import Path
 
+from wetwell.protocols.atomic_file import whole_file
 from wetwell.protocols.errors import ConfigError, RecordingError
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.whole_file import whole_file
-from wetwell.services.clock import now_ns
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.runtime.clock import now_ns
 
 log = logging.getLogger(__name__)
 

@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from wetwell.protocols.keys import SITE
-from wetwell.protocols.messages import Sample, Status
-from wetwell.protocols.stamps import NS_PER_S, to_iso
+from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.messages.messages import Sample, Status
+from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.services.doctor.finding import Finding, Level
 from wetwell.services.doctor.survey import Survey
-from wetwell.services.health.board import figure_faults
+from wetwell.services.runtime.health.board import figure_faults
 
 MAX_SKEW_S = 60.0
 LEAST_STRETCH_S = 1.0

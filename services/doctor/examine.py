@@ -8,13 +8,13 @@ from importlib.metadata import version
 from pathlib import Path
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.station import Station
-from wetwell.services.bus import connect
+from wetwell.protocols.station.station_file import Station
 from wetwell.services.doctor.checks import LEAST_FREE_BYTES, findings_of
 from wetwell.services.doctor.finding import Finding
 from wetwell.services.doctor.survey import listen
-from wetwell.services.presets import find_station
-from wetwell.services.settings import ModbusSettings, Settings, load_settings
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.settings import ModbusSettings, Settings, load_settings
+from wetwell.services.stations import find_station
 
 ROUTER_S = 5.0
 MODBUS_S = 3.0

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from wetwell.protocols.alarm_messages import AlarmReport
-from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.keys import (
+from wetwell.protocols.bus.interface import Bus, Presence, Subscription
+from wetwell.protocols.bus.keys import (
     SITE,
     alarm_report_key,
     alive_key,
@@ -18,11 +17,12 @@ from wetwell.protocols.keys import (
     status_key,
     verdict_key,
 )
-from wetwell.protocols.link import Bus, Presence, Subscription
-from wetwell.protocols.messages import Message, MessageError, Sample, Status, Verdict
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.services.clock import now_ns
+from wetwell.protocols.messages.alarm import AlarmReport
+from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.runtime.clock import now_ns
 
 T = TypeVar("T")
 M = TypeVar("M", bound=Message)

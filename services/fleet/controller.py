@@ -11,18 +11,18 @@ from typing import Any
 
 from distributed import Client, Future, LocalCluster, fire_and_forget
 
+from wetwell.protocols.bus.interface import Bus, Publisher
+from wetwell.protocols.bus.keys import SITE, plan_key
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.fleet_messages import Plan
-from wetwell.protocols.keys import SITE, plan_key
-from wetwell.protocols.link import Bus, Publisher
-from wetwell.protocols.station import Station
-from wetwell.services.bus import connect
-from wetwell.services.clock import now_ns
-from wetwell.services.daemon import report_health, stop_event, ticks, until
+from wetwell.protocols.messages.fleet import Plan
+from wetwell.protocols.station.station_file import Station
 from wetwell.services.fleet.inventory import Inventory
 from wetwell.services.fleet.placement import moves, shard_of
 from wetwell.services.fleet.shard import run_shard
-from wetwell.services.settings import Settings
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.lifecycle import report_health, stop_event, ticks, until
+from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
 

@@ -5,8 +5,8 @@ import logging
 from pathlib import Path
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.station import Station
-from wetwell.services.presets import find_station
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.stations import find_station
 
 log = logging.getLogger(__name__)
 

@@ -6,15 +6,15 @@ import logging
 
 from distributed import secede
 
-from wetwell.protocols.fleet_messages import Plan
-from wetwell.protocols.keys import SITE, plan_key
-from wetwell.protocols.link import Bus, Subscription
-from wetwell.protocols.messages import MessageError
-from wetwell.services.bus import connect
-from wetwell.services.daemon import report_health
-from wetwell.services.detector.serve import judge_all
-from wetwell.services.logs import start_logging
-from wetwell.services.settings import Settings
+from wetwell.protocols.bus.interface import Bus, Subscription
+from wetwell.protocols.bus.keys import SITE, plan_key
+from wetwell.protocols.messages.fleet import Plan
+from wetwell.protocols.messages.messages import MessageError
+from wetwell.services.detector.daemon import judge_all
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.lifecycle import report_health
+from wetwell.services.runtime.logs import start_logging
+from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
 

@@ -6,14 +6,14 @@ import logging
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any
 
-from wetwell.protocols.device_map import Plc
-from wetwell.protocols.keys import SITE
-from wetwell.protocols.link import Bus
-from wetwell.services.bus import connect
-from wetwell.services.daemon import report_health, stop_event, until
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.modbus.device_map import Plc
 from wetwell.services.gateway.poller import PlcPoller
-from wetwell.services.sample_sender import SampleSender
-from wetwell.services.settings import Settings
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.sample_sender import SampleSender
+from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
 

@@ -4,11 +4,11 @@ import logging
 from collections import Counter, deque
 from collections.abc import Mapping
 
-from wetwell.protocols.device_map import Plc
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages import PumpReading, Quality, Sample, ServiceState
-from wetwell.protocols.modbus_client import NoAnswerError, RefusedError, WrongAnswerError
-from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.protocols.messages.messages import PumpReading, Quality, Sample, ServiceState
+from wetwell.protocols.modbus.client import NoAnswerError, RefusedError, WrongAnswerError
+from wetwell.protocols.modbus.device_map import Plc
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.gateway.poll import Poll
 
 log = logging.getLogger(__name__)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from wetwell.protocols.block_reads import Block, halves
-from wetwell.protocols.device_map import Plc
-from wetwell.protocols.modbus_client import ModbusConnection, RefusedError
+from wetwell.protocols.modbus.block_reads import Block, halves
+from wetwell.protocols.modbus.client import ModbusConnection, RefusedError
+from wetwell.protocols.modbus.device_map import Plc
 from wetwell.protocols.units import house_unit
 
 _ABSENT_CODES = frozenset({5, 6, 10, 11})

@@ -4,15 +4,15 @@ import asyncio
 import random
 from collections.abc import Callable
 
-from wetwell.protocols.block_reads import plan_blocks
-from wetwell.protocols.device_map import Plc
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages import Sample, ServiceState
-from wetwell.protocols.modbus_client import ModbusConnection, RefusedError
-from wetwell.services.clock import now_ns
-from wetwell.services.daemon import ticks
+from wetwell.protocols.messages.messages import Sample, ServiceState
+from wetwell.protocols.modbus.block_reads import plan_blocks
+from wetwell.protocols.modbus.client import ModbusConnection, RefusedError
+from wetwell.protocols.modbus.device_map import Plc
 from wetwell.services.gateway.feed import StationFeed
 from wetwell.services.gateway.poll import poll_once
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.lifecycle import ticks
 
 FIRST_WAIT_S = 1.0
 """Upper limit of the random wait before a connection is made anew; it doubles with each one that brings no poll."""

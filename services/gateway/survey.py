@@ -3,10 +3,10 @@
 import asyncio
 from collections.abc import Sequence
 
-from wetwell.protocols.block_reads import plan_blocks
-from wetwell.protocols.device_map import Plc
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.protocols.modbus.block_reads import plan_blocks
+from wetwell.protocols.modbus.device_map import Plc
+from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
 from wetwell.protocols.units import house_unit
 from wetwell.services.gateway.poll import poll_once
 from wetwell.services.gateway.poller import connection_to

@@ -4,14 +4,14 @@ import asyncio
 import contextlib
 import logging
 
-from wetwell.protocols.keys import ROOT, SITE, alarm_key, history_key, sample_block_key, sample_key, verdict_key
-from wetwell.protocols.link import Bus, Request, Subscription
-from wetwell.services.bus import connect
-from wetwell.services.clock import now_ns
-from wetwell.services.daemon import report_health, stop_event, until
-from wetwell.services.historian.core import Historian, PayloadKind
-from wetwell.services.historian.opening import open_store
-from wetwell.services.settings import Settings
+from wetwell.protocols.bus.interface import Bus, Request, Subscription
+from wetwell.protocols.bus.keys import ROOT, SITE, alarm_key, history_key, sample_block_key, sample_key, verdict_key
+from wetwell.services.historian.service import Historian, PayloadKind
+from wetwell.services.historian.store.opening import open_store
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wetwell.protocols.recordings.kpi import kpis
 from wetwell.services.historian.rows import HOUR_NS, Floats, Integers
 from wetwell.services.historian.samples import Samples
-from wetwell.simulator.kpi import kpis
 
 STATION_FIGURES = ("known_h",)
 PUMP_FIGURES = ("energy_kwh", "volume_m3", "run_h", "starts")

@@ -10,10 +10,10 @@ from typing import NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.messages import Quality
-from wetwell.protocols.readings import Readings
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.messages.messages import Quality
+from wetwell.protocols.messages.readings import Readings
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.timestamps import NS_PER_S
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
+from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
 from wetwell.services.historian.rows import Floats, Integers, PackedSamples, SampleRow, pack_arrays, unpack
 
 

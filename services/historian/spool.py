@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from wetwell.services.historian.rows import SampleRow
-from wetwell.services.historian.store import EventRow
+from wetwell.services.historian.store.interface import EventRow
 
 Row = SampleRow | EventRow
 

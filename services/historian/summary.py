@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.rows import Floats, Integers
 from wetwell.services.historian.samples import Samples, columns_of
 

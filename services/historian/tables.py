@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from wetwell.protocols.history_messages import History
-from wetwell.protocols.stamps import to_iso
+from wetwell.protocols.messages.history import History
+from wetwell.protocols.timestamps import to_iso
 
 _SHOWN = {
     "verdicts": ("time", "pump", "state"),

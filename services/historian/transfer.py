@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from wetwell.protocols.errors import ConfigError, RecordingError
-from wetwell.protocols.history_messages import LONGEST_NS
-from wetwell.protocols.recording import read_recording, recording_writer
-from wetwell.protocols.station import NAME_PATTERN
+from wetwell.protocols.messages.history import LONGEST_NS
+from wetwell.protocols.recordings.recording import read_recording, recording_writer
+from wetwell.protocols.station.station_file import NAME_PATTERN
 from wetwell.services.historian.samples import Samples
-from wetwell.services.historian.store import DAY_NS, Batch, Store, blocks
+from wetwell.services.historian.store.interface import DAY_NS, Batch, Store, blocks
 
 
 def export_recording(store: Store, station: str, start_ns: int, end_ns: int, path: Path) -> int:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from wetwell.protocols.errors import WetwellError
-from wetwell.protocols.recording import Recording
-from wetwell.services.swmm_plant import run_swmm
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.services.trial.swmm_plant import run_swmm
 from wetwell.sim2real.trial.cases import PlantName, TrialCase
 from wetwell.sim2real.truth import truth_plant
 from wetwell.sim2real.truth.case import TruthCase

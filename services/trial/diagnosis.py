@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.services.executors import let_interrupts
+from wetwell.services.batch.executors import let_interrupts
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.sealed_case import RECORDING_FILE, STATION_FILE
 from wetwell.sim2real.trial.answer import Answer, answer_of

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wetwell.services.charts import Section, bar_chart, heat_map, page, paragraph, table
+from wetwell.services.reports.charts import Section, bar_chart, heat_map, page, paragraph, table
 
 SHARES = ("verdict_right", "top_1", "top_2", "component_right", "false_attribution", "interval_coverage")
 

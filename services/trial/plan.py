@@ -8,8 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from wetwell.protocols.atomic_file import whole_file
 from wetwell.protocols.errors import ConfigError, RecordingError
-from wetwell.protocols.whole_file import whole_file
 from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
 
 SCHEMA = "wetwell.trial/2"

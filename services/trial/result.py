@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.protocols.whole_file import whole_file
-from wetwell.services.parallel import Failure
+from wetwell.protocols.atomic_file import whole_file
+from wetwell.services.batch.parallel import Failure
 from wetwell.services.trial.diagnosis import RECALIBRATED, REPORTS, WHOLE_LIBRARY, answer_in
-from wetwell.services.trial.held_out import held_out_summary
+from wetwell.services.trial.holdout import held_out_summary
 from wetwell.services.trial.page import trial_page
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.sealed_case import open_case

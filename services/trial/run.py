@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wetwell.services.parallel import Failure, refuse_if_all, work_through
+from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.trial.diagnosis import (
     RECALIBRATED,
     REPORTS,
@@ -16,7 +16,7 @@ from wetwell.services.trial.diagnosis import (
     diagnose,
     is_diagnosed,
 )
-from wetwell.services.trial.held_out import hold_out
+from wetwell.services.trial.holdout import hold_out
 from wetwell.services.trial.plan import TrialPlan, take_folder
 from wetwell.services.trial.result import score_trial
 from wetwell.services.trial.sealed_case import is_published, open_case, publish

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import tomli_w
 
+from wetwell.protocols.atomic_file import whole_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.recording import write_recording
-from wetwell.protocols.whole_file import whole_file
+from wetwell.protocols.recordings.recording import write_recording
 from wetwell.services.trial.acting_case import acting_case
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.scores import Label

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.recording import Recording
+from wetwell.protocols.recordings.recording import Recording
 
 Floats = npt.NDArray[np.float64]
 

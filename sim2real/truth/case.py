@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wetwell.protocols.station import Station
+from wetwell.protocols.station.station_file import Station
 
 FaultKind = Literal[
     "blockage", "clogging", "static_rise", "sensor_stuck", "sensor_bias", "sensor_drift", "sensor_gap"

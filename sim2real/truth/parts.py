@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.protocols.station import Station
+from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.truth.case import Quantity
 from wetwell.sim2real.truth.spec import Floats, Spec, Surroundings, duty_m3h
 from wetwell.sim2real.truth.telemetry import Telemetry

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wetwell.protocols.station import Station
+from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.truth.case import Deviation, FaultKind, Quantity, TrueInflow, TruthCase, TruthFault
 from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.kernel import LEVEL

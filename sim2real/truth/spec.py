@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.station import Station
+from wetwell.protocols.station.station_file import Station
 
 Floats = npt.NDArray[np.float64]
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.station import Sensors
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Sensors
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.truth import kernel
 from wetwell.sim2real.truth.case import Quantity, TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS

@@ -5,33 +5,33 @@ from typing import Annotated, Any, get_args
 from pydantic import Field, TypeAdapter, ValidationError
 
 from wetwell.protocols.errors import first_fault
-from wetwell.protocols.station import Station
-from wetwell.simulator.effects.air_pocket import AirPocket
-from wetwell.simulator.effects.channel_delay import ChannelDelay
-from wetwell.simulator.effects.check_valve_leak import CheckValveLeak
-from wetwell.simulator.effects.common_header import CommonHeader
-from wetwell.simulator.effects.control_delay import ControlDelay
+from wetwell.protocols.station.station_file import Station
+from wetwell.simulator.effects.controller.control_delay import ControlDelay
+from wetwell.simulator.effects.controller.threshold_shift import ThresholdShift
+from wetwell.simulator.effects.drive.load_dependent_power import LoadDependentPower
+from wetwell.simulator.effects.drive.motor_slip import MotorSlip
+from wetwell.simulator.effects.drive.ramp_shape import RampShape
+from wetwell.simulator.effects.drive.supply_voltage_variation import SupplyVoltageVariation
 from wetwell.simulator.effects.effect import Effect
-from wetwell.simulator.effects.flow_low_cutoff import FlowLowCutoff
-from wetwell.simulator.effects.flow_meter_gain import FlowMeterGain
-from wetwell.simulator.effects.flow_meter_lag import FlowMeterLag
-from wetwell.simulator.effects.friction_bias import FrictionBias
-from wetwell.simulator.effects.head_sensor_offset import HeadSensorOffset
-from wetwell.simulator.effects.level_dependent_static_head import LevelDependentStaticHead
-from wetwell.simulator.effects.level_quantisation import LevelQuantisation
-from wetwell.simulator.effects.level_sensor_lag import LevelSensorLag
-from wetwell.simulator.effects.load_dependent_power import LoadDependentPower
-from wetwell.simulator.effects.motor_slip import MotorSlip
-from wetwell.simulator.effects.pump_wear import PumpWear
-from wetwell.simulator.effects.ragging import Ragging
-from wetwell.simulator.effects.ramp_shape import RampShape
-from wetwell.simulator.effects.report_by_exception import ReportByException
-from wetwell.simulator.effects.static_head_bias import StaticHeadBias
-from wetwell.simulator.effects.sump_area_profile import SumpAreaProfile
-from wetwell.simulator.effects.supply_voltage_variation import SupplyVoltageVariation
-from wetwell.simulator.effects.threshold_shift import ThresholdShift
-from wetwell.simulator.effects.unmetered_inflow import UnmeteredInflow
-from wetwell.simulator.effects.water_inertia import WaterInertia
+from wetwell.simulator.effects.pump.check_valve_leak import CheckValveLeak
+from wetwell.simulator.effects.pump.pump_wear import PumpWear
+from wetwell.simulator.effects.pump.ragging import Ragging
+from wetwell.simulator.effects.rising_main.air_pocket import AirPocket
+from wetwell.simulator.effects.rising_main.common_header import CommonHeader
+from wetwell.simulator.effects.rising_main.friction_bias import FrictionBias
+from wetwell.simulator.effects.rising_main.level_dependent_static_head import LevelDependentStaticHead
+from wetwell.simulator.effects.rising_main.static_head_bias import StaticHeadBias
+from wetwell.simulator.effects.rising_main.water_inertia import WaterInertia
+from wetwell.simulator.effects.telemetry.channel_delay import ChannelDelay
+from wetwell.simulator.effects.telemetry.flow_low_cutoff import FlowLowCutoff
+from wetwell.simulator.effects.telemetry.flow_meter_gain import FlowMeterGain
+from wetwell.simulator.effects.telemetry.flow_meter_lag import FlowMeterLag
+from wetwell.simulator.effects.telemetry.head_sensor_offset import HeadSensorOffset
+from wetwell.simulator.effects.telemetry.level_quantisation import LevelQuantisation
+from wetwell.simulator.effects.telemetry.level_sensor_lag import LevelSensorLag
+from wetwell.simulator.effects.telemetry.report_by_exception import ReportByException
+from wetwell.simulator.effects.wet_well.sump_area_profile import SumpAreaProfile
+from wetwell.simulator.effects.wet_well.unmetered_inflow import UnmeteredInflow
 from wetwell.simulator.plant import PlantParameters, plant_parameters
 
 AnyEffect = Annotated[

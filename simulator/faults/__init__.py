@@ -4,20 +4,20 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
-from wetwell.simulator.faults.air_pocket import AirPocket
-from wetwell.simulator.faults.blockage import Blockage
-from wetwell.simulator.faults.check_valve_leak import CheckValveLeak
-from wetwell.simulator.faults.drive_trip import DriveTrip
-from wetwell.simulator.faults.frozen_plc import FrozenPlc
-from wetwell.simulator.faults.impeller_wear import ImpellerWear
-from wetwell.simulator.faults.partly_closed_valve import PartlyClosedValve
-from wetwell.simulator.faults.pipe_clogging import PipeClogging
-from wetwell.simulator.faults.ragging import Ragging
-from wetwell.simulator.faults.sensor_bias import SensorBias
-from wetwell.simulator.faults.sensor_drift import SensorDrift
-from wetwell.simulator.faults.sensor_noise import SensorNoise
-from wetwell.simulator.faults.sensor_stuck import SensorStuck
-from wetwell.simulator.faults.wear_ring_leakage import WearRingLeakage
+from wetwell.simulator.faults.pump.blockage import Blockage
+from wetwell.simulator.faults.pump.check_valve_leak import CheckValveLeak
+from wetwell.simulator.faults.pump.drive_trip import DriveTrip
+from wetwell.simulator.faults.pump.impeller_wear import ImpellerWear
+from wetwell.simulator.faults.pump.ragging import Ragging
+from wetwell.simulator.faults.pump.wear_ring_leakage import WearRingLeakage
+from wetwell.simulator.faults.rising_main.air_pocket import AirPocket
+from wetwell.simulator.faults.rising_main.partly_closed_valve import PartlyClosedValve
+from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
+from wetwell.simulator.faults.telemetry.frozen_plc import FrozenPlc
+from wetwell.simulator.faults.telemetry.sensor_bias import SensorBias
+from wetwell.simulator.faults.telemetry.sensor_drift import SensorDrift
+from wetwell.simulator.faults.telemetry.sensor_noise import SensorNoise
+from wetwell.simulator.faults.telemetry.sensor_stuck import SensorStuck
 
 Fault = Annotated[
     Blockage

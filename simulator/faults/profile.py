@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from wetwell.protocols.station import NonNegative, Positive, Table
-from wetwell.simulator.channels import Quantity, channels_of
+from wetwell.protocols.station.station_file import NonNegative, Positive, Table
 from wetwell.simulator.plant import Forcing
+from wetwell.simulator.telemetry.channels import Quantity, channels_of
 
 Floats = npt.NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from wetwell.protocols.jit import compiled
-from wetwell.protocols.station import NonNegative, Positive, Table
+from wetwell.protocols.station.station_file import NonNegative, Positive, Table
 from wetwell.simulator.inflow.stream import Floats
 
 HOURS = (

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from wetwell.protocols.station import NonNegative, Table
+from wetwell.protocols.station.station_file import NonNegative, Table
 from wetwell.simulator.inflow.stream import Floats
 from wetwell.simulator.inflow.surges import Surges, SurgeStream
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, PlainSerializer, model_validator
 
-from wetwell.protocols.station import Table
+from wetwell.protocols.station.station_file import Table
 from wetwell.simulator.inflow.stream import Floats
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from wetwell.protocols.station import NonNegative, Table
+from wetwell.protocols.station.station_file import NonNegative, Table
 from wetwell.simulator.inflow.stream import Floats
 
 

@@ -10,9 +10,9 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from playwright.sync_api import expect
 
-from wetwell.protocols.recording import read_recording
-from wetwell.protocols.stamps import from_iso
-from wetwell.services.tokens import new_token
+from wetwell.protocols.recordings.recording import read_recording
+from wetwell.protocols.timestamps import from_iso
+from wetwell.services.security.tokens import new_token
 
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 SLOW_MS = 30_000
@@ -61,7 +61,7 @@ def test_a_blockage_turns_the_right_pump_red_and_tells_why(site, open_page, scre
     page = open_page(f"{site.url}/station/alpha?pump=2")
     expect(page.locator('.pump[data-state="pump_fault"] .name')).to_have_text(["Pump 2"], timeout=60_000)
     pump = page.locator('.pump[data-state="pump_fault"]')
-    theme = (files("wetwell.services") / "theme.css").read_text(encoding="utf-8")
+    theme = (files("wetwell.services") / "reports" / "theme.css").read_text(encoding="utf-8")
     red = re.search(r"--urgent: light-dark\(#(\w{6})", theme)[1]
     colour = pump.locator("circle").evaluate("node => getComputedStyle(node).stroke")
     assert colour == f"rgb({int(red[:2], 16)}, {int(red[2:4], 16)}, {int(red[4:], 16)})"

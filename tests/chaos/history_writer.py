@@ -7,11 +7,11 @@ import itertools
 import sys
 from pathlib import Path
 
-from wetwell.protocols.messages import PumpReading, Sample
-from wetwell.protocols.sample_block import SampleBlock
-from wetwell.services.historian.core import Historian
-from wetwell.services.historian.folder_store import FolderStore
-from wetwell.services.historian.store import DAY_NS
+from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import DAY_NS
 
 STEP_NS = DAY_NS // 200
 

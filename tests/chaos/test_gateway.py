@@ -11,11 +11,11 @@ from itertools import pairwise
 
 import pytest
 
-from wetwell.protocols.device_map import Device, Plc
-from wetwell.protocols.device_signal import Signal
-from wetwell.protocols.keys import sample_key, status_key
-from wetwell.protocols.memory_link import MemoryBus
-from wetwell.protocols.messages import Sample, Status
+from wetwell.protocols.bus.keys import sample_key, status_key
+from wetwell.protocols.bus.memory_link import MemoryBus
+from wetwell.protocols.messages.messages import Sample, Status
+from wetwell.protocols.modbus.device_map import Device, Plc
+from wetwell.protocols.modbus.device_signal import Signal
 from wetwell.services.gateway.daemon import poll_all
 from wetwell.services.gateway.poller import connection_to
 

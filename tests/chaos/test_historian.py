@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wetwell.protocols.history_messages import History, HistoryQuery
-from wetwell.protocols.keys import history_key, sample_key
-from wetwell.protocols.messages import PumpReading, Sample
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.zenoh_link import open_router
-from wetwell.services.historian.core import Historian
-from wetwell.services.historian.folder_store import FolderStore
-from wetwell.services.historian.live_database import LiveDatabase
-from wetwell.services.historian.postgres_store import PostgresStore
-from wetwell.services.historian.store import DAY_NS, Store, blocks
+from wetwell.protocols.bus.keys import history_key, sample_key
+from wetwell.protocols.bus.zenoh.link import open_router
+from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import DAY_NS, Store, blocks
+from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.postgres_store import PostgresStore
 
 WRITER = Path(__file__).with_name("history_writer.py")
 NOW_NS = 10**18
@@ -115,7 +115,7 @@ def test_a_historian_that_was_killed_gets_what_it_missed_from_the_publishers(tmp
 UPGRADER = """
 import contextlib, os, signal, sqlite3, sys
 from pathlib import Path
-from wetwell.services.historian.live_database import LiveDatabase
+from wetwell.services.historian.store.live_database import LiveDatabase
 
 class Killed(sqlite3.Connection):
     def __init__(self, *arguments, **named):

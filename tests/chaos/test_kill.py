@@ -11,13 +11,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import SITE, alive_key
-from wetwell.protocols.messages import Sample, Verdict
-from wetwell.protocols.stamps import MAX_STAMP_NS
-from wetwell.protocols.zenoh_link import connect_client
-from wetwell.services.historian.folder_store import FolderStore
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.protocols.bus.keys import SITE, alive_key
+from wetwell.protocols.bus.zenoh.link import connect_client
+from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.timestamps import MAX_STAMP_NS
+from wetwell.services.historian.store.folder_store import FolderStore
 
 SPEED = 15
 """Seconds of the station in one on the wall: the publishers' caches reach back 40 s."""

@@ -15,14 +15,14 @@ from functools import partial
 
 from routers import Router, free_address
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import sample_key, verdict_key
-from wetwell.protocols.link import Subscription
-from wetwell.protocols.messages import Sample, Verdict
-from wetwell.protocols.zenoh_link import ZenohBus, connect_client
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.protocols.bus.interface import Subscription
+from wetwell.protocols.bus.keys import sample_key, verdict_key
+from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
+from wetwell.protocols.messages.messages import Sample, Verdict
 from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
-from wetwell.services.detector.judge import StationJudge
+from wetwell.services.detector.station_detector import StationJudge
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 

@@ -8,8 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.station import EffectTable, Station, load_station
-from wetwell.services.presets import find_station
+from wetwell.protocols.station.station_file import EffectTable, Station, load_station
+from wetwell.services.stations import find_station
 from wetwell.simulator.effects import EFFECTS, effect_table, effective_parameters, effects_of
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
@@ -82,7 +82,8 @@ def test_registry_holds_the_library():
 @every_effect
 def test_name_is_the_registry_key_and_the_file(name, effect):
     assert made(effect, 0.25).name == name
-    assert effect.__module__ == f"wetwell.simulator.effects.{name}"
+    assert effect.__module__.startswith("wetwell.simulator.effects.")
+    assert effect.__module__.rpartition(".")[2] == name
 
 
 @every_effect

@@ -17,11 +17,11 @@ import typer
 import yaml
 from distributed.cli import dask_scheduler, dask_worker
 
-from wetwell.protocols.access import load_access
+from wetwell.protocols.bus.roles import load_access
 from wetwell.services.cli import app
-from wetwell.services.presets import find_station
-from wetwell.services.settings import load_settings
-from wetwell.services.tokens import holder_of
+from wetwell.services.runtime.settings import load_settings
+from wetwell.services.security.tokens import holder_of
+from wetwell.services.stations import find_station
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docker" / "kubernetes"
@@ -333,7 +333,7 @@ def test_passwords_users_and_roles_fit(secrets, tmp_path):
     roles = {role.name: role for role in load_access(tmp_path / "access.toml").role}
     assert set(users) <= {who for role in roles.values() for who in role.who}
     assert roles.pop("branch").publish == ("wetwell/_site/status/router", "wetwell/_site/alive/router")
-    for role in load_access(ROOT / "services" / "access.toml").role:
+    for role in load_access(ROOT / "services" / "security" / "access.toml").role:
         also = {"users": (role.name, "branch")} if role.name in {"detector", "fleet"} else {}
         assert roles.pop(role.name) == role.model_copy(update=also)
     assert roles == {}

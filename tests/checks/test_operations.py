@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from wetwell.detector.gate import COUNTS
-from wetwell.services.alarms.keeper import AlarmKeeper
-from wetwell.services.alarms.listing import TARGETS
+from wetwell.detector.stream.gate import COUNTS
 from wetwell.services.alarms.rules import RULES
+from wetwell.services.alarms.service import AlarmKeeper
 from wetwell.services.alarms.station_watch import Now
-from wetwell.services.health.metrics import METRICS
-from wetwell.services.settings import AlarmSettings
+from wetwell.services.alarms.tables import TARGETS
+from wetwell.services.runtime.health.metrics import METRICS
+from wetwell.services.runtime.settings import AlarmSettings
 
 ROOT = Path(__file__).parents[2]
 SOURCES = [
-    *(ROOT / "detector").glob("*.py"),
+    *(ROOT / "detector").rglob("*.py"),
     *(path for path in (ROOT / "services").rglob("*.py") if {"alarms", "detector", "detector.py"} & {*path.parts}),
 ]
 

@@ -14,10 +14,10 @@ import typer
 import yaml
 from pydantic import BaseModel
 
-from wetwell.protocols.access import load_access
+from wetwell.protocols.bus.roles import load_access
 from wetwell.services.cli import app
-from wetwell.services.settings import Settings
-from wetwell.services.tokens import holder_of
+from wetwell.services.runtime.settings import Settings
+from wetwell.services.security.tokens import holder_of
 
 ROOT = Path(__file__).parents[2]
 DOCKER = ROOT / "docker"
@@ -64,7 +64,7 @@ def test_no_secret_is_in_the_file():
 
 
 def test_each_daemon_is_a_user_that_the_roles_know():
-    roles = {role.name for role in load_access(ROOT / "services" / "access.toml").role}
+    roles = {role.name for role in load_access(ROOT / "services" / "security" / "access.toml").role}
     for name, service in OURS.items():
         if name != "router":
             assert service["environment"]["WETWELL_ZENOH__USER"] == name

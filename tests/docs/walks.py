@@ -7,7 +7,7 @@ STATION = 'cp "$ROOT"/simulator/stations/alpha.toml my-station.toml'
 TAKEN_AS_A_FIELD_WOULD = """\
 wetwell simulate --station my-station.toml --scenario nominal --days 1 --seed 3 --out field.parquet
 python - <<'PYTHON'
-from wetwell.protocols.recording import read_recording, write_recording
+from wetwell.protocols.recordings.recording import read_recording, write_recording
 from dataclasses import replace
 from pathlib import Path
 taken = read_recording(Path("field.parquet"))
@@ -94,9 +94,10 @@ printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
             "--scheduler local"
         },
         left_out={
-            "wetwell fleet --stations stations.csv": "needs a cluster; tests/integration/test_fleet.py starts one",
+            "wetwell fleet --stations stations.csv": "needs a cluster; "
+            "tests/integration/services/fleet/test_fleet.py starts one",
             "WETWELL_DETECTOR__STATE_DIR=state wetwell detector release": "needs a quarantined station; "
-            "tests/unit/test_quarantine.py",
+            "tests/unit/services/detector/test_quarantine.py",
         },
     ),
     Walk(

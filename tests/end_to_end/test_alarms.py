@@ -13,11 +13,11 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from wetwell.protocols.alarm_messages import Alarm, AlarmAnswer
-from wetwell.protocols.keys import alarm_act_key, alarm_key, alarm_report_key, verdict_key
-from wetwell.protocols.messages import Verdict
-from wetwell.protocols.zenoh_link import ZenohBus, open_router
-from wetwell.services.alarms.asking import list_alarms, new_act, send_act
+from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alarm_report_key, verdict_key
+from wetwell.protocols.bus.zenoh.link import ZenohBus, open_router
+from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
+from wetwell.protocols.messages.messages import Verdict
+from wetwell.services.alarms.client import list_alarms, new_act, send_act
 from wetwell.services.cli import app
 
 LIMIT_S = 60.0

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from wetwell.protocols.keys import alarm_report_key
-from wetwell.protocols.zenoh_link import open_router
+from wetwell.protocols.bus.keys import alarm_report_key
+from wetwell.protocols.bus.zenoh.link import open_router
 from wetwell.services.doctor.examine import examine
 from wetwell.services.doctor.finding import Finding, exit_code
 

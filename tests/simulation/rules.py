@@ -7,12 +7,12 @@ from itertools import pairwise
 from accidents import CLOCK_STEP_S
 from simulated_site import Site
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.protocols.keys import sample_key
-from wetwell.protocols.messages import Sample, Verdict
-from wetwell.protocols.stamps import MAX_STAMP_NS, NS_PER_S
-from wetwell.protocols.station import Station
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.protocols.bus.keys import sample_key
+from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 
 
 def broken_rules(site: Site) -> list[str]:

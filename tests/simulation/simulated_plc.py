@@ -4,12 +4,12 @@ import asyncio
 import random
 from typing import Self
 
-from wetwell.protocols.device_map import Device, Plc
-from wetwell.protocols.device_signal import Signal
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.modbus_client import NoAnswerError, RefusedError
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.registers import encode, register_table
+from wetwell.protocols.modbus.client import NoAnswerError, RefusedError
+from wetwell.protocols.modbus.device_map import Device, Plc
+from wetwell.protocols.modbus.device_signal import Signal
+from wetwell.protocols.modbus.registers import encode, register_table
+from wetwell.protocols.recordings.recording import Recording
 
 
 class SimulatedPlc:

@@ -18,24 +18,24 @@ from accidents import happen
 from network import Network, SimulatedBus
 from simulated_plc import SimulatedPlc
 
-from wetwell.protocols import whole_file
-from wetwell.protocols.alarm_messages import Alarm
+from wetwell.protocols import atomic_file
+from wetwell.protocols.bus.interface import Keyed
+from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.keys import alarm_key, sample_key, verdict_key
-from wetwell.protocols.link import Keyed
-from wetwell.protocols.messages import Verdict
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.stamps import NS_PER_S
-from wetwell.protocols.station import Station
+from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.alarms import serve as alarms_serve
-from wetwell.services.alarms.keeper import AlarmKeeper
-from wetwell.services.detector.serve import judge_all
+from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.detector.daemon import judge_all
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
-from wetwell.services.historian.core import Historian
-from wetwell.services.historian.folder_store import FolderStore
-from wetwell.services.historian.store import Batch, StoreError
-from wetwell.services.settings import AlarmSettings, DetectorSettings, HealthSettings, Settings
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import Batch, StoreError
+from wetwell.services.runtime.settings import AlarmSettings, DetectorSettings, HealthSettings, Settings
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -197,7 +197,7 @@ class Site:
         """Clock, PLC connections and disks of this site in place of the real ones."""
         loop = asyncio.get_running_loop()
         write = FolderStore.write
-        real = whole_file.whole_file
+        real = atomic_file.whole_file
 
         def time_ns() -> int:
             return START_NS + round((loop.time() + self.clock_s) * NS_PER_S)
@@ -216,14 +216,14 @@ class Site:
 
         with contextlib.ExitStack() as patches:
             for target, replacement in (
-                ("wetwell.services.clock.time", SimpleNamespace(time_ns=time_ns)),
+                ("wetwell.services.runtime.clock.time", SimpleNamespace(time_ns=time_ns)),
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
-                ("wetwell.services.alarms.serve.LOOK_S", 1.0 * self.period_s),
-                ("wetwell.services.alarms.serve.SAVE_S", 60.0 * self.period_s),
+                ("wetwell.services.alarms.daemon.LOOK_S", 1.0 * self.period_s),
+                ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.detector.checkpoint.whole_file", file),
                 ("wetwell.services.alarms.state_file.whole_file", file),
-                ("wetwell.services.historian.folder_store.FolderStore.write", keep),
+                ("wetwell.services.historian.store.folder_store.FolderStore.write", keep),
             ):
                 patches.enter_context(mock.patch(target, replacement))
             yield

@@ -6,8 +6,8 @@ from pathlib import Path
 from simulated_site import Site
 from virtual_loop import run_virtual
 
-from wetwell.protocols.station import Station
-from wetwell.services.presets import find_scenario, find_station
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.stations import find_scenario, find_station
 
 GRAIN_S = 0.25
 """Of the clock of a light site."""

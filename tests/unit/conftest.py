@@ -5,11 +5,11 @@ import copy
 import numpy as np
 import pytest
 
-from wetwell.detector.nominal import nominal_of
-from wetwell.detector.pipeline import Detector
-from wetwell.detector.run import SEGMENT_SAMPLES, Run, Segments
-from wetwell.protocols.recording import Recording
-from wetwell.protocols.stamps import NS_PER_S
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.detector.runs.run import SEGMENT_SAMPLES, Run, Segments
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 

@@ -1,0 +1,1 @@
+"""What a healthy pump shows: model and learning phase."""

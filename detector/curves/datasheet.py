@@ -1,0 +1,138 @@
+"""What the datasheet says of a station: the curves from which residuals are taken."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.jit import compiled
+from wetwell.protocols.station.station_file import Station
+
+Table = npt.NDArray[np.void]
+TABLE = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("c0", "c1", "c2", "frequency_hz", "runout_m3h", "static_head_m", "friction_h2_m5")
+    ]
+    + [("is_common_header", np.int64)]
+)
+RESOLUTION_M = 1e-9
+"""The head of a common header is found to this."""
+MAX_STEPS = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nominal:
+    """Datasheet curves of a station.
+
+    Attributes
+    ----------
+    curves : tuple of (c0, c1, c2), one a pump
+        H = c0 N² + c1 N Q + c2 Q², Q in m³/h.
+    frequencies_hz : tuple of float
+        Nominal frequency of each pump. [Hz]
+    static_head_m, friction_h2_m5 : float
+        H = H_s + k Q². [m, h²/m⁵]
+    is_common_header : bool
+        Whether k acts on the total flow.
+    area_m2 : float
+        Cross-section of the wet well. [m²]
+    """
+
+    curves: tuple[tuple[float, float, float], ...]
+    frequencies_hz: tuple[float, ...]
+    static_head_m: float
+    friction_h2_m5: float
+    is_common_header: bool
+    area_m2: float
+
+    @property
+    def pumps(self) -> int:
+        """Number of pumps."""
+        return len(self.curves)
+
+    def runout_flow_m3h(self, pump: int) -> float:
+        """Flow at which the curve of a pump (from 0) reaches zero head at nominal speed. [m³/h]."""
+        c0, c1, c2 = self.curves[pump]
+        return 2.0 * c0 / (-c1 + math.sqrt(c1 * c1 - 4.0 * c2 * c0))
+
+    def table(self) -> Table:
+        """One record a pump, as compiled code reads the datasheet."""
+        station = (self.static_head_m, self.friction_h2_m5, self.is_common_header)
+        return np.array(
+            [
+                (*curve, frequency_hz, self.runout_flow_m3h(pump), *station)
+                for pump, (curve, frequency_hz) in enumerate(zip(self.curves, self.frequencies_hz, strict=True))
+            ],
+            dtype=TABLE,
+        )
+
+
+@compiled
+def _flow_m3h(lift_m: float, linear: float, square: float) -> float:
+    """Positive root of lift + linear Q + square Q², 0 without lift; square < 0 or linear < 0."""
+    if lift_m <= 0.0:
+        return 0.0
+    return 2.0 * lift_m / (-linear + math.sqrt(linear * linear - 4.0 * square * lift_m))
+
+
+@compiled
+def duty_flows(table: Any, duty: Any) -> None:
+    """Set the flow of each pump on its curve and that of the main, at its speed; 0 where it stands or cannot lift.
+
+    On a common header the head H where all curves meet is the root of H_s + k (sum of Q_i(H))² - H, by Newton's
+    method kept between the heads at which the sum is too large and too small.
+
+    Parameters
+    ----------
+    table : Nominal.table()
+    duty : (pumps,) records
+        `duty_speed` is read, a share of nominal; `duty_m3h` is set. [m³/h]
+    """
+    static_m, friction = table[0]["static_head_m"], table[0]["friction_h2_m5"]
+    lifting, high_m = 0, static_m
+    for pump in range(table.shape[0]):
+        own, speed = table[pump], duty[pump]["duty_speed"]
+        shutoff_m = own["c0"] * speed * speed
+        flow_m3h = _flow_m3h(shutoff_m - static_m, own["c1"] * speed, own["c2"] - friction)
+        duty[pump]["duty_m3h"] = flow_m3h
+        lifting += flow_m3h > 0.0
+        high_m = max(high_m, shutoff_m)
+    if not table[0]["is_common_header"] or lifting < 2:
+        return
+    low_m, head_m = static_m, static_m
+    for _ in range(MAX_STEPS):
+        total_m3h, slope = 0.0, 0.0
+        for pump in range(table.shape[0]):
+            own, speed = table[pump], duty[pump]["duty_speed"]
+            linear = own["c1"] * speed
+            flow_m3h = _flow_m3h(own["c0"] * speed * speed - head_m, linear, own["c2"])
+            duty[pump]["duty_m3h"] = flow_m3h
+            total_m3h += flow_m3h
+            if flow_m3h > 0.0:
+                slope += 1.0 / (linear + 2.0 * own["c2"] * flow_m3h)
+        lacking_m = static_m + friction * total_m3h * total_m3h - head_m
+        if lacking_m > 0.0:
+            low_m = head_m
+        else:
+            high_m = head_m
+        step_m = lacking_m / (1.0 - 2.0 * friction * total_m3h * slope)
+        if abs(step_m) <= RESOLUTION_M:
+            return
+        head_m += step_m
+        if not low_m < head_m < high_m:
+            head_m = 0.5 * (low_m + high_m)
+
+
+def nominal_of(station: Station) -> Nominal:
+    """Datasheet curves in a station file."""
+    return Nominal(
+        curves=tuple(pump.coefficients for pump in station.pump),
+        frequencies_hz=tuple(pump.nominal_frequency_hz for pump in station.pump),
+        static_head_m=station.rising_main.static_head_m,
+        friction_h2_m5=station.rising_main.friction_h2_m5,
+        is_common_header=station.rising_main.layout == "common",
+        area_m2=station.sump.area_m2,
+    )

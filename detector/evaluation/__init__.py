@@ -1,0 +1,1 @@
+"""Verdicts held against truth; no part of the detector's own way."""

@@ -1,0 +1,66 @@
+"""What both readings of the paper's second method share: an index a run, and limits that follow its normal runs."""
+
+from abc import abstractmethod
+from collections import deque
+
+import numpy as np
+
+from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.evaluation.methods.run_detector import Floats, RunDetector
+from wetwell.detector.runs.run import Run
+from wetwell.detector.statistics.bootstrap import block_bootstrap_interval
+from wetwell.detector.statistics.tangent import attribution_index
+from wetwell.protocols.messages.messages import State
+
+RUNS = 50
+"""Normal runs that the limits rest on."""
+OUTER_SHARE = 0.05
+SYSTEM_BELOW = 0.4
+PUMP_ABOVE = 0.6
+RESAMPLES = 500
+CONFIDENCE = 0.95
+
+
+class IndexMethod(RunDetector):
+    """Attribution index of a run with its block-bootstrap interval, held against adaptive limits.
+
+    The limits are the outer 5 % of the index of the learning phase, and never inside the paper's 0.4 and 0.6; then
+    they follow the last `RUNS` runs that were told normal. The whole interval must lie outside. The paper says that
+    the limits follow recent normal data from time to time, not how.
+    """
+
+    block: int
+    """Neighbouring residuals that are drawn together."""
+
+    def __init__(self, station: str, nominal: Nominal) -> None:
+        super().__init__(station, nominal)
+        self._healthy: list[deque[float]] = [deque(maxlen=RUNS) for _ in range(nominal.pumps)]
+        self._rng = np.random.default_rng(0)
+
+    @abstractmethod
+    def _residuals(self, run: Run) -> tuple[Floats, Floats]:
+        """ψ_p and ψ_s of a run."""
+
+    def _learn(self, pump: int, runs: list[Run]) -> None:
+        self._healthy[pump].extend(attribution_index(*self._residuals(run)) for run in runs)
+
+    def _told(self, run: Run) -> State:
+        psi_p, psi_s = self._residuals(run)
+        if not len(psi_p):
+            return "unknown"
+        low, high = block_bootstrap_interval(
+            psi_p,
+            psi_s,
+            block=min(self.block, len(psi_p)),
+            resamples=RESAMPLES,
+            confidence=CONFIDENCE,
+            rng=self._rng,
+        )
+        healthy = self._healthy[run.pump]
+        below, above = np.quantile(np.array(healthy), [OUTER_SHARE, 1.0 - OUTER_SHARE])
+        if high < min(below, SYSTEM_BELOW):
+            return "system_fault"
+        if low > max(above, PUMP_ABOVE):
+            return "pump_fault"
+        healthy.append(attribution_index(psi_p, psi_s))
+        return "normal"

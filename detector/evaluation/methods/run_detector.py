@@ -1,0 +1,104 @@
+"""What all baselines share: gate, pump runs and a learning phase, as the detector beside them has them."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, Run
+from wetwell.detector.runs.run_tracker import RunTracker
+from wetwell.detector.stream.block import Block
+from wetwell.detector.stream.gate import Gate
+from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.timestamps import NS_PER_S
+
+Floats = npt.NDArray[np.float64]
+
+LEARNING_S = 6.0 * 3600.0
+MIN_RUNS = 4
+"""Least number of runs that a pump is learnt from."""
+MIN_SEGMENTS = 2
+"""A shorter run is not learnt from."""
+ALPHA = 1e-3
+"""Share of healthy runs in which one test may reject, for the methods of which nobody has said another."""
+
+
+class RunDetector(ABC):
+    """One hard verdict at the end of each run: what a method says of it, or `learning`, or `unknown` without data.
+
+    Unlike the detector, a baseline takes whatever comes in the first six hours as healthy, and has no early verdicts,
+    no memory between pumps and no probabilities: `probability` holds the told state with 1.
+
+    Parameters
+    ----------
+    station : str
+        Name for the verdicts.
+    nominal : Nominal
+        Datasheet curves.
+    """
+
+    def __init__(self, station: str, nominal: Nominal) -> None:
+        self._station = station
+        self._nominal = nominal
+        self._gate = Gate(nominal)
+        self._runs = RunTracker(nominal)
+        self._learning: list[list[Run] | None] = [[] for _ in range(nominal.pumps)]
+        self._begin_ns: int | None = None
+
+    def take(self, block: Block) -> list[Verdict]:
+        """Verdicts that a block of samples brings."""
+        verdicts = []
+        for row in range(len(block.time_ns)):
+            frame = self._gate.update_row(block, row)
+            if frame is None:
+                continue
+            if self._begin_ns is None:
+                self._begin_ns = frame.time_ns
+            verdicts += [self._judge(run, frame.time_ns) for run in self._runs.update(frame)]
+        return verdicts
+
+    def finish(self) -> tuple[Verdict, ...]:
+        """Verdicts on the runs that are still open at the end of a recording."""
+        return tuple(self._judge(run, run.window_ns[1]) for run in self._runs.finish())
+
+    @abstractmethod
+    def _learn(self, pump: int, runs: list[Run]) -> None:
+        """Take the runs of the learning phase of a pump (from 0); called once for each."""
+
+    @abstractmethod
+    def _told(self, run: Run) -> State:
+        """State of a run with at least 25 steady samples, after learning."""
+
+    def _judge(self, run: Run, time_ns: int) -> Verdict:
+        state = self._state(run, time_ns)
+        return Verdict(
+            time=time_ns,
+            station=self._station,
+            pump=run.pump + 1,
+            state=state,
+            probability={state: 1.0},
+            evidence={"steady_samples": len(run.time_s)},
+            window=run.window_ns,
+        )
+
+    def _state(self, run: Run, time_ns: int) -> State:
+        if run.missing & NEEDED:
+            return "unknown"
+        learnt = self._learning[run.pump]
+        if learnt is not None:
+            assert self._begin_ns is not None  # noqa: S101 - a run has samples
+            if len(learnt) < MIN_RUNS or time_ns - self._begin_ns <= LEARNING_S * NS_PER_S:
+                if len(run.time_s) >= MIN_SEGMENTS * SEGMENT_SAMPLES:
+                    learnt.append(run)
+                return "learning"
+            self._learn(run.pump, learnt)
+            self._learning[run.pump] = None
+        return self._told(run) if len(run.time_s) >= SEGMENT_SAMPLES else "unknown"
+
+
+def state_of(*, pump: bool, system: bool) -> State:
+    """State by which of the two curves has moved."""
+    if pump:
+        return "pump_and_system_fault" if system else "pump_fault"
+    return "system_fault" if system else "normal"

@@ -1,0 +1,157 @@
+"""What a run shows, as distances from what its pump's baseline expects."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.baseline.model import MIN_RUNS, Baseline, Curve
+from wetwell.detector.curves.sensor_signatures import flow_meter_direction, head_sensor_direction
+from wetwell.detector.runs.run import Run
+from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median, step_variance
+
+Floats = npt.NDArray[np.float64]
+
+PUMP, SYSTEM, DRAWDOWN, POWER = range(4)
+"""Components of an observation."""
+COMPONENTS = ("pump", "system", "drawdown", "power")
+
+CHECK_FLOOR = 0.004
+"""Least standard deviation of the logarithm of drawdown and power between runs."""
+MIN_STEPS = 4
+NOISIER_FACTOR = 3.0
+"""A run's own variance counts where it is larger than this times the learnt one."""
+POWER_EXPONENT = 2.0
+"""Of the speed: between 1 for a constant load and 3 for a free one; the scatter learnt covers the rest."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """Mean and variance of a figure that does without the curves, over healthy runs; NaN where it was never known."""
+
+    mean: float
+    variance: float
+
+
+def learn_check(values: Sequence[float]) -> Check:
+    """Median and robust variance of the finite values, NaN with fewer than `MIN_RUNS`."""
+    known = np.array([value for value in values if math.isfinite(value)])
+    if len(known) < MIN_RUNS:
+        return Check(mean=math.nan, variance=math.nan)
+    middle = float(median(known))
+    deviation = NORMAL_MEDIAN * float(median(np.abs(known - middle)))
+    return Check(mean=middle, variance=max(deviation, CHECK_FLOOR) ** 2 * (1.0 + 1.0 / len(known)))
+
+
+def log_power(run: Run) -> float:
+    """Logarithm of the electrical power of a run, taken to nominal speed; NaN where it is not measured."""
+    known = np.isfinite(run.power_kw) & (run.power_kw > 0.0)
+    if 2 * np.count_nonzero(known) < len(run.power_kw) or not known.any():
+        return math.nan
+    return float(np.mean(np.log(run.power_kw[known]) - POWER_EXPONENT * np.log(run.speed_ratio[known])))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """How far a run lies from the baseline.
+
+    Attributes
+    ----------
+    mean : (4,) array
+        Shift of (r_p, r_s) in m, and of the logarithms of metered flow over drawdown flow and of the power; NaN where
+        it is not known.
+    covariance : (4, 4) array
+        Of that mean if nothing has changed: noise, scatter between runs, and what the slopes may be wrong by over the
+        way that the flow of a healthy pump goes.
+    slope_variance : (2,) array
+        More of it where a fault has moved the flow: what the slopes may be wrong by over the rest of the way. [m²]
+    flow_meter, head_sensor : (4,) arrays
+        Change of the mean with the relative error of the flow meter, and with a metre that the head sensor reads too
+        much.
+    """
+
+    mean: Floats
+    covariance: Floats
+    slope_variance: Floats
+    flow_meter: Floats
+    head_sensor: Floats
+
+    @property
+    def sigmas(self) -> Floats:
+        """(4,) shift over its standard deviation."""
+        sigmas: Floats = self.mean / np.sqrt(np.diag(self.covariance))
+        return sigmas
+
+
+def observe(
+    run: Run,
+    baseline: Baseline,
+    curve: Curve,
+    friction_h2_m5: float,
+    *,
+    drawdown: tuple[float, Check],
+    power: Check,
+) -> Observation:
+    """Observation of a run with at least one segment.
+
+    The median over its segments, whose variance is π/2 times that of the mean: a run in which something comes or goes
+    is told by its longer part, and a burst within it does not tell. Where a run scatters more than the learnt ones
+    its own scatter counts.
+
+    Parameters
+    ----------
+    run : Run
+    baseline : Baseline
+        Of its pump.
+    curve, friction_h2_m5
+        By the datasheet.
+    drawdown : (float, Check)
+        Logarithm of metered flow over drawdown flow, and what it is in health.
+    power : Check
+        What the logarithm of the power is in health.
+    """
+    segments = run.segments
+    shifts_m = baseline.shifts(segments)
+    flow_m3h, total_m3h = float(median(segments.flow_m3h)), float(median(segments.total_m3h))
+    level_m = float(median(segments.level_m))
+    healthy_flow_m3h, healthy_total_m3h = baseline.explained_flows(segments)
+    healthy_variance = baseline.variances(
+        _towards(healthy_flow_m3h, flow_m3h, baseline.flow_scatter),
+        _towards(healthy_total_m3h, total_m3h, baseline.flow_scatter),
+        level_m,
+    )
+    slope_variance = np.maximum(baseline.variances(flow_m3h, total_m3h, level_m) - healthy_variance, 0.0)
+    covariance = np.zeros((4, 4))
+    covariance[:2, :2] = (
+        _noise(shifts_m, baseline.noise(segments), baseline.correlation_factor)
+        + baseline.run_covariance
+        + np.diag(healthy_variance)
+    )
+    covariance[DRAWDOWN, DRAWDOWN] = drawdown[1].variance
+    covariance[POWER, POWER] = power.variance
+    speed_ratio = float(median(segments.speed_ratio))
+    direction = flow_meter_direction(flow_m3h, flow_m3h * speed_ratio, total_m3h, curve, friction_h2_m5)
+    return Observation(
+        mean=np.array([*median(shifts_m), drawdown[0] - drawdown[1].mean, log_power(run) - power.mean]),
+        covariance=covariance,
+        slope_variance=slope_variance,
+        flow_meter=np.array([*direction, 1.0, 0.0]),
+        head_sensor=np.array([*head_sensor_direction(speed_ratio), 0.0, 0.0]),
+    )
+
+
+def _towards(explained_m3h: float, measured_m3h: float, scatter: float) -> float:
+    """The flow of a healthy pump that lies nearest to the measured one."""
+    reach_m3h = scatter * explained_m3h
+    return min(max(measured_m3h, explained_m3h - reach_m3h), explained_m3h + reach_m3h)
+
+
+def _noise(shifts_m: Floats, covariance: Floats, correlation_factor: float) -> Floats:
+    """Covariance of the median of the segments of a run, from that of one segment."""
+    if len(shifts_m) >= MIN_STEPS:
+        own = step_variance(shifts_m) * correlation_factor
+        covariance = covariance * max(1.0, float(np.max(own / np.diag(covariance))) / NOISIER_FACTOR)
+    noise: Floats = covariance * (np.pi / 2.0 / len(shifts_m))
+    return noise

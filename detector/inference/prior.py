@@ -1,0 +1,56 @@
+"""What is believed before the next run: of each pump and its meters, and of the main that they share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.inference.posterior import BOTH, FLOW_METER, HEAD_SENSOR, PUMP_FAULT, SYSTEM_FAULT
+
+Floats = npt.NDArray[np.float64]
+
+PUMP_PRIOR = 0.05
+SYSTEM_PRIOR = 0.05
+FLOW_METER_PRIOR = 0.01
+HEAD_SENSOR_PRIOR = 0.005
+CHANGE_PER_RUN = 0.05
+"""Share of a belief that is forgotten from run to run: faults come and go."""
+
+
+@dataclass(slots=True)
+class PumpBelief:
+    """Probabilities that a pump has a fault, and that its flow meter or its head sensor is wrong."""
+
+    pump: float = PUMP_PRIOR
+    flow_meter: float = FLOW_METER_PRIOR
+    head_sensor: float = HEAD_SENSOR_PRIOR
+
+
+@dataclass(slots=True)
+class SystemBelief:
+    """Probability that the system has a fault: what one pump meets, the others will."""
+
+    system: float = SYSTEM_PRIOR
+
+
+def joint_prior(pump: PumpBelief, system: SystemBelief) -> Floats:
+    """(6,) prior of the hypotheses; one meter at most is wrong, and then pump and system are not at fault."""
+    p, s, q, h = pump.pump, system.system, pump.flow_meter, pump.head_sensor
+    healthy = (1.0 - p) * (1.0 - s)
+    meters = 1.0 - q - h
+    prior = np.array([healthy * meters, p * (1.0 - s) * meters, (1.0 - p) * s * meters, p * s * meters, 0.0, 0.0])
+    prior[FLOW_METER], prior[HEAD_SENSOR] = healthy * q, healthy * h
+    prior /= prior.sum()
+    return prior
+
+
+def remember(probability: Floats, pump: PumpBelief, system: SystemBelief) -> None:
+    """Take what a run has said into the beliefs, in place; a little is forgotten, so that nothing is ever certain."""
+    pump.pump = _mixed(probability[PUMP_FAULT] + probability[BOTH], PUMP_PRIOR)
+    pump.flow_meter = _mixed(probability[FLOW_METER], FLOW_METER_PRIOR)
+    pump.head_sensor = _mixed(probability[HEAD_SENSOR], HEAD_SENSOR_PRIOR)
+    system.system = _mixed(probability[SYSTEM_FAULT] + probability[BOTH], SYSTEM_PRIOR)
+
+
+def _mixed(probability: float, prior: float) -> float:
+    return float((1.0 - CHANGE_PER_RUN) * probability + CHANGE_PER_RUN * prior)

@@ -1,0 +1,1 @@
+"""From steady samples to pump runs."""

@@ -1,0 +1,1 @@
+"""Faults of sensors that a run shows."""

@@ -1,0 +1,1 @@
+"""The state of a detector as bytes, and those of older versions."""

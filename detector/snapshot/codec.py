@@ -1,0 +1,189 @@
+"""The state of a detector as bytes, and back: JSON with a checksum, exact to the last bit."""
+
+import base64
+import hashlib
+import json
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from types import NoneType, UnionType
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.baseline.learning import Learning
+from wetwell.detector.baseline.model import Baseline, Model
+from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.inference.observation import Check
+from wetwell.detector.inference.prior import PumpBelief, SystemBelief
+from wetwell.detector.pump_judge import Knowledge, PumpRecord
+from wetwell.detector.runs.run import Segments
+from wetwell.detector.snapshot.upgrades import UPGRADES
+from wetwell.detector.statistics.cusum import Cusum
+from wetwell.detector.stream.missing_signals import BlindWatch
+from wetwell.detector.verdict.control_limits import IndexLimits
+from wetwell.protocols.errors import WetwellError
+
+_SCHEMA_NAME, FORM = "wetwell.detector-snapshot", 2
+SCHEMA = f"{_SCHEMA_NAME}/{FORM}"
+
+_CLASSES: Mapping[str, type] = {
+    cls.__name__: cls
+    for cls in (
+        Baseline,
+        BlindWatch,
+        Check,
+        Cusum,
+        IndexLimits,
+        Knowledge,
+        Learning,
+        Model,
+        PumpBelief,
+        PumpRecord,
+        Segments,
+        SystemBelief,
+    )
+}
+
+
+class SnapshotError(WetwellError):
+    """A snapshot is damaged, of another format, or of another station."""
+
+
+def encode_snapshot(station: str, nominal: Nominal, state: Mapping[str, Any]) -> bytes:
+    """Bytes of a detector's state; the datasheet is not kept, only its fingerprint."""
+    text = json.dumps(_encoded(dict(state)), separators=(",", ":"), allow_nan=False)
+    header = {
+        "schema": SCHEMA,
+        "station": station,
+        "datasheet": _fingerprint(nominal),
+        "sha256": hashlib.sha256(text.encode()).hexdigest(),
+    }
+    return f"{json.dumps(header)}\n{text}\n".encode()
+
+
+def decode_snapshot(data: bytes, station: str, nominal: Nominal) -> dict[str, Any]:
+    """State in a snapshot; one of an older form is taken over, see `UPGRADES`.
+
+    Raises
+    ------
+    SnapshotError
+        If it is damaged, of another format or of another station, or if the datasheet curves have changed since.
+    """
+    try:
+        head, _, body = data.partition(b"\n")
+        header, text = json.loads(head), body.rstrip(b"\n")
+        name, _, number = header["schema"].partition("/")
+        form = int(number) if name == _SCHEMA_NAME else 0
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SnapshotError(f"snapshot of station '{station}': damaged, its first line is no header") from error
+    if form != FORM and form not in UPGRADES:
+        known = f"format '{header['schema']}', this version reads up to '{SCHEMA}'"
+        raise SnapshotError(f"snapshot of station '{station}': {known}")
+    if hashlib.sha256(text).hexdigest() != header.get("sha256"):
+        raise SnapshotError(f"snapshot of station '{station}': damaged, its checksum differs")
+    if header.get("station") != station:
+        raise SnapshotError(f"snapshot of station '{header.get('station')}': this is station '{station}'")
+    if header.get("datasheet") != _fingerprint(nominal):
+        raise SnapshotError(f"snapshot of station '{station}': the curves in the station file have changed since")
+    try:
+        encoded = json.loads(text)
+        while form < FORM:
+            encoded, form = UPGRADES[form](encoded, nominal), form + 1
+        state: dict[str, Any] = _decoded(encoded, nominal)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
+    return state
+
+
+def _fingerprint(nominal: Nominal) -> str:
+    return hashlib.sha256(repr(nominal).encode()).hexdigest()
+
+
+def _attributes(value: object) -> list[str]:
+    slots = [name for cls in type(value).__mro__ for name in getattr(cls, "__slots__", ())]
+    return slots or list(vars(value))
+
+
+def _encoded(value: Any) -> Any:
+    for kinds, encode in _ENCODERS:
+        if isinstance(value, kinds):
+            return encode(value)
+    name = type(value).__name__
+    if _CLASSES.get(name) is not type(value):
+        raise TypeError(f"a {name} cannot be part of a snapshot")
+    return {"object": [name, {field: _encoded(getattr(value, field)) for field in _attributes(value)}]}
+
+
+def _encoded_float(value: float) -> Any:
+    return float(value) if math.isfinite(value) else {"float": str(float(value))}
+
+
+def _encoded_array(value: npt.NDArray[Any]) -> Any:
+    order: Literal["C", "F"] = "C" if value.flags.c_contiguous else "F"
+    dtype = value.dtype.str if value.dtype.names is None else value.dtype.descr
+    return {"array": [dtype, list(value.shape), order, base64.b64encode(value.tobytes(order)).decode()]}
+
+
+def _encoded_pairs(value: Mapping[Any, Any]) -> list[Any]:
+    return [[_encoded(key), _encoded(item)] for key, item in value.items()]
+
+
+_ENCODERS: tuple[tuple[type | UnionType, Callable[[Any], Any]], ...] = (
+    (NoneType | bool | int | str, lambda value: value),
+    (float, _encoded_float),
+    (np.ndarray, _encoded_array),
+    (list, lambda value: [_encoded(item) for item in value]),
+    (tuple, lambda value: {"tuple": [_encoded(item) for item in value]}),
+    (frozenset, lambda value: {"frozenset": sorted(value)}),
+    (set, lambda value: {"set": sorted(value)}),
+    (deque, lambda value: {"deque": [value.maxlen, [_encoded(item) for item in value]]}),
+    (Counter, lambda value: {"counter": _encoded_pairs(value)}),
+    (dict, lambda value: {"dict": _encoded_pairs(value)}),
+    (Nominal, lambda _: {"nominal": None}),
+)
+
+
+def _decoded(value: Any, nominal: Nominal) -> Any:
+    if isinstance(value, list):
+        return [_decoded(item, nominal) for item in value]
+    if not isinstance(value, dict):
+        return value
+    ((kind, content),) = value.items()
+    return _DECODERS[kind](content, nominal)
+
+
+def _array(content: list[Any], _nominal: Nominal) -> Any:
+    dtype, shape, order, data = content
+    dtype = dtype if isinstance(dtype, str) else [(name, kind) for name, kind in dtype]
+    return np.frombuffer(base64.b64decode(data), dtype=dtype).reshape(shape, order=order).copy(order)
+
+
+def _object(content: list[Any], nominal: Nominal) -> Any:
+    name, fields = content
+    lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys()
+    if lacking:
+        raise ValueError(f"a {name} without {', '.join(sorted(lacking))}")
+    made: Any = object.__new__(_CLASSES[name])
+    for field, value in fields.items():
+        object.__setattr__(made, field, _decoded(value, nominal))
+    return made
+
+
+def _pairs(content: list[Any], nominal: Nominal) -> dict[Any, Any]:
+    return {_decoded(key, nominal): _decoded(item, nominal) for key, item in content}
+
+
+_DECODERS: Mapping[str, Callable[[Any, Nominal], Any]] = {
+    "float": lambda content, _: float(content),
+    "array": _array,
+    "tuple": lambda content, nominal: tuple(_decoded(content, nominal)),
+    "frozenset": lambda content, nominal: frozenset(_decoded(content, nominal)),
+    "set": lambda content, nominal: set(_decoded(content, nominal)),
+    "deque": lambda content, nominal: deque(_decoded(content[1], nominal), maxlen=content[0]),
+    "counter": lambda content, nominal: Counter(_pairs(content, nominal)),
+    "dict": _pairs,
+    "nominal": lambda _, nominal: nominal,
+    "object": _object,
+}

@@ -1,0 +1,80 @@
+"""Snapshots of older versions, taken over form by form: what was learnt goes on, what was going on begins anew."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.statistics.cusum import Cusum
+from wetwell.detector.stream.gate import COUNTS, STATE
+from wetwell.detector.stream.missing_signals import BlindWatch
+from wetwell.detector.stream.run_state import new_pumps
+from wetwell.detector.stream.stuck_sensors import METERS, new_meters
+
+SEGMENT_SAMPLES = 25
+"""Of all segments of form 1."""
+MOVED = ("run_s", "stuck", "rolling")
+"""Of a pump in form 1: kept in arrays now, where it goes on."""
+
+
+def from_1(encoded: Any, nominal: Nominal) -> Any:
+    """Form 2 of a state of form 1, which kept objects where there are arrays now.
+
+    Open runs, the drawdown, the rolling tests and the look within a run begin anew. Arrays that are not set here are
+    as before the first sample.
+    """
+    state = dict(encoded["dict"])
+    gate, pumps, meters = np.zeros(1, dtype=STATE), new_pumps(nominal), new_meters(nominal.pumps)
+    _take_gate(gate, _fields(state["_gate"]), state["_seen_s"])
+    _take_meters(meters, _fields(state["_repeats"]))
+    for number, fields in enumerate(map(_fields, state["_pumps"])):
+        pumps["is_learning"][number] = fields["known"] is None
+        pumps["run_s"][number] = fields["run_s"]
+        for name in MOVED:
+            del fields[name]
+        fields |= {"early": None, "cusum": Cusum(), "blind": BlindWatch()}
+    for name, fields in _objects([state["_pumps"]]):
+        if name == "Baseline":
+            fields["segment_samples"] = SEGMENT_SAMPLES
+        elif name == "Segments":
+            fields["samples"] = SEGMENT_SAMPLES
+    arrays = [["gate", gate], ["pumps", pumps], ["meters", meters]]
+    return {"dict": [["arrays", {"dict": arrays}], ["system", state["_system"]], ["pumps", state["_pumps"]]]}
+
+
+UPGRADES: Mapping[int, Callable[[Any, Nominal], Any]] = {1: from_1}
+"""By the form that each begins with."""
+
+
+def _fields(encoded: Any) -> dict[str, Any]:
+    fields: dict[str, Any] = encoded["object"][1]
+    return fields
+
+
+def _objects(encoded: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and fields of all objects in what is encoded."""
+    if isinstance(encoded, dict):
+        if "object" in encoded:
+            yield tuple(encoded["object"])
+        encoded = list(encoded.values())
+    if isinstance(encoded, list):
+        for part in encoded:
+            yield from _objects(part)
+
+
+def _take_gate(gate: Any, fields: Mapping[str, Any], seen_s: float) -> None:
+    if fields["_last_ns"] is not None:
+        gate["is_begun"], gate["time_ns"], gate["seq"] = 1, fields["_last_ns"], fields["_last_seq"]
+    gate["seen_s"] = seen_s
+    for name, count in fields["counts"]["counter"]:
+        if name in COUNTS:
+            gate[name] = count
+
+
+def _take_meters(meters: Any, fields: Mapping[str, Any]) -> None:
+    """Keep for how long each reading repeated itself while it was learnt."""
+    pumps = (len(meters) - 1) // len(METERS)
+    names = ["level_m", *(f"pump{pump}_{name}" for pump in range(1, pumps + 1) for name in METERS)]
+    longest_ns = dict(fields["longest_ns"]["dict"])
+    meters["longest_ns"] = [longest_ns.get(name, 0) for name in names]

@@ -1,0 +1,1 @@
+"""Statistics: F-tests, CUSUM, bootstrap, tangent residuals, medians."""

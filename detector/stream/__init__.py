@@ -1,0 +1,1 @@
+"""What each sample goes through, compiled: gate, run state, drawdown, stuck and missing signals."""

@@ -1,0 +1,251 @@
+"""The gate: order, range and presence of values, before any statistic sees them."""
+
+import math
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.stream.block import (
+    FIRST_PUMP,
+    FLOW,
+    FREQUENCY,
+    HEAD,
+    INFLOW,
+    LEVEL,
+    POWER,
+    PUMP_VALUES,
+    RUNNING,
+    Block,
+    LiveBlock,
+)
+from wetwell.protocols.jit import compiled
+from wetwell.protocols.messages.readings import Readings
+from wetwell.protocols.timestamps import NS_PER_S
+
+Floats = npt.NDArray[np.float64]
+
+MAX_GAP_S = 10.0
+MAX_JUMP_S = 600.0
+MIN_GAP_S = 0.05
+"""Samples nearer to each other are taken for one that is doubled."""
+MAX_LOST = 1_000_000
+CONFIRMATIONS = 10
+RESENT_SAMPLES = 1000
+"""More samples than a bus sends again after a lost link; they come with numbers that were there before."""
+LEVEL_RANGE_M = (-1.0, 100.0)
+POWER_RANGE_KW = (-1.0, 1.0e6)
+CENTURY_S = 3.2e9
+
+COUNTS = (
+    "samples",
+    "doubled",
+    "late",
+    "future",
+    "clock_steps",
+    "gaps",
+    "lost",
+    "bad_quality",
+    "wrong_pump_count",
+    "missing_values",
+    "out_of_range_values",
+)
+STATE = np.dtype(
+    [(name, np.int64) for name in ("is_begun", "time_ns", "seq", "other_ns", "other_count", *COUNTS)]
+    + [(name, np.float64) for name in ("gap_s", "seen_s")]
+)
+"""Stamp and number of the last sample let through, of the last one that disagreed, counts, time since the sample
+before, and the time in all that the station has been seen."""
+RANGES = np.dtype(
+    [(f"{end}_{name}", np.float64) for name in ("frequency_hz", "flow_m3h", "head_m") for end in ("low", "high")]
+)
+
+
+class PumpFrame(NamedTuple):
+    """What is known of one pump in one second; NaN is "no value", None is "not said"."""
+
+    frequency_hz: float
+    flow_m3h: float
+    head_m: float
+    power_kw: float
+    running: bool | None
+
+
+class Frame(NamedTuple):
+    """A sample that has passed the gate.
+
+    `gap_s` is the time since the one before: 0 for the first, infinite where nobody knows, after a clock step.
+    """
+
+    time_ns: int
+    gap_s: float
+    level_m: float
+    inflow_m3h: float
+    pumps: tuple[PumpFrame, ...]
+
+    def values(self) -> list[float]:
+        """The values in the order of a block."""
+        return [
+            self.level_m,
+            self.inflow_m3h,
+            *(math.nan if v is None else float(v) for pump in self.pumps for v in pump),
+        ]
+
+
+class Gate:
+    """Lets samples through in the order of their time, with values that can be.
+
+    A value that is absent, NaN or outside its range becomes NaN and is counted. A sample that is doubled or late is
+    dropped and counted. A sample that jumps more than `MAX_JUMP_S` ahead ("future"), and samples that are behind, may
+    come from a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another,
+    the gate follows them and counts a clock step. Those that are behind with old numbers are most likely sent again
+    after a lost link, and it takes more than `RESENT_SAMPLES` of them: then the source has begun anew.
+
+    `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has
+    passed over; a sample that comes late after all is counted there too.
+
+    Memory: constant.
+    """
+
+    def __init__(self, nominal: Nominal) -> None:
+        self.state = np.zeros(1, dtype=STATE)
+        self.ranges = np.array([_ranges(nominal, pump) for pump in range(nominal.pumps)], dtype=RANGES)
+        self.frame = np.full(FIRST_PUMP + PUMP_VALUES * nominal.pumps, math.nan)
+        self._live = LiveBlock(nominal.pumps)
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many samples and values were let through, marked or dropped; those that are not 0."""
+        return Counter({name: int(self.state[name][0]) for name in COUNTS if self.state[name][0]})
+
+    def update(self, sample: Readings) -> Frame | None:
+        """Frame of a sample, or None where it is dropped."""
+        return self.update_row(self._live.fill(sample), 0)
+
+    def update_row(self, block: Block, row: int) -> Frame | None:
+        """Frame of a row of a block, or None where it is dropped."""
+        state, now_ns = self.state[0], block.time_ns[row]
+        told = (now_ns, block.seq[row], block.values[row], block.pumps, block.is_bad)
+        if not let_through(state, self.ranges, *told, self.frame):
+            return None
+        level_m, inflow_m3h, *rest = self.frame.tolist()
+        readings = (rest[first : first + PUMP_VALUES] for first in range(0, len(rest), PUMP_VALUES))
+        return Frame(
+            int(now_ns),
+            float(state["gap_s"]),
+            level_m,
+            inflow_m3h,
+            tuple(PumpFrame(f, q, h, p, None if math.isnan(on) else on > 0.0) for f, q, h, p, on in readings),
+        )
+
+
+def _ranges(nominal: Nominal, pump: int) -> tuple[float, ...]:
+    """Lowest and highest frequency, flow and head that a pump can show."""
+    runout_m3h = nominal.runout_flow_m3h(pump)
+    return (
+        -0.5,
+        2.0 * nominal.frequencies_hz[pump],
+        -0.1 * runout_m3h,
+        2.0 * runout_m3h,
+        -10.0,
+        3.0 * nominal.curves[pump][0],
+    )
+
+
+@compiled
+def seconds_between(earlier_ns: int, later_ns: int) -> float:
+    """Time between stamps, to the nanosecond but for those that lie so far apart that their difference overflows."""
+    about_s = later_ns / NS_PER_S - earlier_ns / NS_PER_S
+    if abs(about_s) > CENTURY_S:
+        return about_s
+    return (later_ns - earlier_ns) / NS_PER_S
+
+
+@compiled
+def _is_in_order(state: Any, time_ns: int, seq: int) -> bool:
+    """Whether a sample is let through; its gap is noted."""
+    if not state["is_begun"]:
+        state["gap_s"] = 0.0
+        return True
+    gap_s = seconds_between(state["time_ns"], time_ns)
+    if MIN_GAP_S <= gap_s <= MAX_JUMP_S:
+        state["gap_s"] = gap_s
+        return True
+    since_other_s = seconds_between(state["other_ns"], time_ns)
+    if 0.0 <= gap_s < MIN_GAP_S or (state["other_count"] > 0 and 0.0 <= since_other_s < MIN_GAP_S):
+        state["doubled"] += 1
+        return False
+    if gap_s < 0.0:
+        state["late"] += 1
+    else:
+        state["future"] += 1
+    follows = state["other_count"] > 0 and 0.0 < since_other_s <= MAX_JUMP_S
+    state["other_count"] = state["other_count"] + 1 if follows else 1
+    state["other_ns"] = time_ns
+    may_be_resent = gap_s < 0.0 and seq <= state["seq"]
+    if state["other_count"] < (RESENT_SAMPLES if may_be_resent else CONFIRMATIONS):
+        return False
+    state["clock_steps"] += 1
+    state["gap_s"] = math.inf
+    return True
+
+
+@compiled
+def _count_lost(state: Any, seq: int, is_let_through: bool) -> None:
+    last = state["seq"]
+    if state["is_begun"] and 1 < seq - last <= MAX_LOST:  # beyond, the source counts from elsewhere
+        state["lost"] += seq - last - 1
+    if seq > last or is_let_through:
+        state["seq"] = seq
+
+
+@compiled
+def _checked(state: Any, value: float, low: float, high: float) -> float:
+    """The value, or NaN, and counted, where it is absent or cannot be."""
+    if low <= value <= high:
+        return value
+    if math.isfinite(value):
+        state["out_of_range_values"] += 1
+    else:
+        state["missing_values"] += 1
+    return math.nan
+
+
+@compiled
+def let_through(
+    state: Any, ranges: Any, time_ns: int, seq: int, values: Floats, pumps: int, is_bad: bool, frame: Floats
+) -> bool:
+    """Whether a sample passes; then `frame` holds its values."""
+    state["samples"] += 1
+    is_let_through = _is_in_order(state, time_ns, seq)
+    _count_lost(state, seq, is_let_through)
+    if not is_let_through:
+        return False
+    state["is_begun"] = 1
+    state["time_ns"] = time_ns
+    state["other_count"] = 0
+    if state["gap_s"] > MAX_GAP_S:
+        state["gaps"] += 1
+    if math.isfinite(state["gap_s"]):
+        state["seen_s"] += state["gap_s"]
+    frame[:] = math.nan
+    if is_bad:
+        state["bad_quality"] += 1
+        return True
+    if pumps != ranges.shape[0]:
+        state["wrong_pump_count"] += 1
+    frame[LEVEL] = _checked(state, values[LEVEL], LEVEL_RANGE_M[0], LEVEL_RANGE_M[1])
+    if math.isfinite(values[INFLOW]):
+        frame[INFLOW] = values[INFLOW]
+    for pump in range(min(pumps, ranges.shape[0])):
+        limits, at = ranges[pump], FIRST_PUMP + PUMP_VALUES * pump
+        frame[at + FREQUENCY] = _checked(
+            state, values[at + FREQUENCY], limits["low_frequency_hz"], limits["high_frequency_hz"]
+        )
+        frame[at + FLOW] = _checked(state, values[at + FLOW], limits["low_flow_m3h"], limits["high_flow_m3h"])
+        frame[at + HEAD] = _checked(state, values[at + HEAD], limits["low_head_m"], limits["high_head_m"])
+        frame[at + POWER] = _checked(state, values[at + POWER], POWER_RANGE_KW[0], POWER_RANGE_KW[1])
+        frame[at + RUNNING] = values[at + RUNNING]
+    return True

@@ -1,0 +1,272 @@
+"""The open runs of a station from sample to sample: which pumps run, and which samples are steady; compiled."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.detector.curves.datasheet import Nominal, Table, duty_flows
+from wetwell.detector.curves.residuals import distances
+from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, SIGNALS, Floats
+from wetwell.detector.stream.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
+from wetwell.protocols.jit import compiled
+from wetwell.protocols.timestamps import NS_PER_S
+
+WARM_UP_S = 30.0
+SETTLING_S = 10.0
+SPEED_STEP = 0.02
+"""A change of the speed by more than this share of nominal has to settle."""
+MIN_SPEED_RATIO = 0.4
+MAX_SPEED_RATIO = 1.25
+MAX_RUN_S = 1800.0
+BREAK_S = 60.0
+USUAL_GAPS = 2.5
+"""A feed that is slow by itself breaks only where it lacks more than so many of its usual steps."""
+RUNNING_SHARE = 0.05
+"""Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
+NO_FLOW_SHARE = 0.01
+"""Share of the run-out flow below which the check valve is closed: then the main may take less than its curve."""
+NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
+BLIND_S = 60.0
+"""A run that has lacked one of them for so long is reported at once."""
+WARM_UP_NS, SETTLING_NS, PART_NS, BLIND_NS = (int(s * NS_PER_S) for s in (WARM_UP_S, SETTLING_S, MAX_RUN_S, BLIND_S))
+
+PUMP = np.dtype(
+    [
+        (name, np.int64)
+        for name in (
+            "is_running",
+            "is_open",
+            "is_ending",
+            "is_steady",
+            "is_reported_blind",
+            "is_blind",
+            "is_learning",
+            "start_ns",
+            "part_ns",
+            "last_ns",
+            "steady_from_ns",
+            "samples",
+            "seen",
+            "stuck",
+        )
+    ]
+    + [
+        (name, np.float64)
+        for name in ("speed_ratio", "duty_speed", "duty_m3h", "run_s", "log_ratio", "pump_log_p", "system_log_p")
+    ]
+)
+"""What is known of a pump from sample to sample.
+
+The open run: its start, that of the part being collected, its last sample, when it will be steady, how many steady
+samples it has, a bit for each signal that it has had, and whether one that is needed has never come. Speed and flow
+by the datasheet. For others: whether the pump is being learnt, a bit for each meter that was stuck in the run, time
+that it ran, the drawdown figure of its last run, and the smallest log p of the rolling tests since they were told.
+"""
+PACE = np.dtype([("segment_samples", np.int64), ("gap_s", np.float64), ("gap_before_s", np.float64)])
+"""How fast a feed comes: samples in a segment, by the pace of the last run, and the last two gaps that are known."""
+COLUMNS = 10
+"""Of a steady sample: pump, time, flow, head, speed ratio, total flow, level, power, both flows by the datasheet."""
+LEAST_ROOM = 256
+SEGMENT_MEANS = 8
+
+
+def new_pumps(nominal: Nominal) -> npt.NDArray[np.void]:
+    """State of the pumps of a station before the first sample."""
+    pumps = np.zeros(nominal.pumps, dtype=PUMP)
+    pumps["speed_ratio"] = pumps["log_ratio"] = math.nan
+    pumps["is_learning"] = 1
+    return pumps
+
+
+def new_pace() -> npt.NDArray[np.void]:
+    """Pace of a feed before its first sample."""
+    pace = np.zeros(1, dtype=PACE)
+    pace["segment_samples"] = SEGMENT_SAMPLES
+    return pace
+
+
+@compiled
+def is_break(pace: Any, gap_s: float, limit_s: float) -> bool:
+    """Whether a gap is longer than the limit, and than the feed's own pace explains."""
+    return bool(gap_s > limit_s and gap_s > USUAL_GAPS * min(pace["gap_s"], pace["gap_before_s"]))
+
+
+@compiled
+def note_gap(pace: Any, gap_s: float) -> None:
+    """Remember a gap, after it has been judged."""
+    if gap_s < math.inf:
+        pace["gap_before_s"] = pace["gap_s"]
+        pace["gap_s"] = gap_s
+
+
+@compiled
+def _says_running(own: Any, frame: Floats, at: int, is_open: bool) -> bool:
+    """Whether a pump runs: by its flag, else by frequency or flow, else as it did."""
+    if not math.isnan(frame[at + RUNNING]):
+        return bool(frame[at + RUNNING] > 0.0)
+    if not math.isnan(frame[at + FREQUENCY]):
+        return bool(frame[at + FREQUENCY] > RUNNING_SHARE * own["frequency_hz"])
+    if not math.isnan(frame[at + FLOW]):
+        return bool(frame[at + FLOW] > RUNNING_SHARE * own["runout_m3h"])
+    return is_open
+
+
+@compiled
+def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
+    pump["steady_from_ns"] = max(pump["steady_from_ns"], now_ns + wait_ns)
+
+
+@compiled
+def note_running(table: Table, pumps: Any, pace: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+    """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
+    is_broken = is_break(pace, gap_s, BREAK_S)
+    is_changed = any_ending = False
+    for number in range(pumps.shape[0]):
+        pump = pumps[number]
+        is_open = pump["is_open"] != 0
+        at = FIRST_PUMP + PUMP_VALUES * number
+        is_running = _says_running(table[number], frame, at, is_open and not is_broken)
+        is_changed = is_changed or is_running != (pump["is_running"] != 0)
+        pump["is_running"] = is_running
+        is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= PART_NS
+        pump["is_ending"] = is_open and is_over
+        any_ending = any_ending or (is_open and is_over)
+        if is_open and is_broken:
+            pump["is_open"] = 0
+    if is_changed:
+        for number in range(pumps.shape[0]):
+            if pumps[number]["is_open"]:
+                _settle(pumps[number], time_ns, WARM_UP_NS)
+    return any_ending
+
+
+@compiled
+def steady_rows(pumps: Any) -> int:
+    """Number of steady samples in all open runs."""
+    rows = 0
+    for number in range(pumps.shape[0]):
+        rows += pumps[number]["samples"]
+    return rows
+
+
+@compiled
+def drop_ended(pumps: Any, rows: Floats, time_ns: int) -> None:
+    """Close the runs that end, and begin the next part of those that go on."""
+    kept = 0
+    for row in range(steady_rows(pumps)):
+        if not pumps[int(rows[row, 0])]["is_ending"]:
+            for column in range(COLUMNS):
+                rows[kept, column] = rows[row, column]
+            kept += 1
+    for number in range(pumps.shape[0]):
+        pump = pumps[number]
+        if pump["is_ending"]:
+            pump["is_ending"] = pump["samples"] = pump["seen"] = 0
+            pump["is_open"] = pump["is_open"] and pump["is_running"]
+            pump["part_ns"] = time_ns
+
+
+@compiled
+def _note_duty(table: Table, pumps: Any, frame: Floats) -> None:
+    """Flows by the datasheet; worked out anew only when a speed has changed."""
+    is_new = False
+    for number in range(pumps.shape[0]):
+        pump, frequency_hz = pumps[number], frame[FIRST_PUMP + PUMP_VALUES * number + FREQUENCY]
+        speed = frequency_hz / table[number]["frequency_hz"] if pump["is_running"] and frequency_hz > 0.0 else 0.0
+        is_new = is_new or speed != pump["duty_speed"]
+        pump["duty_speed"] = speed
+    if is_new:
+        duty_flows(table, pumps)
+
+
+@compiled
+def _collect(table: Table, pumps: Any, number: int, time_ns: int, frame: Floats, rows: Floats, row: int) -> bool:
+    """Take the frame into the open run of a pump; whether it is steady, and so has become this row."""
+    pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
+    flow_m3h, head_m = frame[at + FLOW], frame[at + HEAD]
+    for bit, value in enumerate((frame[at + FREQUENCY], flow_m3h, head_m, frame[LEVEL], frame[at + POWER])):
+        if not math.isnan(value):
+            pump["seen"] |= 1 << bit
+    speed_ratio = frame[at + FREQUENCY] / own["frequency_hz"]
+    if not abs(speed_ratio - pump["speed_ratio"]) <= SPEED_STEP:
+        pump["speed_ratio"] = speed_ratio
+        _settle(pump, time_ns, SETTLING_NS)
+    is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
+    if time_ns < pump["steady_from_ns"] or not is_usable or math.isnan(flow_m3h + head_m):
+        return False
+    _note_duty(table, pumps, frame)
+    total_m3h, duty_total_m3h = flow_m3h, pump["duty_m3h"]
+    if own["is_common_header"]:
+        total_m3h = duty_total_m3h = 0.0
+        for other in range(pumps.shape[0]):
+            duty_total_m3h += pumps[other]["duty_m3h"]
+            if pumps[other]["is_running"]:
+                total_m3h += frame[FIRST_PUMP + PUMP_VALUES * other + FLOW]
+        if math.isnan(total_m3h):
+            return False
+    rows[row, 0] = number
+    rows[row, 1] = (time_ns - pump["part_ns"]) / NS_PER_S
+    rows[row, 2] = flow_m3h
+    rows[row, 3] = head_m
+    rows[row, 4] = speed_ratio
+    rows[row, 5] = total_m3h
+    rows[row, 6] = frame[LEVEL]
+    rows[row, 7] = frame[at + POWER]
+    rows[row, 8] = pump["duty_m3h"] / speed_ratio
+    rows[row, 9] = duty_total_m3h
+    return True
+
+
+@compiled
+def collect(table: Table, pumps: Any, time_ns: int, frame: Floats, rows: Floats) -> bool:
+    """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind."""
+    row = steady_rows(pumps)
+    any_blind = False
+    for number in range(pumps.shape[0]):
+        pump = pumps[number]
+        pump["is_steady"] = pump["is_blind"] = 0
+        if not pump["is_running"]:
+            continue
+        if not pump["is_open"]:
+            pump["is_open"] = 1
+            pump["is_reported_blind"] = pump["samples"] = pump["seen"] = 0
+            pump["start_ns"] = pump["part_ns"] = time_ns
+            pump["steady_from_ns"] = time_ns + WARM_UP_NS
+            pump["speed_ratio"] = math.nan
+        pump["last_ns"] = time_ns
+        if _collect(table, pumps, number, time_ns, frame, rows, row):
+            pump["is_steady"] = 1
+            pump["samples"] += 1
+            row += 1
+        if not pump["is_reported_blind"] and time_ns - pump["start_ns"] >= BLIND_NS:
+            pump["is_reported_blind"] = 1
+            pump["is_blind"] = pump["seen"] & NEEDED_BITS != NEEDED_BITS
+            any_blind = any_blind or pump["is_blind"] != 0
+    return any_blind
+
+
+@compiled
+def average(table: Table, pump: int, rows: Floats, samples: int, means: Floats) -> None:
+    """Set the means of each segment of so many samples: both residuals, then as in `Segments`."""
+    own = table[pump]
+    for segment in range(means.shape[1]):
+        means[:, segment] = 0.0
+        for at in range(segment * samples, (segment + 1) * samples):
+            flow_m3h, head_m, speed_ratio, total_m3h = rows[at, 2], rows[at, 3], rows[at, 4], rows[at, 5]
+            pump_m, system_m = distances(
+                *(flow_m3h, head_m, speed_ratio, total_m3h, own["c0"], own["c1"], own["c2"]),
+                *(own["static_head_m"], own["friction_h2_m5"]),
+            )
+            is_closed = total_m3h < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
+            means[0, segment] += pump_m
+            means[1, segment] += 0.0 if is_closed else system_m
+            means[2, segment] += flow_m3h / speed_ratio
+            means[3, segment] += total_m3h
+            means[4, segment] += rows[at, 8]
+            means[5, segment] += rows[at, 9]
+            means[6, segment] += rows[at, 6]
+            means[7, segment] += speed_ratio
+        for mean in range(SEGMENT_MEANS):
+            means[mean, segment] /= samples

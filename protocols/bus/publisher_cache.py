@@ -1,0 +1,182 @@
+"""What a publisher keeps of its messages, numbered, for those who come late or have lost some, and how they ask."""
+
+import secrets
+import struct
+import threading
+from collections import deque
+from collections.abc import Iterator
+from itertools import accumulate, islice, pairwise
+from typing import Literal, NamedTuple
+
+from pydantic import Field, ValidationError
+
+from wetwell.protocols.messages.messages import Message
+
+SOURCE_BYTES = 8
+PAGE_BYTES = 65_536
+"""Messages of one answer; one message at least."""
+
+_MARK = struct.Struct(f">{SOURCE_BYTES}sQ")
+_PAGE = struct.Struct(f">{SOURCE_BYTES}sQQ")
+
+
+class KeptQuery(Message):
+    """Question on the key of a publisher for what it keeps; without `source` for its last message."""
+
+    schema_name: Literal["wetwell.kept-query/1"] = Field("wetwell.kept-query/1", alias="schema")
+    source: str = Field("", max_length=2 * SOURCE_BYTES)
+    begin: int = Field(0, ge=0, lt=2**63)
+
+
+class Page(NamedTuple):
+    """Messages of one publisher without a gap.
+
+    Attributes
+    ----------
+    source : bytes
+        Of which life of which publisher.
+    first : int
+        Number of the first of `payloads`; where there are none, of the next message.
+    end : int
+        Number that the publisher's next message will have.
+    """
+
+    source: bytes
+    first: int
+    end: int
+    payloads: tuple[bytes, ...]
+
+    def encode(self) -> tuple[bytes, bytes]:
+        """Body, the messages one after the other, and head, which says where each ends."""
+        sizes = [len(payload) for payload in self.payloads]
+        return b"".join(self.payloads), _PAGE.pack(*self[:3]) + struct.pack(f">{len(sizes)}I", *sizes)
+
+    @classmethod
+    def decode(cls, body: bytes, head: bytes) -> "Page | None":
+        """Page in an answer; None if it is none.
+
+        Examples
+        --------
+        >>> page = Page(b"8 bytes.", 7, 9, (b"seven", b"eight"))
+        >>> Page.decode(*page.encode()) == page, Page.decode(b"seven", b"")
+        (True, None)
+        """
+        if len(head) < _PAGE.size or len(head) % 4:
+            return None
+        source, first, end = _PAGE.unpack_from(head)
+        sizes = struct.unpack_from(f">{(len(head) - _PAGE.size) // 4}I", head, _PAGE.size)
+        ends = list(accumulate(sizes, initial=0))
+        if ends[-1] != len(body) or first + len(sizes) > end:
+            return None
+        payloads = tuple(body[begin:stop] for begin, stop in pairwise(ends))
+        return cls(source, first, end, payloads)
+
+
+class LastMessages:
+    """The last messages of a publisher, and the last one in any case.
+
+    Parameters
+    ----------
+    history : int
+        Most messages, >= 1; one that holds many things counts as many.
+    before : LastMessages, optional
+        What to begin with.
+    """
+
+    def __init__(self, history: int, before: "LastMessages | None" = None) -> None:
+        self.payloads: deque[bytes] = deque()
+        self._history = history
+        self._weights: deque[int] = deque()
+        self._weight = 0
+        if before is not None:
+            for payload, weight in before.weighed():
+                self.add(payload, weight)
+
+    def weighed(self) -> Iterator[tuple[bytes, int]]:
+        """Messages with what each counts as."""
+        return zip(self.payloads, self._weights, strict=True)
+
+    def add(self, payload: bytes, weight: int) -> None:
+        """Keep a message that counts as so many."""
+        self.payloads.append(payload)
+        self._weights.append(weight)
+        self._weight += weight
+        while self._weight > self._history and len(self.payloads) > 1:
+            self.payloads.popleft()
+            self._weight -= self._weights.popleft()
+
+
+class KeptMessages:
+    """What one publisher keeps. Its `source` is new with each life, its numbers count up from 0.
+
+    Parameters
+    ----------
+    history : int
+        Most messages that are kept, >= 1.
+    """
+
+    def __init__(self, history: int) -> None:
+        self.source = secrets.token_bytes(SOURCE_BYTES)
+        self.end = 0
+        self._last = LastMessages(history)
+        self._payloads = self._last.payloads
+        self._lock = threading.Lock()
+
+    def add(self, payload: bytes, weight: int = 1) -> bytes:
+        """Keep a message; the mark that goes with it."""
+        with self._lock:
+            mark = _MARK.pack(self.source, self.end)
+            self._last.add(payload, weight)
+            self.end += 1
+        return mark
+
+    @property
+    def last(self) -> bytes | None:
+        """The last message; None before the first."""
+        with self._lock:
+            return self._payloads[-1] if self._payloads else None
+
+    @property
+    def next_mark(self) -> bytes:
+        """Mark of the next message."""
+        return _MARK.pack(self.source, self.end)
+
+    def page(self, query: KeptQuery) -> Page | None:
+        """What a question asks for, as far as it is kept and fits; None if it is for another one, or all is new."""
+        if self.end == 0 or query.source not in ("", self.source.hex()):
+            return None
+        with self._lock:
+            kept = len(self._payloads)
+            begin = query.begin if query.source else self.end - 1
+            first = min(max(begin, self.end - kept), self.end)
+            payloads: list[bytes] = []
+            room = PAGE_BYTES
+            for payload in islice(self._payloads, first - (self.end - kept), None):
+                room -= len(payload)
+                if payloads and room < 0:
+                    break
+                payloads.append(payload)
+            return Page(self.source, first, self.end, tuple(payloads))
+
+
+def read_mark(mark: bytes) -> tuple[bytes, int] | None:
+    """Source and number in the mark of a message; None if it is none, as of a publisher that is not of this package.
+
+    Examples
+    --------
+    >>> kept = KeptMessages(history=2)
+    >>> read_mark(kept.add(b"{}")) == (kept.source, 0), read_mark(b"?")
+    (True, None)
+    """
+    if len(mark) != _MARK.size:
+        return None
+    source, number = _MARK.unpack(mark)
+    return source, number
+
+
+def read_query(payload: bytes) -> KeptQuery | None:
+    """Question for what is kept; None if it is none."""
+    try:
+        return KeptQuery.model_validate_json(payload)
+    except ValidationError:
+        return None

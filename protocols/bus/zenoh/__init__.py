@@ -1,0 +1,1 @@
+"""The bus over Zenoh, the only importer of its library."""

@@ -1,0 +1,305 @@
+"""Bus over Zenoh: one process is the router, the others are its clients."""
+
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+import random
+import threading
+from collections.abc import Sequence
+from typing import Self
+
+import zenoh
+
+from wetwell.protocols.bus.interface import Keyed, Presence, Request
+from wetwell.protocols.bus.mailbox import Mailbox
+from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
+from wetwell.protocols.bus.zenoh.publisher import ZenohPublisher, at_once
+from wetwell.protocols.bus.zenoh.session import open_client_session, open_router_session, refusal
+from wetwell.protocols.bus.zenoh.subscription import Feed
+from wetwell.protocols.bus.zenoh.worker import ZenohPump
+from wetwell.protocols.errors import LinkError
+from wetwell.protocols.messages.messages import JSON_ENCODING
+
+logger = logging.getLogger(__name__)
+
+REQUESTS = 1_000
+"""Most questions, or changes of presence, that wait for one reader."""
+
+
+class ZenohRequest:
+    """Question that came over Zenoh."""
+
+    def __init__(self, query: zenoh.Query, reply_key: str) -> None:
+        self.key = str(query.key_expr)
+        self.payload = b"" if query.payload is None else query.payload.to_bytes()
+        self._query = query
+        self._reply_key = reply_key
+
+    def reply(self, payload: bytes) -> None:
+        """Answer it; nothing happens if who asked is gone."""
+        with contextlib.suppress(zenoh.ZError), self._query:
+            self._query.reply(self._reply_key, payload, encoding=JSON_ENCODING)
+
+
+class ZenohBus:
+    """A `Bus` over a Zenoh session. Close it, or use it in a `with`: else the process never ends.
+
+    Characteristics: buffered: in each subscription, and in each publisher its last `history` messages · when full:
+    the oldest is dropped and counted; on the way to a slow subscriber messages are dropped and asked for again from
+    the publisher's history · threads: any may publish; one of the bus's own fetches what has come, each 10 ms ·
+    reconnect: a client comes back by itself, usually within 0.5 s of the router; its publishers, subscriptions and
+    what it announced are then as before.
+
+    The messages of one publisher come in their order, each once. What was lost, or sent while a router was away,
+    comes afterwards as far as the publisher keeps it; later messages of it wait until then, about a minute where
+    nobody answers. The last one of a publisher that falls silent is missed after a second, behind a link between
+    routers that was away after a minute at most. Without a `history` a subscription begins with the first message
+    that reaches it.
+
+    Parameters
+    ----------
+    session : zenoh.Session
+        Open session; the bus closes it.
+    is_router : bool
+        Whether others connect to this session.
+    """
+
+    def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
+        self._session = session
+        self._is_router = is_router
+        self._declared: list[object] = []  # zenoh undeclares what nobody holds
+        self._pump = ZenohPump(session, is_router=is_router)
+        self._exit = contextlib.ExitStack()
+        self._exit.enter_context(session)
+        self._exit.callback(self._pump.stop)
+        self._lock = threading.Lock()  # zenoh refuses to be asked while another thread closes the session
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the network; twice is fine."""
+        with self._lock:
+            self._exit.close()
+
+    def publisher(self, key: str, *, history: int = 1) -> ZenohPublisher:
+        """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss.
+
+        Raises
+        ------
+        ValueError
+            If `history` is below one.
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        if history < 1:
+            raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
+        with refusal("publish on", key):
+            publisher = ZenohPublisher(self._session, key, history, self._pump.questions)
+        self._pump.publish(publisher)
+        return publisher
+
+    def subscribe(
+        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
+    ) -> Mailbox[bytes]:
+        """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
+
+        Without `recover`, and without `history`, what is lost on the way stays lost.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[bytes] = Mailbox(capacity)
+
+        def take(messages: list[Keyed]) -> None:
+            mailbox.extend([payload for _, payload in messages])
+
+        with refusal("subscribe to", key):
+            self._pump.follow(Feed(self._session, [key], history, take, recover=recover))
+        return mailbox
+
+    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
+        """One subscription to many keys, whose messages come with their keys.
+
+        Raises
+        ------
+        LinkError
+            If a key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Keyed] = Mailbox(capacity)
+        with refusal("subscribe to", ", ".join(keys[:3])):
+            self._pump.follow(Feed(self._session, keys, history, mailbox.extend, recover=True))
+        return mailbox
+
+    def answer(self, key: str) -> Mailbox[Request]:
+        """Questions that are asked on a key from now on; each is to be answered.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Request] = Mailbox(REQUESTS)
+
+        def deliver(query: zenoh.Query) -> None:
+            mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
+
+        with refusal("answer", key):
+            self._declared.append(self._session.declare_queryable(key, at_once(deliver)))
+        return mailbox
+
+    async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
+        """Answers to a question; of a key with a publisher also its last message. None in time: an empty list.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        loop, ended, answers = asyncio.get_running_loop(), asyncio.Event(), list[bytes]()
+
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.append(reply.ok.payload.to_bytes())
+
+        def end() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits
+                loop.call_soon_threadsafe(ended.set)
+
+        with refusal("ask", key):
+            self._session.get(
+                key,
+                zenoh.handlers.Callback(take, end, indirect=False),
+                payload=payload,
+                encoding=JSON_ENCODING,
+                target=zenoh.QueryTarget.ALL,
+                timeout=timeout_s,
+            )
+        await ended.wait()
+        return answers
+
+    def watch(self, key: str) -> Mailbox[Presence]:
+        """Services that are announced under a key expression: those that live now, then each change.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        mailbox: Mailbox[Presence] = Mailbox(REQUESTS)
+
+        def deliver(sample: zenoh.Sample) -> None:
+            mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
+
+        with refusal("watch", key):
+            self._declared.append(self._session.liveliness().declare_subscriber(key, at_once(deliver), history=True))
+        return mailbox
+
+    def announce(self, key: str) -> None:
+        """Show under a key that this service lives, by a liveliness token that goes with the connection.
+
+        Raises
+        ------
+        LinkError
+            If the key is not a key expression or the bus is closed.
+        """
+        with refusal("announce", key):
+            self._declared.append(self._session.liveliness().declare_token(key))
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether messages can reach others now: a router always, a client while it has its router."""
+        with self._lock:
+            if self._session.is_closed():
+                return False
+            return self._is_router or bool(self._session.info.routers_zid())
+
+
+def open_router(endpoint: str, access: ZenohAccess = OPEN, upstream: Sequence[str] = ()) -> ZenohBus:
+    """Bus to which others connect; with `upstream` a branch of the tree of those routers, looked for until there.
+
+    Parameters
+    ----------
+    endpoint : str
+        Where to listen, such as `tcp/127.0.0.1:7447`, or `tls/...` with a certificate.
+    access : ZenohAccess
+        Who may come, and what they may do.
+    upstream : sequence of str
+        Endpoints of routers that this one connects to.
+
+    Raises
+    ------
+    ConfigError
+        If `endpoint` is not of that form, or something of `access` is missing or cannot be read.
+    LinkError
+        If the endpoint cannot be listened on, most often because another program does.
+    """
+    return ZenohBus(open_router_session(endpoint, access, upstream), is_router=True)
+
+
+def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0) -> ZenohBus:
+    """Bus through the router at an endpoint; waits up to `timeout_s` for it.
+
+    Raises
+    ------
+    ConfigError
+        If `endpoint` is not of the form `tcp/127.0.0.1:7447`, or something of `access` is missing or cannot be read.
+    LinkError
+        If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
+    """
+    return ZenohBus(open_client_session(endpoint, access, timeout_s), is_router=False)
+
+
+async def connect_client(
+    endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0, longest_wait_s: float = 10.0
+) -> ZenohBus:
+    """Bus through the router at an endpoint; tries until it is there, with full jitter, and logs each failure.
+
+    Parameters
+    ----------
+    endpoint : str
+        Where the router listens, such as `tcp/127.0.0.1:7447`.
+    access : ZenohAccess
+        Who this client is.
+    timeout_s : float
+        Time limit of one try. [s]
+    longest_wait_s : float
+        Upper limit of the random wait between two tries, which otherwise grows as 1.5^n. [s]
+
+    Raises
+    ------
+    ConfigError
+        If `endpoint` is not of that form or `access` is wrong in itself: no later try would help.
+    """
+    attempt = 0
+    while True:
+        try:
+            return await _open_in_thread(endpoint, access, timeout_s)
+        except LinkError as error:
+            attempt += 1
+            wait_s = random.uniform(0.0, min(longest_wait_s, 1.5 ** min(attempt, 100)))
+            logger.warning("%s; try %d, next in %.1f s", error, attempt, wait_s)
+        await asyncio.sleep(wait_s)
+
+
+async def _open_in_thread(endpoint: str, access: ZenohAccess, timeout_s: float) -> ZenohBus:
+    """Open a client without blocking the loop; a bus that comes after a cancellation is closed in the thread."""
+    executor = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh-open")
+    opening = executor.submit(open_client, endpoint, access, timeout_s=timeout_s)
+    executor.shutdown(wait=False)
+    try:
+        return await asyncio.wrap_future(opening)
+    except asyncio.CancelledError:
+        opening.add_done_callback(_close_late)
+        raise
+
+
+def _close_late(opening: concurrent.futures.Future[ZenohBus]) -> None:
+    if not opening.cancelled() and opening.exception() is None:
+        opening.result().close()

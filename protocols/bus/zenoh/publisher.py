@@ -1,0 +1,128 @@
+"""One key of a Zenoh bus, from the side of who publishes."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from wetwell.protocols.bus.keys import tail_key
+from wetwell.protocols.bus.publisher_cache import KeptMessages, read_query
+from wetwell.protocols.bus.zenoh.session import reason
+from wetwell.protocols.errors import LinkError
+from wetwell.protocols.messages.messages import JSON_ENCODING
+
+LAST_LOSS_S = 1.0
+"""So long after a message that no other followed its publisher says that it was the last."""
+LONGEST_SILENCE_S = 60.0
+"""So long at most until it says so again."""
+SAME_PAUSE = 0.2
+"""Share by which one pause may differ from the one before in a rhythm."""
+
+
+def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0.0) -> bool:
+    """Whether a publisher should say, again, which message was its last: 1, 4, 16, 64 s after it, then each 60 s.
+
+    Once is not enough: where a link between two routers was away, neither the publisher nor who has missed
+    something is told of it. As the waits grow, what was lost is known within four times as long as the link was away.
+    Who speaks in a rhythm has nothing to say until it has missed its turn: its next message shows what is missing.
+
+    Parameters
+    ----------
+    now_s : float
+        Time. [s]
+    silent_s : float
+        Since when it is silent. [s]
+    told_s : float
+        When it has said so before. [s]
+    rhythm_s : float
+        From each message to the next; 0 if that differs. [s]
+
+    Examples
+    --------
+    >>> [is_end_due(now_s, 10.0, 0.0) for now_s in (10.9, 11.1)]
+    [False, True]
+    >>> [is_end_due(now_s, 10.0, 11.0) for now_s in (13.9, 14.1)]
+    [False, True]
+    >>> [is_end_due(now_s, 10.0, 500.0) for now_s in (559.9, 560.1)]
+    [False, True]
+    >>> [is_end_due(now_s, 10.0, 0.0, rhythm_s=10.0) for now_s in (29.9, 30.1)]
+    [False, True]
+    """
+    first_s = max(LAST_LOSS_S, min(2.0 * rhythm_s, LONGEST_SILENCE_S))
+    wait_s = min(3.0 * (told_s - silent_s), LONGEST_SILENCE_S) if told_s > silent_s else 0.0
+    return now_s - silent_s > first_s and now_s - told_s > wait_s
+
+
+class ZenohPublisher:
+    """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
+
+    def __init__(
+        self, session: zenoh.Session, key: str, history: int, questions: "deque[tuple[ZenohPublisher, zenoh.Query]]"
+    ) -> None:
+        self.key = key
+        self.kept = KeptMessages(history)
+        self._silent_s = 0.0
+        self._told_s = 0.0
+        self._pause_s = 0.0
+        self._rhythm_s = 0.0
+        self._session = session
+        self._questions = questions
+        self._lock = threading.Lock()
+        self._publisher = session.declare_publisher(
+            key, encoding=JSON_ENCODING, congestion_control=zenoh.CongestionControl.DROP
+        )
+        self._queryable = session.declare_queryable(key, at_once(self._ask))
+
+    def put(self, payload: bytes, weight: int = 1) -> None:
+        """Send a message, which counts as `weight` kept ones; without a router it is kept for the time after.
+
+        Raises
+        ------
+        LinkError
+            If the bus is closed.
+        """
+        with self._lock:  # what is numbered first is sent first
+            mark = self.kept.add(payload, weight)
+            try:  # not `refusal`: this is once a message
+                self._publisher.put(payload, attachment=mark)
+            except zenoh.ZError as error:
+                raise LinkError(f"cannot publish on '{self.key}': {reason(error)}") from error
+        now_s = time.monotonic()
+        pause_s = now_s - self._silent_s
+        self._rhythm_s = pause_s if abs(pause_s - self._pause_s) < SAME_PAUSE * pause_s else 0.0
+        self._pause_s, self._silent_s = pause_s, now_s
+
+    def _ask(self, query: zenoh.Query) -> None:
+        self._questions.append((self, query))
+
+    def answer(self, query: zenoh.Query) -> None:
+        """Answer what is kept, or the last message to those who only ask for that."""
+        asked = None if query.payload is None else read_query(query.payload.to_bytes())
+        with query:
+            if asked is None:
+                if (last := self.kept.last) is not None:
+                    query.reply(self.key, last, encoding=JSON_ENCODING)
+            elif (page := self.kept.page(asked)) is not None:
+                body, head = page.encode()
+                query.reply(self.key, body, attachment=head)
+
+    def stir(self, now_s: float) -> None:
+        """Say which message was the last as if it had just been sent: the link was away."""
+        self._silent_s, self._told_s, self._rhythm_s = now_s - LAST_LOSS_S, 0.0, 0.0
+
+    def settle(self, now_s: float) -> bool:
+        """Tell those who follow which message was the last, if it is time to; whether it was."""
+        if not self.kept.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
+            return False
+        self._told_s = now_s
+        drop = zenoh.CongestionControl.DROP
+        self._session.put(tail_key(self.key), b"", attachment=self.kept.next_mark, congestion_control=drop)
+        return True
+
+
+def at_once(take: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":
+    """A callback in the thread of the session, for what is rare and takes no time. By default each has a thread."""
+    return zenoh.handlers.Callback(take, indirect=False)

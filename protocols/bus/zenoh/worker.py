@@ -1,0 +1,238 @@
+"""The thread of a Zenoh bus: fetches what has come, asks for what is missing, answers those who ask.
+
+Zenoh's own threads put messages into channels without Python's lock. A callback for each message would wait for
+that lock while the process computes, up to 5 ms a message.
+"""
+
+import logging
+import random
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from wetwell.protocols.bus.publisher_cache import KeptQuery, Page
+from wetwell.protocols.bus.sequencer import Line
+from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher, at_once
+from wetwell.protocols.bus.zenoh.subscription import CHANNEL, Feed
+from wetwell.protocols.messages.messages import JSON_ENCODING
+
+logger = logging.getLogger(__name__)
+
+PERIOD_S = 0.01
+
+ROUNDS = 25
+"""In so many periods each publisher is looked at once."""
+TOLD_AT_ONCE = 10
+"""Publishers that say in one period which message was their last: it costs more than a message."""
+ASKED = 32
+"""Questions for missing messages that are on the way at the same time."""
+ANSWER_S = 2.0
+TRIES = 5
+PATIENT_TRIES = 20
+"""Of messages whose publisher may be behind a link between routers that is away: about a minute."""
+FIRST_WAIT_S = 0.1
+"""Longest wait before the second try; it doubles with each, and is drawn at random."""
+LONGEST_WAIT_S = 5.0
+
+LOOK = KeptQuery().encode()
+
+
+@dataclass
+class Question:
+    """A question for missing messages of a line, or for the last message of all publishers on a key."""
+
+    feed: Feed
+    key: str
+    line: Line | None = None
+    due_s: float = 0.0
+    begin: int = 0
+    tries: int = 0
+    replies: Any = None
+    is_refused: bool = False
+
+
+class ZenohPump(threading.Thread):
+    """Serves all feeds and publishers of a session until it is stopped.
+
+    Parameters
+    ----------
+    session : zenoh.Session
+    is_router : bool
+        Whether others connect to this session.
+    """
+
+    def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
+        super().__init__(name="zenoh-pump")
+        self.questions: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
+        self._session = session
+        self._is_router = is_router
+        self._feeds: list[Feed] = []
+        self._publishers: list[ZenohPublisher] = []
+        self._turn = 0
+        self._due: deque[Question] = deque()
+        self._asked: list[Question] = []
+        self._stopping = threading.Event()
+        self._has_reconnected = threading.Event()
+        self._lock = threading.Lock()
+        self._listener: object = None
+
+    def publish(self, publisher: ZenohPublisher) -> None:
+        """Serve a publisher from now on."""
+        self._publishers.append(publisher)
+        self._begin()
+
+    def follow(self, feed: Feed) -> None:
+        """Serve a subscription from now on, beginning with what is kept of it."""
+        if feed.history:
+            self._due.extend(Question(feed, key) for key in feed.keys)
+        self._feeds.append(feed)
+        self._begin()
+
+    def stop(self) -> None:
+        """End the thread; twice is fine."""
+        self._stopping.set()
+        if self.is_alive() and threading.current_thread() is not self:
+            self.join()
+
+    def _begin(self) -> None:
+        with self._lock:
+            if self.ident is None:
+                self._listener = self._session.info.declare_transport_events_listener(
+                    at_once(self._hear_transport), history=False
+                )
+                self.start()
+
+    def _hear_transport(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT:
+            self._has_reconnected.set()
+
+    def run(self) -> None:
+        """Serve until stopped."""
+        while not self._stopping.wait(PERIOD_S):
+            try:
+                for feed in self._feeds:
+                    feed.fetch()
+                self._answer()
+                now_s = time.monotonic()
+                self._settle(now_s)
+                self._hear(now_s)
+                self._ask(now_s)
+            except Exception:  # one odd message must not make the process deaf
+                if self._session.is_closed():
+                    return
+                logger.exception("bus")
+
+    def _answer(self) -> None:
+        while self.questions:
+            publisher, query = self.questions.popleft()
+            publisher.answer(query)
+
+    def _settle(self, now_s: float) -> None:
+        """Say of each publisher that has fallen silent, or whose link was away, which message was its last."""
+        if self._has_reconnected.is_set():
+            self._has_reconnected.clear()
+            for publisher in self._publishers:
+                publisher.stir(now_s)
+            due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
+            self._due.extend(
+                Question(feed, key, due_s=due_s) for feed in self._feeds if feed.recovers for key in feed.keys
+            )
+        told = 0
+        for _ in range(-(-len(self._publishers) // ROUNDS)):
+            self._turn = (self._turn + 1) % len(self._publishers)
+            told += self._publishers[self._turn].settle(now_s)
+            if told == TOLD_AT_ONCE:
+                break
+
+    def _hear(self, now_s: float) -> None:
+        """Take the answers that have come."""
+        going: list[Question] = []
+        for question in self._asked:
+            if self._take_replies(question):
+                going.append(question)
+            else:
+                self._finish(question, now_s)
+        self._asked = going
+
+    def _take_replies(self, question: Question) -> bool:
+        """Whether more may come."""
+        feed = question.feed
+        try:
+            while (reply := question.replies.try_recv()) is not None:
+                if reply.ok is None:
+                    question.is_refused = True
+                    continue
+                head = reply.ok.attachment
+                page = head and Page.decode(reply.ok.payload.to_bytes(), head.to_bytes())
+                if page:
+                    feed.take_page(str(reply.ok.key_expr), page, is_from_next=question.line is not None)
+        except zenoh.ZError:  # all that were asked have answered
+            return False
+        finally:
+            feed.pass_on()
+        return True
+
+    def _finish(self, question: Question, now_s: float) -> None:
+        """Ask again, later, where that may help; give up in the end."""
+        line = question.line
+        if line is None:
+            is_done = not (question.is_refused and question.feed.history)
+        else:
+            if line.next > question.begin:  # there was more than fits into one answer
+                question.tries = 0
+            is_done = not line.is_missing
+            line.is_asked = not is_done
+        if is_done:
+            return
+        question.tries += 1
+        is_patient = line is not None and not question.feed.follower.is_replaced(line)
+        if question.tries > (PATIENT_TRIES if is_patient else TRIES):
+            if line is not None:
+                line.is_asked = False
+                question.feed.give_up(line)
+            return
+        if question.tries > 1:
+            longest_s = min(FIRST_WAIT_S * 2.0 ** (question.tries - 1), LONGEST_WAIT_S)
+            question.due_s = now_s + random.uniform(longest_s / 2.0, longest_s)
+        self._due.append(question)
+
+    def _ask(self, now_s: float) -> None:
+        """Ask for what is missing, as far as not too many questions are on the way."""
+        for feed in self._feeds:
+            for line in feed.follower.wanted.values():
+                line.is_asked = True
+                self._due.append(Question(feed, line.key, line))
+            feed.follower.wanted.clear()
+        if not self._due or not (self._is_router or self._session.info.routers_zid()):
+            return
+        for _ in range(len(self._due)):
+            if len(self._asked) >= ASKED:
+                return
+            question = self._due.popleft()
+            if question.due_s > now_s:
+                self._due.append(question)
+                continue
+            self._put_question(question)
+            self._asked.append(question)
+
+    def _put_question(self, question: Question) -> None:
+        line, payload, manners = question.line, LOOK, zenoh.CongestionControl.BLOCK
+        if line is not None:
+            question.begin = line.next
+            payload = KeptQuery(source=line.source.hex(), begin=line.next).encode()
+            manners = zenoh.CongestionControl.DROP  # the answer is large: rather ask again than block a router
+        question.is_refused = False
+        question.replies = self._session.get(
+            question.key,
+            zenoh.handlers.FifoChannel(CHANNEL),
+            payload=payload,
+            encoding=JSON_ENCODING,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            congestion_control=manners,
+            timeout=ANSWER_S,
+        )

@@ -1,9 +1,0 @@
-"""Files of other origins turned into recordings, one module an origin."""
-
-from collections.abc import Callable
-from pathlib import Path
-
-from wetwell.protocols.importers.skab import read_skab
-from wetwell.protocols.recording import Recording
-
-IMPORTERS: dict[str, Callable[[Path], Recording]] = {"skab": read_skab}

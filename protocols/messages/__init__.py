@@ -1,0 +1,1 @@
+"""Messages on the bus, and what is measured in one second."""

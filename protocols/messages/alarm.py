@@ -1,0 +1,98 @@
+"""Messages on alarms, after ISA-18.2: the alarm itself, an act of an operator on it, the answer."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from wetwell.protocols.messages.messages import Message, Stamp
+
+AlarmState = Literal[
+    "normal",
+    "unacknowledged",
+    "acknowledged",
+    "returned",
+    "shelved",
+    "out_of_service",
+]
+"""ISA-18.2: normal (A), unacknowledged alarm (B), acknowledged alarm (C), returned to normal unacknowledged (D),
+shelved (G), out of service (I)."""
+
+Priority = Literal["low", "medium", "high", "urgent"]
+
+Act = Literal["acknowledge", "shelve", "unshelve", "out_of_service", "in_service"]
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class Alarm(Message):
+    """An alarm after its last change. `id` names the condition, such as `pump2.pump_fault`, and stays the same."""
+
+    schema_name: Literal["wetwell.alarm/1"] = Field("wetwell.alarm/1", alias="schema")
+    id: Name
+    time: Stamp
+    station: str
+    pump: int | None = Field(None, ge=1)
+    priority: Priority
+    state: AlarmState
+    is_active: bool
+    text: str
+    advice: str = ""
+    raised: Stamp | None = None
+    returned: Stamp | None = None
+    acknowledged: Stamp | None = None
+    by: str | None = None
+    until: Stamp | None = None
+    reason: str = ""
+
+
+class AlarmAct(Message):
+    """What an operator does to an alarm. `id` makes it safe to ask twice; `minutes` is for how long it is shelved."""
+
+    schema_name: Literal["wetwell.alarm-act/1"] = Field("wetwell.alarm-act/1", alias="schema")
+    id: Name
+    station: str
+    alarm: Name
+    act: Act
+    by: Name
+    minutes: float | None = Field(None, gt=0.0, le=7 * 24 * 60)
+    reason: str = Field("", max_length=500)
+
+    @model_validator(mode="after")
+    def _a_shelf_has_an_end(self) -> Self:
+        if self.act == "shelve" and self.minutes is None:
+            raise ValueError("minutes must be given to shelve an alarm")
+        return self
+
+
+class AlarmAnswer(Message):
+    """What came of an act: the alarm as it is now, or why nothing was done."""
+
+    schema_name: Literal["wetwell.alarm-answer/1"] = Field("wetwell.alarm-answer/1", alias="schema")
+    id: str
+    is_done: bool
+    reason: str = ""
+    alarm: Alarm | None = None
+
+
+class AlarmFigure(Message):
+    """An alarm on a list: how often it changed within the hour, or since when it stands."""
+
+    station: str
+    alarm: str
+    transitions: int | None = None
+    raised: Stamp | None = None
+
+
+class AlarmReport(Message):
+    """How well the alarms of a site serve its operators. `rates` on the wall clock, lists in the stations' time.
+
+    `rates`: `alarms_10min`, `alarms_hour`, `alarms_day` (calls in the last ten minutes, hour and day), `peak_10min`
+    (most in any ten minutes of the last day), `flood_share` (of the day's ten minutes), `is_flood`.
+    """
+
+    schema_name: Literal["wetwell.alarm-report/1"] = Field("wetwell.alarm-report/1", alias="schema")
+    time: Stamp
+    rates: dict[str, float]
+    standing: dict[AlarmState, int]
+    chattering: tuple[AlarmFigure, ...] = ()
+    stale: tuple[AlarmFigure, ...] = ()

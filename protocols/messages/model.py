@@ -1,0 +1,45 @@
+"""What the detector believes of a station: curves as configured and as learnt."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from wetwell.protocols.messages.messages import Message, Number, Stamp
+
+
+class Curve(Message):
+    """Head over flow at nominal frequency, with the 95 % band of the healthy pump or main."""
+
+    flow_m3h: tuple[float, ...]
+    head_m: tuple[Number, ...]
+    low_m: tuple[Number, ...] = ()
+    high_m: tuple[Number, ...] = ()
+
+
+class PumpModel(Message):
+    """Curves of one pump and of its main: as configured, as learnt when healthy, as the last verdict sees them.
+
+    `configured_*` are without a band. `learnt_*` are None until learning has ended, `now_*` until a run was judged.
+    """
+
+    pump: int = Field(ge=1)
+    configured_pump: Curve
+    configured_system: Curve
+    learnt_pump: Curve | None = None
+    learnt_system: Curve | None = None
+    now_pump: Curve | None = None
+    now_system: Curve | None = None
+
+
+class Model(Message):
+    """Model of a station, published when it changes. On a common header the system curve is over the total flow."""
+
+    schema_name: Literal["wetwell.model/1"] = Field("wetwell.model/1", alias="schema")
+    time: Stamp
+    station: str
+    nominal_frequency_hz: float
+    start_levels_m: tuple[float, ...]
+    stop_levels_m: tuple[float, ...]
+    floor_area_m2: float
+    is_common_header: bool = False
+    pumps: tuple[PumpModel, ...]

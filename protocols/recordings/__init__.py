@@ -1,0 +1,1 @@
+"""Recordings of a station: files, files of other origins, figures."""

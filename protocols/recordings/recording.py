@@ -1,0 +1,294 @@
+"""Recordings: one station's samples as columns, in CSV, CSV.gz or Parquet, the same columns everywhere.
+
+Columns: `time` (ISO 8601, UTC), `level_m`, optional `inflow_m3h`, and for each pump i from 1
+`pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
+Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
+"""
+
+import contextlib
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.readings import PumpRow, Row
+from wetwell.protocols.timestamps import from_iso, to_iso_array
+
+Floats = npt.NDArray[np.float64]
+
+STATION_COLUMNS = ("level_m", "inflow_m3h")
+PUMP_QUANTITIES = ("frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
+TRUTH_PREFIX = "truth_"
+SUFFIXES = (".csv", ".csv.gz", ".parquet")
+_PUMP_COLUMN = re.compile(rf"pump([1-9]\d*)_({'|'.join(PUMP_QUANTITIES)})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Samples of one station, in the order of their rows.
+
+    Attributes
+    ----------
+    time_ns : (n,) int64
+        Nanoseconds since 1970, UTC; may repeat, jump or go back.
+    columns : mapping of column name to (n,) float64
+        Measured values; NaN is "no value". A column that is absent was never measured.
+    truth : mapping of column name to (n,) array
+        Columns that start with `truth_`: numbers or texts. No diagnosis may read them.
+    ignored : tuple of str
+        Columns of the file that are none of these.
+    """
+
+    time_ns: npt.NDArray[np.int64]
+    columns: Mapping[str, Floats]
+    truth: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    @property
+    def pumps(self) -> int:
+        """Number of pumps that the columns speak of."""
+        return max((int(m[1]) for m in map(_PUMP_COLUMN.fullmatch, self.columns) if m), default=0)
+
+    def column(self, name: str) -> Floats:
+        """(n,) values of a column, NaN throughout where it is absent."""
+        if name in self.columns:
+            return self.columns[name]
+        return np.full(len(self), np.nan)
+
+    def samples(self, station: str, first_seq: int = 0) -> Iterator[Sample]:
+        """Yield the rows as messages, `seq` counting from `first_seq`."""
+        station_values = [self.column(name).tolist() for name in STATION_COLUMNS]
+        pump_values = [
+            [self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES]
+            for i in range(1, self.pumps + 1)
+        ]
+        for row, stamp_ns in enumerate(self.time_ns.tolist()):
+            level_m, inflow_m3h = (_value(values[row]) for values in station_values)
+            yield Sample(
+                station=station,
+                seq=first_seq + row,
+                time=stamp_ns,
+                level_m=level_m,
+                inflow_m3h=inflow_m3h,
+                pumps=tuple(_reading(pump, row) for pump in pump_values),
+            )
+
+    def rows(self) -> Iterator[Row]:
+        """Yield the rows as they are, without the checks of a message."""
+        pumps = [
+            zip(
+                *(self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES[:-1]),
+                map(_flag, self.column(f"pump{i}_{PUMP_QUANTITIES[-1]}").tolist()),
+                strict=True,
+            )
+            for i in range(1, self.pumps + 1)
+        ]
+        station = (self.column(name).tolist() for name in STATION_COLUMNS)
+        of_pumps = zip(*(map(PumpRow._make, pump) for pump in pumps), strict=True)
+        return map(Row, count(), self.time_ns.tolist(), *station, of_pumps)
+
+
+def _flag(number: float) -> bool | None:
+    return number > 0 if number == number else None  # noqa: PLR0124 - the quickest test for NaN
+
+
+def _value(number: float) -> float | None:
+    return number if number == number else None  # noqa: PLR0124 - the quickest test for NaN
+
+
+def _reading(columns: list[list[float]], row: int) -> PumpReading:
+    frequency_hz, flow_m3h, head_m, power_kw, running = (_value(values[row]) for values in columns)
+    return PumpReading(
+        frequency_hz=frequency_hz,
+        flow_m3h=flow_m3h,
+        head_m=head_m,
+        power_kw=power_kw,
+        running=None if running is None else running > 0,
+    )
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a recording.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read, its ending is not one of `SUFFIXES`, a needed column is missing or a value is
+        not of its column's kind; one line with file, column and rule.
+    """
+    table = _read_table(path)
+    if "time" not in table.column_names:
+        raise RecordingError(f"{path}: column 'time' is missing")
+    columns: dict[str, Floats] = {}
+    truth: dict[str, npt.NDArray[Any]] = {}
+    ignored: list[str] = []
+    for name in table.column_names:
+        if name == "time":
+            continue
+        if name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name):
+            columns[name] = _numbers(table[name], name, path)
+        elif name.startswith(TRUTH_PREFIX):
+            truth[name] = table[name].to_numpy()
+        else:
+            ignored.append(name)
+    recording = Recording(time_ns=_stamps(table["time"], path), columns=columns, truth=truth, ignored=tuple(ignored))
+    if recording.pumps == 0:
+        raise RecordingError(f"{path}: no pump column such as 'pump1_flow_m3h' found")
+    return recording
+
+
+def _suffix(path: Path) -> str:
+    for suffix in SUFFIXES:
+        if path.name.endswith(suffix):
+            return suffix
+    raise RecordingError(f"{path}: a recording ends in one of {', '.join(SUFFIXES)}")
+
+
+def _read_table(path: Path) -> pa.Table:
+    suffix = _suffix(path)
+    header: list[str] = []
+    try:
+        if suffix == ".parquet":
+            return pa.parquet.read_table(path)
+        header = _csv_header(path)
+        types = {name: pa.float64() for name in header if name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name)}
+        return pa.csv.read_csv(
+            path,
+            read_options=pa.csv.ReadOptions(use_threads=False),
+            convert_options=pa.csv.ConvertOptions(
+                column_types=types | {"time": pa.string()}, strings_can_be_null=False
+            ),
+        )
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error) as error:
+        raise RecordingError(f"{path}: {_csv_fault(str(error), header)}") from error
+
+
+def _csv_fault(message: str, header: list[str]) -> str:
+    """First line of an Arrow message, with the column's name for its number and rows counted from 1 as elsewhere."""
+    line = next(iter(message.splitlines()), "not a recording")
+    line = re.sub(r"In CSV column #(\d+): ", lambda match: f"column '{header[int(match[1])]}', ", line)
+    return re.sub(r"Row #(\d+)", lambda match: f"row {int(match[1]) - 1}", line)
+
+
+def _csv_header(path: Path) -> list[str]:
+    opener = gzip.open if path.name.endswith(".gz") else open
+    with opener(path, "rt", encoding="utf-8") as file:
+        header = [name.strip('"') for name in str(file.readline()).rstrip("\r\n").split(",")]
+    repeated = sorted({name for name in header if header.count(name) > 1})
+    if repeated:
+        raise RecordingError(f"{path}: column '{repeated[0]}' stands twice")
+    return header
+
+
+def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
+    try:
+        values: Floats = column.cast(pa.float64()).to_numpy()
+    except pa.ArrowException as error:
+        raise RecordingError(f"{path}: column '{name}' must hold numbers: {error}") from error
+    return values
+
+
+def _stamps(column: pa.ChunkedArray, path: Path) -> npt.NDArray[np.int64]:
+    if pa.types.is_timestamp(column.type):
+        if column.null_count:
+            row = int(np.argmax(column.is_null().to_numpy())) + 1
+            raise RecordingError(f"{path}: column 'time', row {row}: is empty")
+        try:
+            stamps: npt.NDArray[np.int64] = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
+        except pa.ArrowInvalid as error:
+            raise RecordingError(f"{path}: column 'time': {error}") from error
+        return stamps
+    texts = column.to_numpy()
+    try:
+        return np.array([from_iso(text) for text in texts], dtype=np.int64)
+    except (TypeError, ValueError):
+        row = next(row for row, text in enumerate(texts, start=1) if not _is_stamp(text))
+        raise RecordingError(
+            f"{path}: column 'time', row {row}: got {texts[row - 1]!r}, must be ISO 8601 such as 2025-01-31T06:00:00Z"
+        ) from None
+
+
+def _is_stamp(text: Any) -> bool:
+    try:
+        from_iso(text)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def write_recording(recording: Recording, path: Path) -> None:
+    """Write a recording; the file appears whole or not at all, the same bytes for the same recording.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be written or its ending is not one of `SUFFIXES`.
+    """
+    with recording_writer(path) as write:
+        write(recording)
+
+
+@contextlib.contextmanager
+def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
+    """Write a recording block by block; the file appears whole at the end of the `with`, or not at all.
+
+    All blocks have the columns of the first. A block of Parquet is at least one row group.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be written or its ending is not one of `SUFFIXES`.
+    """
+    suffix = _suffix(path)
+    try:
+        with whole_file(path) as file, contextlib.ExitStack() as stack:
+            write = _block_writer(file, suffix, stack)
+            yield lambda block: write(_table(block, suffix))
+    except pa.ArrowException as error:
+        raise RecordingError(f"{path}: cannot be written: {error}") from error
+
+
+def _table(recording: Recording, suffix: str) -> pa.Table:
+    time: Any = recording.time_ns
+    time = pa.array(time, pa.timestamp("ns", tz="UTC")) if suffix == ".parquet" else to_iso_array(time)
+    return pa.table({"time": time, **recording.columns, **recording.truth})
+
+
+def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitStack) -> Callable[[pa.Table], None]:
+    if suffix == ".csv.gz":
+        file = stack.enter_context(gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0))
+    parquet: Any = None
+    is_begun = False
+
+    def write(table: pa.Table) -> None:
+        nonlocal parquet, is_begun
+        if suffix == ".parquet":
+            if not is_begun:
+                parquet = stack.enter_context(pa.parquet.ParquetWriter(file, table.schema, compression="zstd"))
+            parquet.write_table(table)
+        else:
+            if not is_begun:
+                file.write(",".join(table.column_names).encode() + b"\n")
+            pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))
+        is_begun = True
+
+    return write

@@ -1,0 +1,1 @@
+"""Station file: what the owner of a pump station knows of it."""

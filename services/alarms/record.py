@@ -1,0 +1,74 @@
+"""One alarm with all that is kept of it."""
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.alarms.delay import Delay
+from wetwell.services.alarms.rules import Rule, RuleName, alarm_id
+from wetwell.services.alarms.status import Standing, with_condition
+
+CHANGES = 100
+"""Changes of the condition within an hour that are remembered at most."""
+HOUR_NS = 3600 * NS_PER_S
+
+
+class Entry(BaseModel):
+    """An alarm: how it stands, its delays, its words, and when its condition changed within the last hour."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    station: str
+    rule: RuleName
+    pump: int | None = None
+    standing: Standing = Standing()
+    delay: Delay = Field(default_factory=Delay)
+    text: str = ""
+    advice: str = ""
+    time_ns: int = 0
+    changes_ns: list[int] = Field(default_factory=list)
+
+    @property
+    def id(self) -> str:
+        """Name of the alarm within its station."""
+        return alarm_id(self.rule, self.pump)
+
+    def observe(self, wanted: bool, time_ns: int, rule: Rule) -> bool:
+        """Take a look at the condition; whether the alarm has changed by it."""
+        is_active = self.delay.update(wanted, time_ns, rule.on_delay_s, rule.off_delay_s)
+        before = self.standing
+        if is_active == before.is_active:
+            return False
+        self.standing = with_condition(before, is_active=is_active, time_ns=time_ns)
+        self.changes_ns = [*(at for at in self.changes_ns if 0 <= time_ns - at < HOUR_NS), time_ns][-CHANGES:]
+        self.touch(time_ns)
+        return True
+
+    def touch(self, time_ns: int) -> None:
+        """Note a change; no two changes of an alarm have the same time, and a later one never has an earlier one."""
+        self.time_ns = min(max(time_ns, self.time_ns + 1), MAX_STAMP_NS)
+
+    def changes_within_hour(self, now_ns: int) -> int:
+        """How often the condition came or went in the last hour of the station's time."""
+        return sum(0 <= now_ns - at < HOUR_NS for at in self.changes_ns)
+
+    def message(self, rule: Rule) -> Alarm:
+        """The alarm as others see it."""
+        standing = self.standing
+        return Alarm(
+            id=self.id,
+            time=self.time_ns,
+            station=self.station,
+            pump=self.pump,
+            priority=rule.priority,
+            state=standing.state,
+            is_active=standing.is_active,
+            text=self.text or rule.text,
+            advice=self.advice or rule.advice,
+            raised=standing.raised_ns,
+            returned=standing.returned_ns,
+            acknowledged=standing.acknowledged_ns,
+            by=standing.by,
+            until=standing.until_ns,
+            reason=standing.reason,
+        )

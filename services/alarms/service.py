@@ -1,0 +1,298 @@
+"""Takes what comes over the bus, keeps the alarms, publishes their changes and answers questions about them."""
+
+import logging
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Request
+from wetwell.protocols.bus.keys import SITE, alarm_act_key, alarm_key
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmFigure, AlarmReport, AlarmState
+from wetwell.protocols.messages.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.station.station_file import NAME_PATTERN, Station
+from wetwell.services.alarms.audit import Audit
+from wetwell.services.alarms.record import Entry
+from wetwell.services.alarms.registry import SHELF, AlarmBook
+from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
+from wetwell.services.alarms.state_file import SiteState, StateFile, StationState
+from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
+from wetwell.services.alarms.status import ActRefusedError, Standing
+from wetwell.services.runtime.settings import AlarmSettings
+
+log = logging.getLogger(__name__)
+
+M = TypeVar("M", bound=Message)
+
+MAX_STATIONS = 10_000
+"""Further names on the bus are refused: somebody makes them up."""
+
+
+class AlarmKeeper:
+    """The alarms of a site on a bus. Synchronous; `now` gives the clocks.
+
+    Raises
+    ------
+    ConfigError
+        If the folder of the state cannot be used.
+    """
+
+    def __init__(
+        self, bus: Bus, settings: AlarmSettings, stations: Sequence[Station], now: Callable[[], Now]
+    ) -> None:
+        self._bus = bus
+        self._settings = settings
+        self._now = now
+        self._publishers: dict[tuple[str, str], Publisher] = {}
+        self._counts: Counter[str] = Counter()
+        self._lost_s: float | None = None
+        self._audit = Audit(settings.state_dir)
+        self._file = StateFile(settings.state_dir)
+        self._limits = {station.name: limits_of(settings, station) for station in stations}
+        rules = {name: change.model_dump(exclude_none=True) for name, change in settings.rules.items()}
+        self.book = AlarmBook(changed_rules(rules))
+        self.stations: dict[str, StationWatch] = {}
+        self._restore(self._file.load() or SiteState())
+        for station in stations:
+            self._watch(station.name).has_samples = True  # it is missed from the beginning
+        self._watch(SITE)
+
+    def take_sample(self, payload: bytes) -> None:
+        """Look at a sample."""
+        sample = self._decoded(Sample, payload)
+        if sample is not None:
+            self._take_samples(sample.station, [sample])
+
+    def take_sample_block(self, payload: bytes) -> None:
+        """Look at many samples of a station."""
+        block = self._decoded(SampleBlock, payload)
+        if block is not None:
+            self._take_samples(block.station, block.samples())
+
+    def _take_samples(self, station: str, samples: Iterable[Sample]) -> None:
+        watch = self._named(station)
+        if watch is None:
+            return
+        limits = self._limits.get(station) or limits_of(self._settings, None)
+        for sample in samples:
+            is_new = watch.take_sample(sample, self._now(), self.book, limits)
+            self._counts["samples" if is_new else "doubled"] += 1
+
+    def take_verdict(self, payload: bytes) -> None:
+        """Look at a verdict."""
+        verdict = self._decoded(Verdict, payload)
+        if verdict is None or (watch := self._named(verdict.station)) is None:
+            return
+        if verdict.pump > MAX_PUMPS:
+            self._counts["foreign"] += 1
+            return
+        is_new = watch.take_verdict(verdict, self._now(), self.book)
+        self._counts["verdicts" if is_new else "doubled"] += 1
+
+    def take_status(self, payload: bytes) -> None:
+        """Look at the health figures of a gateway."""
+        status = self._decoded(Status, payload)
+        if status is not None and status.service == "gateway" and (watch := self._named(status.station)) is not None:
+            watch.take_status(status, self._now(), self.book, self._settings.heartbeat_after_s)
+
+    def take_presence(self, presence: Presence) -> None:
+        """Note that a service has come or gone."""
+        _, station, _, service = presence.key.split("/", 3)
+        watch = self.stations[SITE] if station == SITE else self._named(station)
+        if watch is not None:
+            watch.take_presence(service, is_alive=presence.is_alive, now=self._now())
+
+    def take_act(self, request: Request) -> None:
+        """Carry out an act of an operator and answer it."""
+        try:
+            act = AlarmAct.decode(request.payload)
+        except MessageError as error:
+            self._counts["malformed"] += 1
+            answer = AlarmAnswer(id="", is_done=False, reason=str(error))
+        else:
+            if request.key == alarm_act_key(act.station):
+                answer = self.carry_out(act)
+            else:
+                reason = f"an act on station '{act.station}' cannot come on key '{request.key}'"
+                answer = AlarmAnswer(id=act.id, is_done=False, reason=reason)
+        self.commit()
+        request.reply(answer.encode())
+
+    def carry_out(self, act: AlarmAct) -> AlarmAnswer:
+        """Carry out an act, once for each `id`, after it was written into the audit."""
+        earlier = self.book.answered(act)
+        if earlier is not None:
+            return earlier
+        now = self._now()
+        if act.station not in self.stations:
+            return AlarmAnswer(id=act.id, is_done=False, reason=f"station '{act.station}' is not known")
+        try:
+            entry, after = self.book.after(act, now.wall_ns)
+        except ActRefusedError as error:
+            self._write_down(now, act, refused=str(error))
+            return self.book.remember(AlarmAnswer(id=act.id, is_done=False, reason=str(error)))
+        if not self._write_down(now, act, before=entry.standing.state, after=after.state):
+            return AlarmAnswer(id=act.id, is_done=False, reason="the audit cannot be written, so nothing was done")
+        self._counts["acts"] += 1
+        time_ns = self._clock_ns(act.station, now)
+        return self.book.carry_out(act, entry, after, time_ns, now.wall_ns)
+
+    def look(self) -> None:
+        """Once a second: what does not come any more, shelves that end, floods."""
+        now, settings = self._now(), self._settings
+        for entry, standing in self.book.shelves_over(now.wall_ns):
+            self._take_back(entry, standing, now)
+        if self._bus.is_connected:
+            if self._lost_s is not None:
+                self._lost_s = None
+                for watch in self.stations.values():
+                    watch.begin_again(now)
+            for watch in self.stations.values():
+                watch.look(now, self.book, settings.stale_after_s, settings.silent_after_s)
+        elif self._lost_s is None:
+            self._lost_s = now.steady_s
+        is_lost = self._lost_s is not None and now.steady_s - self._lost_s > settings.silent_after_s
+        self.book.observe(SITE, "bus_lost", is_lost, now.wall_ns, now.wall_ns)
+        if self.book.rates.look(now.wall_ns):
+            log.warning("alarm flood has %s", "begun" if self.book.rates.is_flood else "ended")
+        self.commit()
+
+    def commit(self) -> None:
+        """Keep what has changed, then publish it."""
+        if not self.book.changed:
+            return
+        self.save()
+        changed, self.book.changed = self.book.changed, []
+        for alarm in changed:
+            log.info("station '%s': alarm %s is %s: %s", alarm.station, alarm.id, alarm.state, alarm.text)
+            self._publish(alarm)
+
+    def publish_all(self) -> None:
+        """Publish every alarm as it stands, after a restart."""
+        for alarm in self.book.alarms():
+            self._publish(alarm)
+
+    def save(self) -> None:
+        """Write the state to disk."""
+        stations = {
+            name: StationState(
+                time_ns=watch.time_ns,
+                seq=watch.seq,
+                last_verdicts_ns={
+                    pump: known.times_ns[-1] for pump, known in watch.verdicts.items() if known.times_ns
+                },
+                services=list(watch.gone_s),
+            )
+            for name, watch in self.stations.items()
+        }
+        self._file.save(SiteState(book=self.book.state(), stations=stations))
+
+    def report(self) -> AlarmReport:
+        """Rates, chattering and stale alarms."""
+        now = self._now()
+        clocks_ns = {name: watch.clock_ns(now) for name, watch in self.stations.items()}
+        transitions = self._settings.chattering_transitions
+        return AlarmReport(
+            time=now.wall_ns,
+            rates=self.book.rates.figures(now.wall_ns),
+            standing=dict(self._standing()),
+            chattering=tuple(
+                AlarmFigure(station=entry.station, alarm=entry.id, transitions=count)
+                for entry, count in self.book.chattering(clocks_ns, transitions)
+            ),
+            stale=tuple(
+                AlarmFigure(station=entry.station, alarm=entry.id, raised=entry.standing.raised_ns)
+                for entry in self.book.stale(clocks_ns)
+            ),
+        )
+
+    def figures(self) -> dict[str, float]:
+        """Health figures."""
+        report = self.report()
+        return {name: float(count) for name, count in self._counts.items()} | {
+            **report.rates,
+            "stations": float(len(self.stations) - 1),
+            "standing": float(sum(entry.standing.is_active for entry in self.book.entries.values())),
+            "unacknowledged": float(report.standing.get("unacknowledged", 0) + report.standing.get("returned", 0)),
+            "chattering": float(len(report.chattering)),
+            "stale": float(len(report.stale)),
+            "disk_errors": float(self._file.errors),
+        }
+
+    def _standing(self) -> Counter[AlarmState]:
+        return Counter(entry.standing.state for entry in self.book.entries.values())
+
+    def _publish(self, alarm: Alarm) -> None:
+        name = (alarm.station, alarm.id)
+        if name not in self._publishers:
+            self._publishers[name] = self._bus.publisher(alarm_key(*name))
+        self._publishers[name].put(alarm.encode())
+
+    def _take_back(self, entry: Entry, standing: Standing, now: Now) -> None:
+        act = {"station": entry.station, "alarm": entry.id, "act": "unshelve", "by": SHELF}
+        try:
+            self._audit.write(now.wall_ns, **act, before=entry.standing.state, after=standing.state)
+        except RecordingError as error:  # the operator is called all the same
+            log.warning("%s", error)
+        self.book.take_back(entry, standing, self._clock_ns(entry.station, now), now.wall_ns)
+
+    def _write_down(self, now: Now, act: AlarmAct, **outcome: str) -> bool:
+        """Whether the act is in the audit."""
+        try:
+            self._audit.write(now.wall_ns, **act.model_dump(mode="json", exclude={"schema_name"}), **outcome)
+        except RecordingError as error:
+            self._counts["audit_errors"] += 1
+            log.warning("%s", error)
+            return False
+        return True
+
+    def _decoded(self, message: type[M], payload: bytes) -> M | None:
+        try:
+            return message.decode(payload)
+        except MessageError as error:
+            self._counts["malformed"] += 1
+            log.warning("%s", error)
+            return None
+
+    def _named(self, station: str) -> StationWatch | None:
+        """What is known of a station; None if this cannot be one."""
+        if station in self.stations and station != SITE:
+            return self.stations[station]
+        is_name = re.fullmatch(NAME_PATTERN, station) is not None and len(station) <= 64
+        if not is_name or len(self.stations) > MAX_STATIONS:
+            self._counts["foreign"] += 1
+            return None
+        return self._watch(station)
+
+    def _clock_ns(self, station: str, now: Now) -> int:
+        return self.stations[station].clock_ns(now) if station in self.stations else now.wall_ns
+
+    def _restore(self, state: SiteState) -> None:
+        now_s = self._now().steady_s
+        self.book.restore(state.book)
+        for name, kept in state.stations.items():
+            watch = self._watch(name)
+            watch.time_ns, watch.seq = kept.time_ns, kept.seq
+            watch.verdicts = {pump: PumpVerdicts([last_ns]) for pump, last_ns in kept.last_verdicts_ns.items()}
+            watch.has_samples = kept.time_ns is not None
+            watch.gone_s = dict.fromkeys(kept.services, now_s)  # missed until seen
+
+    def _watch(self, station: str) -> StationWatch:
+        if station not in self.stations:
+            now_s = self._now().steady_s
+            self.stations[station] = StationWatch(station, heard_s=now_s, missed_s=now_s, start_s=now_s)
+        return self.stations[station]
+
+
+def limits_of(settings: AlarmSettings, station: Station | None) -> Limits:
+    """Levels that are too high, from the settings and the station file if there is one."""
+    high_m, overflow_m = settings.high_level_m, None
+    if station is not None:
+        if high_m is None:
+            high_m = station.control.start_levels_m[-1] + settings.high_level_margin_m
+        if station.sump.overflow_level_m is not None:
+            overflow_m = station.sump.overflow_level_m - settings.overflow_margin_m
+            high_m = min(high_m, overflow_m)
+    return Limits(high_m, overflow_m, settings.level_deadband_m)

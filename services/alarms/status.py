@@ -1,0 +1,80 @@
+"""How an alarm stands: the states of ISA-18.2 and the ways between them. Pure; the clock is an argument."""
+
+from dataclasses import dataclass, replace
+
+from wetwell.protocols.messages.alarm import AlarmAct, AlarmState
+
+NS_PER_MIN = 60 * 1_000_000_000
+SUPPRESSED: frozenset[AlarmState] = frozenset({"shelved", "out_of_service"})
+"""States in which the condition is still followed, but nobody is called."""
+
+
+class ActRefusedError(ValueError):
+    """An act that the state of the alarm does not allow; says why."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """State of one alarm. A standing alarm is active; one that has returned may still wait for its acknowledgement.
+
+    `raised_ns` and `returned_ns` are those of the last time and in the time of the station, `acknowledged_ns` and
+    `until_ns` (end of the shelf) on the wall clock; `by` and `reason` belong to the last act.
+    """
+
+    state: AlarmState = "normal"
+    is_active: bool = False
+    raised_ns: int | None = None
+    returned_ns: int | None = None
+    acknowledged_ns: int | None = None
+    by: str | None = None
+    until_ns: int | None = None
+    reason: str = ""
+
+
+def with_condition(standing: Standing, *, is_active: bool, time_ns: int) -> Standing:
+    """Standing after the condition has come or gone; the same if it has not changed."""
+    if is_active == standing.is_active:
+        return standing
+    if standing.state in SUPPRESSED:
+        changed = {"raised_ns": time_ns, "returned_ns": None} if is_active else {"returned_ns": time_ns}
+        return replace(standing, is_active=is_active, **changed)
+    if is_active:
+        return Standing("unacknowledged", is_active=True, raised_ns=time_ns)
+    state: AlarmState = "returned" if standing.state == "unacknowledged" else "normal"
+    return replace(standing, state=state, is_active=False, returned_ns=time_ns)
+
+
+def with_act(standing: Standing, act: AlarmAct, now_ns: int) -> Standing:
+    """Standing after an act of an operator at this time of day.
+
+    Raises
+    ------
+    ActRefusedError
+        If the state does not allow it.
+    """
+    state = standing.state
+    match act.act:
+        case "acknowledge" if state in ("unacknowledged", "returned"):
+            after: AlarmState = "acknowledged" if state == "unacknowledged" else "normal"
+            return replace(standing, state=after, acknowledged_ns=now_ns, by=act.by, reason=act.reason)
+        case "shelve" if state != "out_of_service" and act.minutes is not None:
+            until_ns = now_ns + round(act.minutes * NS_PER_MIN)
+            return replace(standing, state="shelved", until_ns=until_ns, by=act.by, reason=act.reason)
+        case "out_of_service" if state != "out_of_service":
+            return replace(standing, state="out_of_service", until_ns=None, by=act.by, reason=act.reason)
+        case "unshelve" if state == "shelved":
+            return back(standing, act.by, act.reason)
+        case "in_service" if state == "out_of_service":
+            return back(standing, act.by, act.reason)
+    raise ActRefusedError(f"{act.act}: the alarm is {state}")
+
+
+def back(standing: Standing, by: str, reason: str = "") -> Standing:
+    """Standing after a suppression: the operator is called anew if the condition is there."""
+    state: AlarmState = "unacknowledged" if standing.is_active else "normal"
+    return replace(standing, state=state, acknowledged_ns=None, by=by, until_ns=None, reason=reason)
+
+
+def is_shelf_over(standing: Standing, now_ns: int) -> bool:
+    """Whether the alarm is on a shelf whose end has come."""
+    return standing.state == "shelved" and standing.until_ns is not None and now_ns >= standing.until_ns

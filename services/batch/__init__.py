@@ -1,0 +1,1 @@
+"""Work on files, by one process or many."""

@@ -1,0 +1,141 @@
+"""Work on recordings from the field: prepare, calibrate, validate."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import tomli_w
+from pydantic import ValidationError
+
+from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
+from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
+from wetwell.protocols.station.station_file import Station, load_toml
+from wetwell.protocols.timestamps import to_iso
+from wetwell.services.reports.validation_page import validation_page
+from wetwell.sim2real.calibration.calibration import calibrate, with_estimates
+from wetwell.sim2real.calibration.validation import validate
+from wetwell.sim2real.recording.preparation import Preparation, PreparationReport, prepare
+
+
+def prepared(recording: Path, preparation: Path | None) -> tuple[Recording, PreparationReport]:
+    """Recording in a file, prepared as a TOML file says, or only sorted and without doubles.
+
+    Raises
+    ------
+    ConfigError
+        If the preparation breaks a rule or does not fit the recording.
+    RecordingError
+        If the recording cannot be read.
+    """
+    table = load_toml(preparation) if preparation is not None else {}
+    place = preparation if preparation is not None else recording
+    try:
+        return prepare(read_recording(recording), Preparation.model_validate(table))
+    except ValidationError as error:
+        raise ConfigError(f"{place}: {first_fault(error)}") from error
+    except ValueError as error:
+        raise ConfigError(f"{place}: {error}") from error
+
+
+def prepare_file(recording: Path, preparation: Path | None, out: Path) -> dict[str, Any]:
+    """Write a prepared recording; what was found and done."""
+    rows, report = prepared(recording, preparation)
+    write_recording(rows, out)
+    return {
+        "recording": str(out),
+        "rows": report.rows,
+        "shifted": report.shifted,
+        "out_of_order": report.out_of_order,
+        "doubled": report.doubled,
+        "gaps": [{"start": to_iso(gap.start_ns), "length_s": gap.length_s} for gap in report.gaps],
+    }
+
+
+def calibrate_file(station: Station, recording: Path, preparation: Path | None, out: Path) -> dict[str, Any]:
+    """Write a station file fitted to a recording; the estimates with their intervals.
+
+    Raises
+    ------
+    RecordingError
+        If the recording cannot be used or the station file cannot be written.
+    """
+    rows, _ = prepared(recording, preparation)
+    try:
+        estimates = calibrate(rows, station)
+        fitted = with_estimates(station, estimates)
+    except ValueError as error:
+        raise RecordingError(f"{recording}: {error}") from error
+    write_station(fitted, out)
+    return {
+        "station": str(out),
+        "parameters": [
+            {
+                "name": estimate.name,
+                "value": float(f"{estimate.value:.6g}"),
+                "low": None if estimate.interval is None else float(f"{estimate.interval[0]:.6g}"),
+                "high": None if estimate.interval is None else float(f"{estimate.interval[1]:.6g}"),
+                "unit": estimate.unit,
+                "kept_because": estimate.reason,
+            }
+            for estimate in estimates
+        ],
+    }
+
+
+def validate_file(
+    station: Station, recording: Path, preparation: Path | None, out: Path | None, html: Path | None = None
+) -> dict[str, Any]:
+    """Compare the free-running simulator with a recording; write the simulated recording and a page where asked.
+
+    Raises
+    ------
+    RecordingError
+        If the recording cannot be used, or a file cannot be written.
+    """
+    rows, _ = prepared(recording, preparation)
+    try:
+        result, simulated = validate(rows, station)
+    except ValueError as error:
+        raise RecordingError(f"{recording}: {error}") from error
+    if out is not None:
+        write_recording(simulated, out)
+    if html is not None:
+        with whole_file(html) as file:
+            file.write(validation_page(station, rows, simulated, result).encode())
+    days = [
+        {
+            "day": day,
+            "pump": pump + 1,
+            "starts_measured": int(result.starts[0, row, pump]),
+            "starts_simulated": int(result.starts[1, row, pump]),
+            "run_h_measured": round(float(result.run_h[0, row, pump]), 3),
+            "run_h_simulated": round(float(result.run_h[1, row, pump]), 3),
+        }
+        for row, day in enumerate(result.days)
+        for pump in range(len(station.pump))
+    ]
+    return {
+        "level_nmae": round(result.level_nmae, 5),
+        "starts_nmae": _rounded(result.starts_nmae),
+        "run_h_nmae": _rounded(result.run_h_nmae),
+        "inflow": result.inflow,
+        "days": days,
+    }
+
+
+def _rounded(values: npt.NDArray[np.float64]) -> list[float | None]:
+    return [round(value, 5) if np.isfinite(value) else None for value in values.tolist()]
+
+
+def write_station(station: Station, out: Path) -> None:
+    """Write a station file; it appears whole or not at all.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be written.
+    """
+    with whole_file(out) as file:
+        file.write(tomli_w.dumps(station.model_dump(exclude_none=True)).encode())

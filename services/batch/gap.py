@@ -1,0 +1,156 @@
+"""Diagnose recordings in files: reads and writes, nothing else."""
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.recordings.recording import Recording, write_recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.batch.field_data import prepared, write_station
+from wetwell.services.reports.gap_page import gap_page
+from wetwell.sim2real.calibration.validation import Validation, validate
+from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
+from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport, report_of
+from wetwell.sim2real.recording.preparation import PreparationReport
+from wetwell.sim2real.recording.traces import PUMP_SIGNALS, traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.simulator.effects import EFFECTS, effects_of
+
+THREADS = min(os.cpu_count() or 1, 4)
+"""The replay is compiled and holds no lock, so that threads try effects side by side."""
+
+
+def diagnose_file(
+    station: Station,
+    recording: Path,
+    out: Path,
+    *,
+    only: Iterable[str] | None = None,
+    without: Iterable[str] = (),
+    progress: Callable[[float], None] = lambda _: None,
+) -> GapReport:
+    """Write `report.json`, `report.html` and `station.toml` into a folder, which is made where it is missing.
+
+    Raises
+    ------
+    ConfigError
+        If an effect is not in the library.
+    RecordingError
+        If the recording cannot be used, or the folder not be written.
+    """
+    for name in [*(only or ()), *without]:
+        if name not in EFFECTS:
+            raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
+    rows, preparation = prepared(recording, None)
+    try:
+        with ThreadPoolExecutor(THREADS) as pool:
+            diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
+        closed_loop = _closed_loop(rows, station, diagnosis.station)
+    except ValueError as error:
+        raise RecordingError(f"{recording}: {error}") from error
+    report = report_of(diagnosis, closed_loop, _detector(rows, station, diagnosis.station), _notes(preparation))
+    page = gap_page(report, diagnosis)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{out}: cannot be made: {error.strerror}") from error
+    write_station(diagnosis.station, out / "station.toml")
+    for name, text in (
+        ("report.html", page),
+        ("report.json", report.model_dump_json(by_alias=True, indent=2) + "\n"),
+    ):
+        with whole_file(out / name) as file:
+            file.write(text.encode())
+    return report
+
+
+def replay_file(station: Station, recording: Path, out: Path, *, closed_loop: bool) -> dict[str, object]:
+    """Write what the simulator says for a recording.
+
+    Teacher-forced, frequency, inflow and level come from the recording, second by second; in a closed loop only the
+    inflow does, and the simulator controls its own pumps.
+
+    Raises
+    ------
+    RecordingError
+        If the recording cannot be used or the result not be written.
+    """
+    rows, _ = prepared(recording, None)
+    try:
+        predicted = validate(rows, station)[1] if closed_loop else _teacher_forced(rows, station)
+    except ValueError as error:
+        raise RecordingError(f"{recording}: {error}") from error
+    write_recording(predicted, out)
+    return {"recording": str(out), "rows": len(predicted), "closed_loop": closed_loop}
+
+
+def _teacher_forced(rows: Recording, station: Station) -> Recording:
+    traces = traces_of(rows, station)
+    prediction = Replay(traces, station, effects_of(station)).run()
+    second = ((rows.time_ns - rows.time_ns[0] + 500_000_000) // 1_000_000_000).astype(np.int64)
+    columns = {"level_m": prediction.level_m[second]}
+    if traces.inflow_m3h is not None:
+        columns["inflow_m3h"] = traces.inflow_m3h[second]
+    for i in range(traces.pumps):
+        columns[f"pump{i + 1}_frequency_hz"] = traces.frequency_hz[i, second]
+        for name in PUMP_SIGNALS:
+            if name in prediction.signals:
+                columns[f"pump{i + 1}_{name}"] = prediction.signals[name][i, second]
+        columns[f"pump{i + 1}_running"] = (traces.frequency_hz[i, second] > 0.0).astype(np.float64)
+    return Recording(time_ns=rows.time_ns, columns=columns)
+
+
+def _notes(preparation: PreparationReport) -> tuple[str, ...]:
+    """What was found out of order."""
+    longest_s = max((gap.length_s for gap in preparation.gaps), default=0.0)
+    said = (
+        (preparation.out_of_order, "rows stood before an earlier one and were put in order"),
+        (preparation.doubled, "rows with a time that was there already were dropped"),
+        (len(preparation.gaps), f"gaps, the longest of {longest_s:.0f} s: what is in them is not judged"),
+    )
+    return tuple(f"{count} {text}" for count, text in said if count)
+
+
+def _detector(rows: Recording, before: Station, after: Station) -> DetectorVerdicts:
+    counted = false_verdicts(rows, before, after)
+    return DetectorVerdicts(
+        days=round(counted.days, 3),
+        verdicts=counted.verdicts,
+        false_per_day_before=round(counted.before / counted.days, 2),
+        false_per_day_after=round(counted.after / counted.days, 2),
+        has_new_curves=counted.has_new_curves,
+    )
+
+
+def _closed_loop(rows: Recording, before: Station, after: Station) -> ClosedLoopComparison | None:
+    """Free runs under both stations; None where level or inflow do not allow one."""
+    try:
+        first = validate(rows, before)[0]
+        second = first if after == before else validate(rows, after)[0]
+    except ValueError:
+        return None
+    days = float(rows.time_ns[-1] - rows.time_ns[0]) / 86_400e9
+
+    def figures(result: Validation, row: int) -> tuple[float, float]:
+        return float(result.starts[row].sum()) / days, float(result.run_h[row].sum()) / days
+
+    def loop(result: Validation) -> ClosedLoop:
+        starts, run_h = figures(result, 1)
+        return ClosedLoop(
+            level_nmae=round(result.level_nmae, 5), starts_per_day=round(starts, 2), run_h_per_day=round(run_h, 3)
+        )
+
+    starts, run_h = figures(first, 0)
+    return ClosedLoopComparison(
+        inflow=first.inflow,
+        measured_starts_per_day=round(starts, 2),
+        measured_run_h_per_day=round(run_h, 3),
+        before=loop(first),
+        after=loop(second),
+    )

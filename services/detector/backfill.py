@@ -1,0 +1,63 @@
+"""Samples that a detector has missed while it was away, as far as the historian has them."""
+
+import logging
+from collections.abc import AsyncIterator
+from typing import get_args
+
+import numpy as np
+
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import history_key
+from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.messages import MessageError, Quality, Sample
+from wetwell.protocols.recordings.recording import Recording
+
+log = logging.getLogger(__name__)
+
+PAGE = 3_600
+ANSWER_S = 10.0
+
+
+async def missed_samples(bus: Bus, station: str, since_ns: int, until_ns: int) -> AsyncIterator[list[Sample]]:
+    """Samples between two times, page by page, oldest first; none if no historian answers."""
+    start_ns, more = since_ns + 1, True
+    while more and start_ns < until_ns:
+        query = HistoryQuery(kind="samples", start=start_ns, end=until_ns, points=PAGE, raw=True)
+        page = await _answer(bus, station, query)
+        if page is None or not page.time:
+            return
+        log.info("station '%s': takes %d samples from the historian", station, len(page.time))
+        yield samples_of(page)
+        start_ns, more = page.time[-1] + 1, page.more
+
+
+def samples_of(page: History) -> list[Sample]:
+    """Samples in an answer to a question for raw ones."""
+    columns = {
+        name: np.array(values, dtype=np.float64)
+        for name, values in page.columns.items()
+        if name not in {"seq", "quality"}
+    }
+    recording = Recording(time_ns=np.array(page.time, dtype=np.int64), columns=columns)
+    qualities = get_args(Quality)
+    return [
+        sample.model_copy(update={"seq": int(seq or 0), "quality": qualities[int(quality or 0)]})
+        for sample, seq, quality in zip(
+            recording.samples(page.station), page.columns["seq"], page.columns["quality"], strict=True
+        )
+    ]
+
+
+async def _answer(bus: Bus, station: str, query: HistoryQuery) -> History | None:
+    """First good answer; None with a line in the log if there is none."""
+    for payload in await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S):
+        try:
+            history = History.decode(payload)
+        except MessageError as error:
+            log.warning("station '%s': %s", station, error)
+            continue
+        if not history.error:
+            return history
+        log.warning("station '%s': the historian says: %s", station, history.error)
+    log.info("station '%s': no historian has answered; what the bus keeps must do", station)
+    return None

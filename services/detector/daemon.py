@@ -1,0 +1,103 @@
+"""The detector as a process: any number of stations, their checkpoints, and what was missed while it was away."""
+
+import asyncio
+import contextlib
+import gc
+import logging
+from collections.abc import Sequence
+from functools import partial
+
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import status_key
+from wetwell.protocols.messages.messages import Status
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.intake import Intake
+from wetwell.services.detector.quarantine import Quarantine
+from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.lifecycle import report_health, stop_event, ticks, until
+from wetwell.services.runtime.settings import Settings
+
+log = logging.getLogger(__name__)
+
+
+async def serve_detector(settings: Settings, stations: Sequence[Station]) -> None:
+    """Judge stations until stopped. A router that is away is waited for."""
+    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
+        running = asyncio.create_task(_run(settings, stations, stack), name="detector.run")
+        await until(stop, running)
+
+
+async def _run(settings: Settings, stations: Sequence[Station], stack: contextlib.AsyncExitStack) -> None:
+    bus = stack.enter_context(await connect(settings))
+    await judge_all(settings, bus, stations, "detector", stack)
+
+
+async def judge_all(
+    settings: Settings, bus: Bus, stations: Sequence[Station], name: str, stack: contextlib.AsyncExitStack
+) -> None:
+    """Judge stations for ever; what the stack holds afterwards saves their states.
+
+    Parameters
+    ----------
+    settings : Settings
+        Where states are kept, and how often.
+    bus : Bus
+        Where samples come from and verdicts go to.
+    stations : sequence of Station
+        Those that have brought the process down too often are left out, and told.
+    name : str
+        Of this group of stations, for the trace of a crash.
+    stack : contextlib.AsyncExitStack
+        Of the caller.
+    """
+    kept = settings.detector
+    quarantine = Quarantine(kept.state_dir, name, kept.crash_tries, kept.crash_window_s)
+    stack.callback(quarantine.close)
+    async with asyncio.TaskGroup() as group:
+        judges: list[StationJudge] = []
+        for station in stations:
+            if quarantine.holds(station.name):
+                log.error("station '%s': left out after %d crashes", station.name, kept.crash_tries)
+                group.create_task(_show_left_out(bus, station.name, settings.health.period_s))
+                continue
+            judge = StationJudge(bus, station, kept.costs, Checkpoint(kept.state_dir, station.name), quarantine)
+            stack.callback(judge.keep)
+            judges.append(judge)
+        intake = Intake(bus, judges)
+        gc.freeze()  # looking through the states of a thousand stations for garbage takes a quarter of a second
+        stack.callback(gc.unfreeze)
+        log.info("%d stations: waiting for samples", len(judges))
+        group.create_task(intake.run(), name=f"{name}.intake")
+        period_s = settings.health.period_s
+        for number, judge in enumerate(judges):
+            figures, lead_s = partial(_figures, judge, intake), period_s * number / len(judges)
+            group.create_task(
+                report_health(bus, judge.station, "detector", period_s, figures, lead_s=lead_s),
+                name=f"{name}.{judge.station}.health",
+            )
+        group.create_task(_keep(judges, kept.checkpoint_s), name=f"{name}.checkpoint")
+
+
+async def _show_left_out(bus: Bus, station: str, period_s: float) -> None:
+    """Say on the bus that a station is not judged, for ever."""
+    publisher = bus.publisher(status_key(station, "detector"))
+    async for _ in ticks(period_s, asyncio.Event()):
+        status = Status(
+            time=now_ns(), station=station, service="detector", state="stopping", figures={"left_out": 1.0}
+        )
+        publisher.put(status.encode())
+
+
+def _figures(judge: StationJudge, intake: Intake) -> dict[str, float]:
+    return judge.figures() | {"dropped": float(intake.dropped)}
+
+
+async def _keep(judges: Sequence[StationJudge], period_s: float) -> None:
+    """Save each detector once a period, one after the other, so that no second bears all of them."""
+    while judges:
+        for judge in judges:
+            await asyncio.sleep(period_s / len(judges))
+            await judge.keep_aside()

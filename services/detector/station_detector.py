@@ -1,0 +1,214 @@
+"""One station: its samples into the detector, verdicts and answers to orders out."""
+
+import asyncio
+import logging
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Iterable
+from itertools import islice
+
+import numpy as np
+
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.detector.stream.block import Block
+from wetwell.detector.verdict.maintenance import Costs
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import verdict_key
+from wetwell.protocols.messages.messages import MessageError, Order, Sample, Verdict
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.detector.checkpoint import Checkpoint, Told
+from wetwell.services.detector.model_publisher import ModelPublisher
+from wetwell.services.detector.quarantine import Quarantine
+
+log = logging.getLogger(__name__)
+
+VERDICT_HISTORY = 100
+ORDERS = 100
+"""Orders that are remembered with their answers, so that one that is sent again is not carried out twice."""
+
+
+class StationJudge:
+    """Feeds the detector of one station and publishes what it says.
+
+    Parameters
+    ----------
+    bus : Bus
+        Where verdicts and models go to.
+    station : Station
+        What is judged.
+    costs : Costs, optional
+        For the expected cost of each act.
+    checkpoint : Checkpoint, optional
+        Where the state is kept; what it holds is taken up at once, and its last verdicts are published again.
+    quarantine : Quarantine, optional
+        What remembers at which station the process has died.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        station: Station,
+        costs: Costs | None = None,
+        checkpoint: Checkpoint | None = None,
+        quarantine: Quarantine | None = None,
+    ) -> None:
+        self.station = station.name
+        self.detector = Detector(station.name, nominal_of(station), costs)
+        self._checkpoint = checkpoint
+        self._quarantine = quarantine or Quarantine(None, "", 1, 0.0)
+        told = None if checkpoint is None else checkpoint.restore(self.detector)
+        self.is_restored = told is not None
+        self._publishers = [
+            bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
+            for pump in range(1, len(station.pump) + 1)
+        ]
+        self._model = ModelPublisher(bus, station, self.detector)
+        self._last: dict[int, Verdict] = {}
+        self._answers: OrderedDict[str, Verdict] = OrderedDict()
+        self._counts: Counter[str] = Counter()
+        self._heard_s = time.monotonic()
+        if told is not None:
+            log.info("station '%s': goes on from its checkpoint", self.station)
+            self._answers.update(told.answers)
+            for verdict in told.verdicts:
+                self._publish(verdict)
+
+    def take_payloads(self, payloads: Iterable[bytes], kind: type[Sample | SampleBlock] = Sample) -> int:
+        """Judge what has come from the bus; how many samples. What is not of its kind is counted and left out."""
+        samples = 0
+        self._quarantine.enter(self.station)
+        for payload in payloads:
+            message = self.decoded(payload, kind)
+            if isinstance(message, SampleBlock):
+                self._judge_block(message)
+                samples += len(message.seq)
+            elif message is not None:
+                self._judge(message)
+                samples += 1
+        self._quarantine.leave()
+        return samples
+
+    async def take(self, samples: Iterable[Sample]) -> None:
+        """Judge samples that come another way, such as from the historian."""
+        left = iter(samples)
+        while batch := list(islice(left, 100)):
+            self.take_samples(batch)
+            await asyncio.sleep(0)
+
+    def take_samples(self, samples: Iterable[Sample]) -> None:
+        """Judge samples."""
+        self._quarantine.enter(self.station)
+        for sample in samples:
+            self._judge(sample)
+        self._quarantine.leave()
+
+    def keep(self) -> None:
+        """Save the state, if it is kept anywhere."""
+        if self._checkpoint is not None:
+            self._checkpoint.save(self.detector, self._told())
+
+    async def keep_aside(self) -> None:
+        """Save the state as `keep` does, the disk in a thread of its own."""
+        if self._checkpoint is not None:
+            await asyncio.to_thread(self._checkpoint.write, *self._checkpoint.encode(self.detector, self._told()))
+
+    def _told(self) -> Told:
+        return Told(self._answers, list(self._last.values()))
+
+    def figures(self) -> dict[str, float]:
+        """Health figures."""
+        counts = {name: float(count) for name, count in (self.detector.counts | self._counts).items()}
+        age_s = time.monotonic() - self._heard_s
+        return counts | {"sample_age_s": age_s}
+
+    def decoded(self, payload: bytes, kind: type[Sample | SampleBlock]) -> Sample | SampleBlock | None:
+        """Message of this station in a payload; one that is none is counted, and None."""
+        try:
+            message = kind.decode(payload)
+        except MessageError as error:
+            self._counts["malformed"] += 1
+            log.warning("station '%s': %s", self.station, error)
+            return None
+        if message.station != self.station:
+            self._counts["foreign"] += 1
+            return None
+        self._heard_s = time.monotonic()
+        return message
+
+    def _judge_block(self, message: SampleBlock) -> None:
+        block = Block(
+            time_ns=np.array(message.time, dtype=np.int64),
+            seq=np.array(message.seq, dtype=np.int64),
+            values=message.values(len(self._publishers)),
+            pumps=len(message.pumps),
+            is_bad=message.quality == "bad",
+        )
+        verdicts, rest = list[Verdict](), list[Sample]()
+        try:
+            for verdict in self.detector.verdicts_on(block):
+                verdicts.append(verdict)
+        except Exception:  # one odd run must not take the station off
+            self._counts["failures"] += 1
+            log.exception("station '%s': samples from %d on could not be judged", self.station, message.seq[0])
+            rest = behind(self.detector.last_heard, message.samples())
+        for verdict in verdicts:
+            self._publish(verdict)
+        for sample in rest:
+            self._judge(sample)
+
+    def _judge(self, sample: Sample) -> None:
+        try:
+            verdicts = self.detector.update(sample)
+        except Exception:  # one odd run must not take the station off
+            self._counts["failures"] += 1
+            log.exception("station '%s': sample %d could not be judged", self.station, sample.seq)
+            return
+        for verdict in verdicts:
+            self._publish(verdict)
+
+    def take_order(self, payload: bytes) -> None:
+        """Carry out an order, once; one that is none is counted and left out."""
+        try:
+            order = Order.decode(payload)
+        except MessageError as error:
+            self._counts["malformed_orders"] += 1
+            log.warning("station '%s': %s", self.station, error)
+            return
+        if order.station != self.station or order.pump > len(self._publishers):
+            self._counts["foreign_orders"] += 1
+            log.warning("station '%s': %s", self.station, f"order for pump {order.pump} of '{order.station}' refused")
+            return
+        if order.id in self._answers:
+            self._publish(self._answers[order.id])  # sent again because the answer was lost
+            return
+        act = self.detector.rebaseline if order.act == "rebaseline" else self.detector.revert
+        verdict = act(order.pump - 1, order.time)
+        log.info("station '%s' pump %d: %s by %s", self.station, order.pump, order.act, order.by)
+        evidence = verdict.evidence | {"order": order.id, "by": order.by}
+        self._answers[order.id] = verdict.model_copy(update={"evidence": evidence})
+        if len(self._answers) > ORDERS:
+            self._answers.popitem(last=False)
+        self.keep()  # what was answered must be true after a kill
+        self._publish(self._answers[order.id])
+
+    def _publish(self, verdict: Verdict) -> None:
+        self._counts["verdicts"] += 1
+        self._publishers[verdict.pump - 1].put(verdict.encode())
+        self._model.take(verdict)
+        last = self._last.get(verdict.pump)
+        if last is None or last.state != verdict.state:
+            log.info("station '%s' pump %d: %s", self.station, verdict.pump, verdict.state)
+        self._last[verdict.pump] = verdict
+
+
+def behind(last: tuple[int, int], samples: list[Sample]) -> list[Sample]:
+    """Those behind the sample of this time and number; all if it is not among them.
+
+    The detector takes a long row of samples that it has had for a clock that was set back.
+    """
+    for place in range(len(samples), 0, -1):
+        if (samples[place - 1].time, samples[place - 1].seq) == last:
+            return samples[place:]
+    return samples

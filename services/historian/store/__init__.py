@@ -1,0 +1,1 @@
+"""Stores of the historian: a folder of SQLite and Parquet, or PostgreSQL."""

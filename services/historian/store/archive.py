@@ -1,0 +1,175 @@
+"""Days that are complete, a Parquet file each: `samples/station=alpha/2026-11-20.parquet`; in `minutes/` likewise.
+
+A file of samples is a recording of the house's form with two more columns, `seq` and `quality`.
+"""
+
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+
+from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.errors import RecordingError
+from wetwell.services.historian.rows import Floats, Integers
+from wetwell.services.historian.samples import Samples, columns_of, pumps_of
+from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.historian.summary import Summary
+
+Form = Literal["samples", "minutes"]
+_STAMP = pa.timestamp("ns", tz="UTC")
+_FEW_VALUES = ("running", "count", "quality")
+"""Endings of columns that repeat a few values; the others are measured, and take a third less as streams of bytes."""
+
+
+class Archive:
+    """A folder of daily files. Every method raises `StoreError` if it cannot now, and names the file."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def stations(self) -> list[str]:
+        """Stations of which there is a file."""
+        folders = [folder for form in ("samples", "minutes") for folder in self._folder.glob(f"{form}/station=*")]
+        return sorted({folder.name.removeprefix("station=") for folder in folders})
+
+    def days_ns(self, form: Form, station: str) -> list[int]:
+        """Days of which there is a file, by their beginnings. [ns]."""
+        names = [path.stem for path in (self._folder / form / f"station={station}").glob("*.parquet")]
+        return sorted(int(np.datetime64(name, "ns").astype(np.int64)) for name in names if not name.startswith("."))
+
+    def path(self, form: Form, station: str, day_ns: int) -> Path:
+        """Where the file of a day is."""
+        day = np.datetime_as_string(np.datetime64(day_ns, "ns"), unit="D")
+        return self._folder / form / f"station={station}" / f"{day}.parquet"
+
+    def samples(self, station: str, day_ns: int) -> Samples | None:
+        """Samples of a day; None if there is no file."""
+        table = self._read(self.path("samples", station, day_ns))
+        if table is None:
+            return None
+        return Samples(
+            time_ns=_stamps(table),
+            seq=table["seq"].to_numpy(),
+            quality=table["quality"].to_numpy().astype(np.int64),
+            values=_matrix(table, columns_of(pumps_of(table.column_names))),
+        )
+
+    def pumps(self, station: str, day_ns: int) -> int:
+        """Number of pumps in the file of a day; 0 if there is none."""
+        try:
+            return pumps_of(pa.parquet.read_schema(self.path("samples", station, day_ns)).names)
+        except FileNotFoundError:
+            return 0
+        except (OSError, pa.ArrowException) as error:
+            raise StoreError(f"{self.path('samples', station, day_ns)}: cannot be read: {error}") from error
+
+    def count(self, station: str, day_ns: int, start_ns: int, end_ns: int) -> int:
+        """Number of samples of a span in the file of a day; 0 if there is none."""
+        table = self._read(self.path("samples", station, day_ns), ["time"])
+        if table is None:
+            return 0
+        time_ns = _stamps(table)
+        return int(np.count_nonzero((time_ns >= start_ns) & (time_ns < end_ns)))
+
+    def minutes(self, station: str, day_ns: int) -> Summary | None:
+        """Minutes of a day; None if there is no file."""
+        table = self._read(self.path("minutes", station, day_ns))
+        if table is None:
+            return None
+        names = columns_of(pumps_of(table.column_names))
+        return Summary(
+            time_ns=_stamps(table),
+            count=_matrix(table, [f"{name}_count" for name in names]),
+            mean=_matrix(table, names),
+            low=_matrix(table, [f"{name}_min" for name in names]),
+            high=_matrix(table, [f"{name}_max" for name in names]),
+        )
+
+    def write_samples(self, station: str, day_ns: int, samples: Samples) -> None:
+        """Write the samples of a day, and see that they can be read back."""
+        columns = {"seq": pa.array(samples.seq), "quality": pa.array(samples.quality.astype(np.int8))}
+        values = dict(zip(samples.columns, samples.values.T, strict=True))
+        path = self.path("samples", station, day_ns)
+        _write(path, samples.time_ns, values, columns)
+        kept = self.samples(station, day_ns)
+        if kept is None or not all(
+            np.array_equal(getattr(kept, name), getattr(samples, name), equal_nan=True)
+            for name in ("time_ns", "seq", "quality", "values")
+        ):
+            raise StoreError(f"{path}: does not hold what was written")
+
+    def write_minutes(self, station: str, day_ns: int, minutes: Summary) -> None:
+        """Write the minutes of a day, and see that they can be read back."""
+        names = columns_of((minutes.mean.shape[1] - 2) // 5)
+        counts = {f"{name}_count": column for name, column in zip(names, minutes.count.T, strict=True)}
+        path = self.path("minutes", station, day_ns)
+        _write(path, minutes.time_ns, minutes.columns() | counts, {})
+        kept = self.minutes(station, day_ns)
+        if kept is None or not all(
+            np.array_equal(getattr(kept, name), getattr(minutes, name), equal_nan=True)
+            for name in ("time_ns", "count", "mean", "low", "high")
+        ):
+            raise StoreError(f"{path}: does not hold what was written")
+
+    def delete(self, form: Form, station: str, day_ns: int) -> None:
+        """Delete the file of a day."""
+        path = self.path(form, station, day_ns)
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise StoreError(f"{path}: cannot be deleted: {error.strerror or error}") from error
+
+    def _read(self, path: Path, columns: list[str] | None = None) -> pa.Table | None:
+        try:
+            return pa.parquet.ParquetFile(path).read(columns)
+        except FileNotFoundError:
+            return None
+        except (OSError, pa.ArrowException) as error:
+            raise StoreError(f"{path}: cannot be read: {error}") from error
+
+
+def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: dict[str, Any]) -> None:
+    arrays = {name: pa.array(column, mask=np.isnan(column)) for name, column in values.items()}
+    table = pa.table({"time": pa.array(time_ns, _STAMP), **columns, **arrays})
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(path) as file:
+            pa.parquet.write_table(
+                table,
+                file,
+                compression="zstd",
+                use_dictionary=[name for name in table.column_names if name.endswith(_FEW_VALUES)],
+                use_byte_stream_split=[name for name in values if not name.endswith(_FEW_VALUES)],
+                column_encoding={
+                    name: "DELTA_BINARY_PACKED" for name in ("time", "seq") if name in table.column_names
+                },
+            )
+            file.flush()
+            os.fsync(file.fileno())
+        _sync_folders(path.parent)
+    except RecordingError as error:
+        raise StoreError(str(error)) from error
+    except (OSError, pa.ArrowException) as error:
+        raise StoreError(f"{path}: cannot be written: {error}") from error
+
+
+def _sync_folders(folder: Path) -> None:
+    """Make sure that a new name in a folder, and the folder itself, outlast a power failure."""
+    for each in (folder, folder.parent, folder.parent.parent):
+        descriptor = os.open(each, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _stamps(table: pa.Table) -> Integers:
+    stamps: Integers = table["time"].cast(pa.int64()).to_numpy()
+    return stamps
+
+
+def _matrix(table: pa.Table, names: tuple[str, ...] | list[str]) -> Floats:
+    return np.stack([table[name].to_numpy() for name in names], axis=1)

@@ -1,0 +1,241 @@
+"""The store of a folder: live days in SQLite, complete ones in Parquet, read as one."""
+
+import contextlib
+import fcntl
+import logging
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.rows import HOUR_NS
+from wetwell.services.historian.samples import Samples, merged
+from wetwell.services.historian.store.archive import Archive, Form
+from wetwell.services.historian.store.file_query import summary_of_files
+from wetwell.services.historian.store.interface import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of
+from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
+
+log = logging.getLogger(__name__)
+
+
+class FolderStore:
+    """A `Store` in a folder, which is made if it is not there.
+
+    Parameters
+    ----------
+    folder : Path
+    keep_live_days : int
+        Complete days that stay in the database before they become files.
+    downsample_after_days, keep_days : int, optional
+        Age at which samples become minutes, and at which they and the verdicts and alarms are deleted. The age of a
+        day counts from the newest sample of its station, but never from a time in the future.
+
+    Raises
+    ------
+    StoreError
+        If the folder cannot be used.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        keep_live_days: int = 1,
+        downsample_after_days: int | None = None,
+        keep_days: int | None = None,
+    ) -> None:
+        self._folder = folder
+        self._keep_live_days = keep_live_days
+        self._downsample_after_days = downsample_after_days
+        self._keep_days = keep_days
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
+        self.live = LiveDatabase(folder / "live.sqlite", self.alone)
+        self.archive = Archive(folder)
+        self._adopt()
+
+    def close(self) -> None:
+        """Close the database."""
+        self.live.close()
+
+    @contextlib.contextmanager
+    def alone(self) -> Iterator[None]:
+        """Hold the folder, so that no second historian works on it.
+
+        Raises
+        ------
+        StoreError
+            If another holds it, or it cannot be held.
+        """
+        lock = self._folder / "lock"
+        try:
+            opened = lock.open("w")
+        except OSError as error:
+            raise StoreError(f"{lock}: cannot be written: {error.strerror or error}") from error
+        with opened as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise StoreError(f"{self._folder}: another historian works here") from error
+            yield
+
+    def write(self, batch: Batch) -> int:
+        """Keep a batch in the database."""
+        return self.live.write(batch)
+
+    def stations(self) -> list[StationSpan]:
+        """All stations, by name."""
+        return self.live.stations()
+
+    def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
+        """Beginnings of the days that have samples in a span."""
+        live_ns = self.live.days_ns(station, start_ns, end_ns)  # before the files: rows go from here to there
+        return sorted({*live_ns, *self._filed("samples", station, start_ns, end_ns)})
+
+    def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
+        """Samples of a span; where file and database have the same one, that of the file."""
+        live = self.live.samples(station, start_ns, end_ns)  # before the files, likewise
+        filed = [self.archive.samples(station, day) for day in self._filed("samples", station, start_ns, end_ns)]
+        return merged([*(each.between(start_ns, end_ns) for each in filed if each is not None), live])
+
+    def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
+        """Number of pumps that the samples of a span speak of; None if there are none."""
+        counts = [self.archive.pumps(station, day) for day in self._filed("samples", station, start_ns, end_ns)]
+        live = self.live.pumps(station, start_ns, end_ns)
+        return max(counts if live is None else [*counts, live], default=None)
+
+    def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
+        """Whether a span has at most so many samples, and none that have become minutes."""
+        if self._filed("minutes", station, start_ns, end_ns):
+            return False
+        count = self.live.count(station, start_ns, end_ns, points + 1)
+        for day_ns in self._filed("samples", station, start_ns, end_ns):
+            if count > points:
+                break
+            count += self.archive.count(station, day_ns, start_ns, end_ns)
+        return count <= points
+
+    def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        """Summary of the days in files by DuckDB, of those that are in the database, too, by NumPy."""
+        try:
+            return self._summary(station, start_ns, end_ns, span_ns)
+        except StoreError:
+            return self._summary(station, start_ns, end_ns, span_ns)  # a file has gone on while it was to be read
+
+    def _summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        live_ns = set(self.live.days_ns(station, start_ns, end_ns))
+        of_samples = set(self._filed("samples", station, start_ns, end_ns))
+        of_minutes = set(self._filed("minutes", station, start_ns, end_ns))
+        parts = []
+        for day_ns in sorted(live_ns | (of_samples & of_minutes)):
+            day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
+            minutes = self.archive.minutes(station, day_ns)
+            if minutes is not None:  # late samples, or a downsampling that was broken off
+                day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
+            parts.append(day.over(start_ns, span_ns))
+        filed: dict[Form, set[int]] = {
+            "samples": of_samples - live_ns - of_minutes,
+            "minutes": of_minutes - live_ns - of_samples,
+        }
+        for form, days_ns in filed.items():
+            if days_ns:
+                paths = [self.archive.path(form, station, day_ns) for day_ns in sorted(days_ns)]
+                parts.append(summary_of_files(form, paths, start_ns, end_ns, start_ns, span_ns))
+        return joined(parts).over(start_ns, span_ns)
+
+    def _filed(self, form: Form, station: str, start_ns: int, end_ns: int) -> list[int]:
+        return [day_ns for day_ns in self.archive.days_ns(form, station) if start_ns - DAY_NS < day_ns < end_ns]
+
+    def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
+        """The last so many verdicts or alarms, oldest first."""
+        return self.live.events(kind, station, start_ns, end_ns, last)
+
+    def hours(self, station: str, start_ns: int, end_ns: int) -> Hours:
+        """Figures of the hours of days that have a file."""
+        return self.live.hours(station, start_ns, end_ns)
+
+    def maintain(self, now_ns: int) -> str | None:
+        """Turn one day into a file, or one old file into minutes, or delete one that is too old."""
+        for span in self.stations():
+            newest_ns = day_of(min(span.last_ns, now_ns))
+            for step in (self._roll, self._downsample, self._delete_old):
+                done = step(span.station, newest_ns)
+                if done is not None:
+                    return done
+        return None
+
+    def figures(self) -> dict[str, float]:
+        """Size of the database, and what is free on its disk."""
+        try:
+            free = shutil.disk_usage(self._folder).free
+        except OSError as error:
+            raise StoreError(f"{self._folder}: {error.strerror or error}") from error
+        return {"live_bytes": float(self.live.size_bytes()), "disk_free_bytes": float(free)}
+
+    def _adopt(self) -> None:
+        """Know the stations of the files, even if the database is new."""
+        spans = []
+        for station in self.archive.stations():
+            days_ns = sorted({*self.archive.days_ns("samples", station), *self.archive.days_ns("minutes", station)})
+            if days_ns:
+                spans.append(StationSpan(station, days_ns[0], days_ns[-1] + DAY_NS - 1))
+        known = {span.station for span in self.stations()}
+        self.live.adopt([span for span in spans if span.station not in known])
+
+    def _roll(self, station: str, newest_ns: int) -> str | None:
+        """Write the file of the oldest day in the database that is complete, then delete its rows.
+
+        A crash between the two leaves both; they are read once, and the step is done again.
+        """
+        first_ns = self.live.next_time_ns(station, -(2**63))
+        if first_ns is None or day_of(first_ns) >= newest_ns - self._keep_live_days * DAY_NS:
+            return None
+        day_ns = day_of(first_ns)
+        live = self.live.samples(station, day_ns, day_ns + DAY_NS)
+        filed = self.archive.samples(station, day_ns)
+        samples = live if filed is None else merged([filed, live])
+        end_ns = day_ns + DAY_NS
+        before, after = (
+            self.samples(station, day_ns - HOUR_NS, day_ns),
+            self.samples(station, end_ns, end_ns + HOUR_NS),
+        )
+        self.archive.write_samples(station, day_ns, samples)
+        if day_ns not in self.archive.days_ns("minutes", station):  # else these are a few late ones
+            self.live.write_hours(station, Hours.of_samples(merged([before, samples, after]), day_ns, end_ns))
+        self.live.delete_samples(station, live)
+        return f"{self.archive.path('samples', station, day_ns)}: {len(samples)} samples"
+
+    def _downsample(self, station: str, newest_ns: int) -> str | None:
+        """Turn the oldest file of samples into minutes, if it is old enough."""
+        days_ns = self.archive.days_ns("samples", station)
+        if self._downsample_after_days is None or not days_ns:
+            return None
+        if days_ns[0] >= newest_ns - self._downsample_after_days * DAY_NS:
+            return None
+        day_ns = days_ns[0]
+        samples = self.archive.samples(station, day_ns)
+        if samples is None:
+            return None
+        minutes = Summary.of(samples).over(day_ns, MINUTE_NS)
+        earlier = self.archive.minutes(station, day_ns)
+        if earlier is not None:
+            minutes = fuller(earlier, minutes)
+        self.archive.write_minutes(station, day_ns, minutes)
+        self.archive.delete("samples", station, day_ns)
+        return f"{self.archive.path('minutes', station, day_ns)}: {len(minutes)} minutes"
+
+    def _delete_old(self, station: str, newest_ns: int) -> str | None:
+        """Delete what is too old: the oldest file, or verdicts and alarms."""
+        if self._keep_days is None:
+            return None
+        end_ns = newest_ns - self._keep_days * DAY_NS
+        for form in ("samples", "minutes"):
+            days_ns = self.archive.days_ns(form, station)
+            if days_ns and days_ns[0] < end_ns:
+                self.archive.delete(form, station, days_ns[0])
+                return f"{self.archive.path(form, station, days_ns[0])}: deleted"
+        events = self.live.delete_events(station, end_ns)
+        return f"station '{station}': {events} old verdicts and alarms deleted" if events else None

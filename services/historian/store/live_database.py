@@ -1,0 +1,327 @@
+"""The SQLite database of the live days, of verdicts, alarms and figures.
+
+A write-ahead log with `synchronous=FULL`: when `write` returns, the batch is on the disk and survives `kill -9` and
+a power failure. One connection writes; each reading has a connection of its own and sees one moment.
+"""
+
+import contextlib
+import hashlib
+import itertools
+import logging
+import operator
+import sqlite3
+import threading
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.rows import HOUR_NS, SampleRow, unpack
+from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.interface import (
+    DAY_NS,
+    Batch,
+    EventKind,
+    StationSpan,
+    StoreError,
+    day_of,
+    span_of,
+)
+from wetwell.services.historian.store.live_schema import prepare
+
+log = logging.getLogger(__name__)
+
+BUSY_S = 10.0
+"""So long one process waits for another that writes."""
+
+_SIZE = operator.attrgetter("size")
+_SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
+"""Size, station, time, `seq` of a `SampleRow`: inserting rows of a page together takes half the time."""
+
+_OF_STATION = "FROM sample WHERE station = (SELECT id FROM station WHERE name = :station) "
+_LAST = "coalesce(last_ns, time_ns)"
+_TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
+"""Rows that may have a sample of a span: since a row keeps to its hour, none before the hour of the start has one."""
+
+_PACKED = "time_ns, seq, size, quality, data"
+
+
+class LiveDatabase:
+    """A file of SQLite, made if it is not there, upgraded if it is of an earlier version.
+
+    Parameters
+    ----------
+    path : Path
+    alone : function
+        Context in which no historian works on the file, for the upgrade.
+
+    Raises
+    ------
+    StoreError
+        Here and from every method, if the file cannot be used now. A file that is damaged is put aside, and told.
+    """
+
+    def __init__(self, path: Path, alone: Callable[[], contextlib.AbstractContextManager[None]]) -> None:
+        self._path = path
+        self._alone = alone
+        self._lock = threading.Lock()
+        self._ids: dict[str, int] = {}
+        try:
+            self._writer = self._open()
+        except sqlite3.OperationalError as error:
+            raise StoreError(f"{path}: {error}") from error
+        except sqlite3.DatabaseError as error:
+            aside = _put_aside(path)
+            log.warning("%s: %s; kept as %s, a new one is begun", path, error, aside.name)
+            self._writer = self._open()
+
+    def close(self) -> None:
+        """Close it; twice is fine."""
+        with self._lock:
+            self._writer.close()
+
+    def write(self, batch: Batch) -> int:
+        """Keep a batch whole or not at all, and return how many samples, verdicts and alarms of it were new."""
+        with self._transaction() as database:
+            ids = self._stations(database, batch)
+            new = 0
+            for size, rows in itertools.groupby(sorted(batch.samples, key=_SIZE_AND_KEY), _SIZE):
+                values = [
+                    (
+                        ids[row.station],
+                        row.time_ns,
+                        _key(row),
+                        row.quality,
+                        row.data,
+                        size,
+                        None if size == 1 else row.last_ns,
+                    )
+                    for row in rows
+                ]
+                before = database.total_changes
+                database.executemany("INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?)", values)
+                new += size * (database.total_changes - before)
+            before = database.total_changes
+            database.executemany(
+                "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?)",
+                [
+                    (row.kind, ids[row.station], row.time_ns, _digest(row.payload), row.payload)
+                    for row in batch.events
+                ],
+            )
+            new += database.total_changes - before
+            database.executemany(
+                "UPDATE station SET first_ns = min(coalesce(first_ns, ?1), ?1), "
+                "last_ns = max(coalesce(last_ns, ?2), ?2) WHERE id = ?3",
+                [(*span, ids[station]) for station, span in span_of(batch.samples).items()],
+            )
+        self._ids |= ids
+        return new
+
+    def adopt(self, spans: Sequence[StationSpan]) -> None:
+        """Take stations into the list that are not in it, or of which older or newer samples are kept elsewhere."""
+        with self._transaction() as database:
+            database.executemany(
+                "INSERT INTO station (name, first_ns, last_ns) VALUES (?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
+                "first_ns = min(coalesce(first_ns, excluded.first_ns), excluded.first_ns), "
+                "last_ns = max(coalesce(last_ns, excluded.last_ns), excluded.last_ns)",
+                spans,
+            )
+
+    def stations(self) -> list[StationSpan]:
+        """All stations, by name."""
+        with self._reading() as database:
+            rows = database.execute(
+                "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM station ORDER BY 1"
+            )
+            return [StationSpan(*row) for row in rows]
+
+    def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
+        """Samples from `start_ns` until before `end_ns`."""
+        with self._reading() as database:
+            rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", _span(station, start_ns, end_ns)).fetchall()
+        return Samples.of_rows(rows).between(start_ns, end_ns)
+
+    def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
+        """Number of pumps that the samples of a span speak of; None if there are none."""
+        if end_ns - start_ns < HOUR_NS:  # it may lie between two samples of a row
+            samples = self.samples(station, start_ns, end_ns)
+            return samples.pumps if len(samples) else None
+        with self._reading() as database:
+            (width,) = database.execute(
+                f"SELECT max(length(data) / size / 8 - CASE size WHEN 1 THEN 0 ELSE 2 END) {_TOUCHING}",
+                _span(station, start_ns, end_ns),
+            ).fetchone()
+        return None if width is None else (int(width) - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+
+    def next_time_ns(self, station: str, start_ns: int) -> int | None:
+        """Time of the first sample from `start_ns` on."""
+        span = _span(station, start_ns, start_ns)
+        with self._reading() as database:
+            begun = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
+            (time_ns,) = database.execute(f"SELECT min(time_ns) {_OF_STATION} AND time_ns >= :start", span).fetchone()
+        times_ns = Samples.of_rows(begun).time_ns
+        times_ns = times_ns[times_ns >= start_ns]
+        return min([*times_ns[:1].tolist(), *([] if time_ns is None else [int(time_ns)])], default=None)
+
+    def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
+        """Beginnings of the days that have samples in a span, in order."""
+        days_ns = []
+        next_ns = self.next_time_ns(station, start_ns)
+        while next_ns is not None and next_ns < end_ns:
+            days_ns.append(day_of(next_ns))
+            next_ns = self.next_time_ns(station, days_ns[-1] + DAY_NS)
+        return days_ns
+
+    def count(self, station: str, start_ns: int, end_ns: int, most: int) -> int:
+        """Number of samples of a span, up to `most`; one that came alone and in a row of several counts twice."""
+        span = _span(station, start_ns, end_ns)
+        with self._reading() as database:
+            (whole,) = database.execute(
+                f"SELECT coalesce(sum(size), 0) FROM (SELECT size {_OF_STATION} "  # noqa: S608 - as above
+                f"AND time_ns >= :start AND time_ns < :end AND {_LAST} < :end LIMIT :most)",
+                span | {"most": most},
+            ).fetchone()
+            if whole >= most:
+                return most
+            cut = database.execute(
+                f"SELECT {_PACKED} {_TOUCHING} AND (time_ns < :start OR {_LAST} >= :end)", span
+            ).fetchall()
+        return min(most, int(whole) + len(Samples.of_rows(cut).between(start_ns, end_ns)))
+
+    def delete_samples(self, station: str, samples: Samples) -> None:
+        """Delete the rows that hold these samples, and no others: what came meanwhile stays."""
+        if not len(samples):
+            return
+        span = _span(station, int(samples.time_ns[0]), int(samples.time_ns[-1]) + 1)
+        with self._transaction() as database:
+            (count,) = database.execute(f"SELECT sum(size) {_TOUCHING}", span).fetchone()
+            if count == len(samples):
+                database.execute(f"DELETE {_TOUCHING}", span)
+                return
+            rows = database.execute(f"SELECT {_PACKED}, station {_TOUCHING}", span).fetchall()
+            known = set(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
+            others = {
+                number
+                for part in unpack([row[:5] for row in rows])
+                for number, *key in zip(part.row.tolist(), part.time_ns.tolist(), part.seq.tolist(), strict=True)
+                if tuple(key) not in known
+            }
+            database.executemany(
+                "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?",
+                [(row[5], row[0], row[1]) for place, row in enumerate(rows) if place not in others],
+            )
+
+    def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
+        """The last so many verdicts or alarms, oldest first."""
+        with self._reading() as database:
+            rows = database.execute(
+                "SELECT payload FROM event WHERE kind = ? AND station = (SELECT id FROM station WHERE name = ?) "
+                "AND time_ns >= ? AND time_ns < ? ORDER BY time_ns DESC, id DESC LIMIT ?",
+                (kind, station, start_ns, end_ns, last),
+            ).fetchall()
+        return [payload for (payload,) in reversed(rows)]
+
+    def delete_events(self, station: str, end_ns: int) -> int:
+        """Delete verdicts and alarms from before `end_ns`; returns how many."""
+        with self._transaction() as database:
+            return database.execute(
+                "DELETE FROM event WHERE station = (SELECT id FROM station WHERE name = ?) AND time_ns < ?",
+                (station, end_ns),
+            ).rowcount
+
+    def hours(self, station: str, start_ns: int, end_ns: int) -> Hours:
+        """Figures that `write_hours` has kept."""
+        with self._reading() as database:
+            return Hours.of_rows(
+                database.execute(
+                    "SELECT hour_ns, data FROM hour WHERE station = (SELECT id FROM station WHERE name = ?) "
+                    "AND hour_ns >= ? AND hour_ns < ? ORDER BY 1",
+                    (station, start_ns, end_ns),
+                ).fetchall()
+            )
+
+    def write_hours(self, station: str, hours: Hours) -> None:
+        """Keep figures of hours, in place of earlier ones."""
+        with self._transaction() as database:
+            (number,) = database.execute("SELECT id FROM station WHERE name = ?", (station,)).fetchone()
+            database.executemany("REPLACE INTO hour VALUES (?, ?, ?)", [(number, *row) for row in hours.rows()])
+
+    def size_bytes(self) -> int:
+        """Size of the file and of its log."""
+        sizes = 0
+        for path in (self._path, self._path.with_name(f"{self._path.name}-wal")):
+            with contextlib.suppress(OSError):
+                sizes += path.stat().st_size
+        return sizes
+
+    def _stations(self, database: sqlite3.Connection, batch: Batch) -> dict[str, int]:
+        """Number of each station in a batch; unknown ones get one."""
+        names = {row.station for row in batch.samples} | {row.station for row in batch.events}
+        ids = {name: self._ids[name] for name in names if name in self._ids}
+        for name in sorted(names - ids.keys()):
+            database.execute("INSERT OR IGNORE INTO station (name) VALUES (?)", (name,))
+            (ids[name],) = database.execute("SELECT id FROM station WHERE name = ?", (name,)).fetchone()
+        return ids
+
+    @contextlib.contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        with self._lock:
+            try:
+                self._writer.execute("BEGIN IMMEDIATE")
+                yield self._writer
+                self._writer.execute("COMMIT")
+            except sqlite3.Error as error:
+                raise StoreError(f"{self._path}: {error}") from error
+            finally:
+                if self._writer.in_transaction:
+                    with contextlib.suppress(sqlite3.Error):
+                        self._writer.execute("ROLLBACK")
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        try:
+            with contextlib.closing(sqlite3.connect(self._path, timeout=BUSY_S)) as database:
+                database.execute("PRAGMA query_only = 1")
+                yield database
+        except sqlite3.Error as error:
+            raise StoreError(f"{self._path}: {error}") from error
+
+    def _open(self) -> sqlite3.Connection:
+        database = sqlite3.connect(self._path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+        try:
+            database.execute("PRAGMA journal_mode = WAL")
+            database.execute("PRAGMA synchronous = FULL")
+            prepare(database, self._path, self._alone)
+            database.execute("SELECT count(*) FROM station").fetchone()
+        except BaseException:
+            database.close()
+            raise
+        return database
+
+
+def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:
+    """Values for `_TOUCHING`."""
+    hour_ns = max(start_ns // HOUR_NS * HOUR_NS, -(2**63))
+    return {"station": station, "hour": hour_ns, "start": start_ns, "end": end_ns}
+
+
+def _key(row: SampleRow) -> int:
+    """Number of a sample, or of several samples one below 0 from all of their times and numbers."""
+    return row.seq if row.size == 1 else -1 - zlib.crc32(row.data[-16 * row.size :])
+
+
+def _digest(payload: bytes) -> bytes:
+    return hashlib.blake2b(payload, digest_size=8).digest()
+
+
+def _put_aside(path: Path) -> Path:
+    """Rename a database and its log, so that they can be looked at."""
+    number = 1
+    while (aside := path.with_name(f"{path.name}.refused-{number}")).exists():
+        number += 1
+    for suffix in ("", "-wal", "-shm"):
+        with contextlib.suppress(FileNotFoundError):
+            path.with_name(path.name + suffix).replace(aside.with_name(aside.name + suffix))
+    return aside

@@ -1,0 +1,68 @@
+"""The tables of the live database, and the upgrade of those of an earlier version."""
+
+import logging
+import sqlite3
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from wetwell.services.historian.store.interface import StoreError
+
+log = logging.getLogger(__name__)
+
+VERSION = 2
+
+_SCHEMA = f"""
+BEGIN IMMEDIATE;
+CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
+CREATE TABLE sample (
+    station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, quality INTEGER NOT NULL,
+    data BLOB NOT NULL, size INTEGER NOT NULL DEFAULT 1, last_ns INTEGER, PRIMARY KEY (station, time_ns, seq)
+) WITHOUT ROWID;
+CREATE TABLE event (
+    id INTEGER PRIMARY KEY, kind TEXT NOT NULL, station INTEGER NOT NULL, time_ns INTEGER NOT NULL,
+    digest BLOB NOT NULL, payload BLOB NOT NULL, UNIQUE (kind, station, time_ns, digest)
+);
+CREATE TABLE hour (
+    station INTEGER NOT NULL, hour_ns INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (station, hour_ns)
+) WITHOUT ROWID;
+PRAGMA user_version = {VERSION};
+COMMIT;
+"""
+"""A row of `sample` is a `SampleRow`. For one sample `last_ns` is NULL. For several `seq` is a number below 0, which
+tells rows from each other that begin at the same time."""
+
+_FROM_VERSION_1 = """
+BEGIN IMMEDIATE;
+ALTER TABLE sample ADD COLUMN size INTEGER NOT NULL DEFAULT 1;
+ALTER TABLE sample ADD COLUMN last_ns INTEGER;
+PRAGMA user_version = 2;
+COMMIT;
+"""
+"""Version 1 had rows of one sample. No row is written anew: a large site has some ten gigabytes of them."""
+
+
+def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], AbstractContextManager[None]]) -> None:
+    """Make the tables, or bring those of an earlier version to this one; whole or not at all.
+
+    In the context that `alone` gives no historian works on the file: an earlier one would not know the new table.
+
+    Raises
+    ------
+    StoreError
+        If the file is of a later version, or a historian works on one that must be upgraded.
+    """
+    version = _version(database)
+    if version > VERSION:
+        raise StoreError(f"{path}: version {version} is newer than {VERSION}, which this program knows")
+    if version == 0:
+        database.executescript(_SCHEMA)
+    elif version == 1:
+        with alone():
+            if _version(database) == 1:  # else another has done it meanwhile
+                database.executescript(_FROM_VERSION_1)
+                log.info("%s: upgraded from version 1 to 2", path)
+
+
+def _version(database: sqlite3.Connection) -> int:
+    return int(database.execute("PRAGMA user_version").fetchone()[0])

@@ -1,0 +1,284 @@
+"""The store of a PostgreSQL database, in the schema `wetwell`; for people with SQL its view `wetwell.samples`."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.rows import HOUR_NS, unpack
+from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.float_arrays import COPY_END, COPY_HEADER, copy_rows, from_postgres
+from wetwell.services.historian.store.interface import DAY_NS, Batch, EventKind, StationSpan, day_of, span_of
+from wetwell.services.historian.store.postgres_connection import PostgresConnection
+from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
+
+
+class PostgresStore:
+    """A `Store` in PostgreSQL. It connects when it is first needed, and again after each failure.
+
+    Parameters
+    ----------
+    url : str
+        Such as `postgresql://user@host:5432/name`. It never appears in messages: it may hold a password.
+    password_file : Path, optional
+        File with the password.
+    is_alone : bool
+        Whether to be the one historian of this database.
+    downsample_after_days, keep_days : int, optional
+        As for a folder.
+
+    Raises
+    ------
+    ConfigError
+        If the URL is none.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        password_file: Path | None = None,
+        is_alone: bool = True,
+        keep_live_days: int = 1,
+        downsample_after_days: int | None = None,
+        keep_days: int | None = None,
+    ) -> None:
+        self._connection = PostgresConnection(url, password_file, is_alone=is_alone)
+        self._keep_live_days = keep_live_days
+        self._downsample_after_days = downsample_after_days
+        self._keep_days = keep_days
+
+    def close(self) -> None:
+        """Close the connection; twice is fine."""
+        self._connection.close()
+
+    def write(self, batch: Batch) -> int:
+        """Keep a batch in one transaction."""
+        with self._connection.transaction() as database:
+            names = {row.station for row in batch.samples} | {row.station for row in batch.events}
+            database.cursor().executemany(
+                "INSERT INTO wetwell.station (name) VALUES (%s) ON CONFLICT DO NOTHING",
+                [(name,) for name in sorted(names)],
+            )
+            ids = dict(database.execute("SELECT name, id FROM wetwell.station WHERE name = ANY(%s)", (list(names),)))
+            new = _copy(database, batch, ids)
+            events = database.cursor()
+            events.executemany(
+                "INSERT INTO wetwell.event (kind, station, time_ns, digest, payload) VALUES (%s, %s, %s, %s, %s) "
+                "ON CONFLICT DO NOTHING",
+                [
+                    (row.kind, ids[row.station], row.time_ns, _digest(row.payload), row.payload.decode())
+                    for row in batch.events
+                ],
+            )
+            database.cursor().executemany(
+                "UPDATE wetwell.station SET first_ns = least(first_ns, %(first)s), "
+                "last_ns = greatest(last_ns, %(last)s), summed_until_ns = least(summed_until_ns, %(day)s) "
+                "WHERE id = %(id)s",
+                [
+                    {"first": first_ns, "last": last_ns, "day": day_of(first_ns), "id": ids[station]}
+                    for station, (first_ns, last_ns) in sorted(span_of(batch.samples).items())
+                ],
+            )
+            return new + (events.rowcount if batch.events else 0)
+
+    def stations(self) -> list[StationSpan]:
+        """All stations, by name."""
+        rows = self._connection.read(
+            "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM wetwell.station ORDER BY 1"
+        )
+        return [StationSpan(*row) for row in rows]
+
+    def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
+        """Beginnings of the days that have samples in a span."""
+        rows = self._connection.read(
+            "WITH RECURSIVE s AS (SELECT id FROM wetwell.station WHERE name = %(station)s), next AS ("
+            "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s) AS at UNION ALL "
+            "SELECT (SELECT min(time_ns) FROM wetwell.sample WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= ((floor(at::numeric / %(day)s) + 1) * %(day)s)::bigint AND time_ns < %(end)s) "
+            "FROM next WHERE at IS NOT NULL) SELECT at FROM next WHERE at IS NOT NULL",
+            {"station": station, "start": start_ns, "end": end_ns, "day": DAY_NS},
+        )
+        return [day_of(time_ns) for (time_ns,) in rows]
+
+    def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
+        """Samples of a span."""
+        rows = self._connection.read(
+            "SELECT time_ns, seq, quality, array_send(values) FROM wetwell.sample "
+            "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s",
+            (station, start_ns, end_ns),
+        )
+        return Samples.of_rows(
+            [(time_ns, seq, 1, quality, from_postgres(values)) for time_ns, seq, quality, values in rows]
+        )
+
+    def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
+        """Number of pumps that the samples of a span speak of; None if there are none."""
+        ((width,),) = self._connection.read(
+            "SELECT max(cardinality(values)) FROM wetwell.sample "
+            "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s",
+            (station, start_ns, end_ns),
+        )
+        return None if width is None else (width - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+
+    def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
+        """Whether a span has at most so many samples, and none that have become minutes."""
+        ((samples, minutes),) = self._connection.read(
+            "WITH s AS (SELECT id FROM wetwell.station WHERE name = %(station)s) SELECT "
+            "(SELECT count(*) FROM (SELECT 1 FROM wetwell.sample WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s LIMIT %(most)s) AS few), "
+            "EXISTS (SELECT 1 FROM wetwell.minute WHERE station = (SELECT id FROM s) "
+            "AND time_ns >= %(start)s AND time_ns < %(end)s)",
+            {"station": station, "start": start_ns, "end": end_ns, "most": points + 1},
+        )
+        return samples <= points and not minutes
+
+    def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
+        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
+        days_ns = self.days_ns(station, start_ns, end_ns)
+        parts = []
+        for day_ns in days_ns:
+            day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
+            minutes = self._minutes(station, day_ns, day_ns + DAY_NS)
+            if len(minutes):  # late samples, or a day that has become minutes just now
+                day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
+            parts.append(day.over(start_ns, span_ns))
+        minutes = self._minutes(station, start_ns, end_ns)
+        parts.append(minutes.take(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
+        return joined(parts).over(start_ns, span_ns)
+
+    def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:
+        rows = self._connection.read(
+            "SELECT time_ns, array_send(count), array_send(mean), array_send(low), array_send(high) "
+            "FROM wetwell.minute WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
+            "AND time_ns >= %s AND time_ns < %s ORDER BY time_ns",
+            (station, start_ns, end_ns),
+        )
+        return Summary.of_rows([(time_ns, *map(from_postgres, arrays)) for time_ns, *arrays in rows])
+
+    def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
+        """The last so many verdicts or alarms, oldest first."""
+        rows = self._connection.read(
+            "SELECT payload FROM wetwell.event WHERE kind = %s "
+            "AND station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s "
+            "ORDER BY time_ns DESC, id DESC LIMIT %s",
+            (kind, station, start_ns, end_ns, last),
+        )
+        return [payload.encode() for (payload,) in reversed(rows)]
+
+    def hours(self, station: str, start_ns: int, end_ns: int) -> Hours:
+        """Figures of the hours of days that are complete and summed up."""
+        rows = self._connection.read(
+            "SELECT hour_ns, array_send(values) FROM wetwell.hour JOIN wetwell.station ON station.id = hour.station "
+            "WHERE name = %s AND hour_ns >= %s AND hour_ns < %s ORDER BY 1",
+            (station, start_ns, end_ns),
+        )
+        return Hours.of_rows([(hour_ns, from_postgres(values)) for hour_ns, values in rows])
+
+    def maintain(self, now_ns: int) -> str | None:
+        """Sum up one complete day, or turn one old day into minutes, or delete what is too old."""
+        for span in self.stations():
+            newest_ns = day_of(min(span.last_ns, now_ns))
+            for step in (self._sum_up, self._downsample, self._delete_old):
+                done = step(span.station, newest_ns)
+                if done is not None:
+                    return done
+        return None
+
+    def figures(self) -> dict[str, float]:
+        """Whether it is connected."""
+        return {"is_connected": float(self._connection.is_connected)}
+
+    def _sum_up(self, station: str, newest_ns: int) -> str | None:
+        """Work out the hours of the oldest complete day that has none yet, or has had late samples since."""
+        ((summed_ns,),) = self._connection.read(
+            "SELECT summed_until_ns FROM wetwell.station WHERE name = %s", (station,)
+        )
+        end_ns = newest_ns - self._keep_live_days * DAY_NS
+        day_ns = next(iter(self.days_ns(station, summed_ns, end_ns)), None) if summed_ns < end_ns else None
+        if day_ns is None:
+            return None
+        has_minutes = len(self._minutes(station, day_ns, day_ns + DAY_NS)) > 0
+        around = self.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
+        hours = Hours.of_samples(around, day_ns, day_ns + DAY_NS)
+        with self._connection.transaction() as database:
+            for hour_ns, data in [] if has_minutes else hours.rows():  # else these are a few late samples
+                database.execute(
+                    "INSERT INTO wetwell.hour SELECT id, %b, %b::float8[] FROM wetwell.station WHERE name = %b "
+                    "ON CONFLICT (station, hour_ns) DO UPDATE SET values = excluded.values",
+                    (hour_ns, Hours.of_rows([(hour_ns, data)]).values[0].tolist(), station),
+                )
+            database.execute(
+                "UPDATE wetwell.station SET summed_until_ns = %s WHERE name = %s AND summed_until_ns = %s",
+                (day_ns + DAY_NS, station, summed_ns),
+            )
+        return f"station '{station}': {len(hours)} hours summed up"
+
+    def _downsample(self, station: str, newest_ns: int) -> str | None:
+        """Turn the samples of the oldest day into minutes, if it is old enough."""
+        if self._downsample_after_days is None:
+            return None
+        days_ns = self.days_ns(station, -(2**63), newest_ns - self._downsample_after_days * DAY_NS)
+        if not days_ns:
+            return None
+        day_ns = days_ns[0]
+        samples = self.samples(station, day_ns, day_ns + DAY_NS)
+        minutes = Summary.of(samples).over(day_ns, MINUTE_NS)
+        minutes = fuller(self._minutes(station, day_ns, day_ns + DAY_NS), minutes)
+        keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
+        with self._connection.transaction() as database:
+            ((number,),) = database.execute("SELECT id FROM wetwell.station WHERE name = %s", (station,)).fetchall()
+            database.execute(
+                "DELETE FROM wetwell.minute WHERE station = %s AND time_ns >= %s AND time_ns < %s",
+                (number, day_ns, day_ns + DAY_NS),
+            )
+            database.cursor().executemany(
+                "INSERT INTO wetwell.minute VALUES (%s, %s, %s, %s, %s, %s)",
+                [(number, *row) for row in minutes.lists()],
+            )
+            database.execute(
+                "DELETE FROM wetwell.sample WHERE station = %s AND (time_ns, seq) IN "
+                "(SELECT * FROM unnest(%s::bigint[], %s::bigint[]))",
+                (number, [key[0] for key in keys], [key[1] for key in keys]),
+            )
+        return f"station '{station}': {len(samples)} samples turned into {len(minutes)} minutes"
+
+    def _delete_old(self, station: str, newest_ns: int) -> str | None:
+        """Delete samples, minutes, verdicts and alarms that are too old."""
+        if self._keep_days is None:
+            return None
+        deleted = 0
+        with self._connection.transaction() as database:
+            for table in ("sample", "minute", "event"):
+                deleted += database.execute(
+                    psycopg.sql.SQL(
+                        "DELETE FROM {} WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
+                        "AND time_ns < %s"
+                    ).format(psycopg.sql.Identifier("wetwell", table)),
+                    (station, newest_ns - self._keep_days * DAY_NS),
+                ).rowcount
+        return f"station '{station}': {deleted} old rows deleted" if deleted else None
+
+
+def _copy(database: psycopg.Connection[Any], batch: Batch, ids: dict[str, int]) -> int:
+    """Samples, each a row, by COPY into a temporary table, and from there those that are new."""
+    if not batch.samples:
+        return 0
+    stations = np.array([ids[row.station] for row in batch.samples])
+    with database.cursor().copy("COPY incoming FROM STDIN (FORMAT BINARY)") as copy:
+        copy.write(COPY_HEADER)
+        for part in unpack([(row.time_ns, row.seq, row.size, row.quality, row.data) for row in batch.samples]):
+            copy.write(copy_rows(stations[part.row], part.time_ns, part.seq, part.quality, part.values))
+        copy.write(COPY_END)
+    return database.execute(
+        "INSERT INTO wetwell.sample SELECT * FROM incoming ORDER BY station, time_ns, seq ON CONFLICT DO NOTHING"
+    ).rowcount
+
+
+def _digest(payload: bytes) -> bytes:
+    return hashlib.blake2b(payload, digest_size=8).digest()

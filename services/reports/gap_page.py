@@ -1,0 +1,172 @@
+"""The page of a diagnosis: map of the gap, traces before and after, the residual, the ranking, the parameters."""
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.reports.charts import (
+    Section,
+    Series,
+    bar_chart,
+    heat_map,
+    line_chart,
+    page,
+    paragraph,
+    scatter,
+    table,
+)
+from wetwell.sim2real.diagnosis.covariates import best_covariate
+from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
+from wetwell.sim2real.diagnosis.report import DetectorVerdicts, GapReport
+from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.sim2real.residuals.bins import SIGNALS
+from wetwell.simulator.effects import effects_of
+
+Floats = npt.NDArray[np.float64]
+
+RANKED = 8
+SHOWN_S = 1800
+VERDICTS = {
+    "none": "No gap beyond the noise of the sensors.",
+    "unknown": "There is a gap that no effect of the library explains.",
+    "effect": "The gap is explained by the effects below.",
+}
+
+
+def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
+    """Self-contained HTML page of a diagnosis."""
+    gap = report.gap
+    verdict = [
+        paragraph(VERDICTS[report.verdict]),
+        table(
+            ["gap on held-out cycles", "before", "after", "floor", "shrinkage", "95 % interval"],
+            [["all signals", gap.before, gap.after, gap.floor, gap.shrinkage, _interval(gap.shrinkage_ci)]],
+        ),
+        table(["signal", "before", "after"], [[name, one.before, one.after] for name, one in gap.by_signal.items()]),
+        *(paragraph(f"Note: {note}.") for note in report.notes),
+        paragraph(f"Next: {report.next_experiment}"),
+    ]
+    sections = [Section("Verdict", "".join(verdict))]
+    if report.where:
+        sections.append(Section("Where the gap lies", _map(report)))
+    if report.effects:
+        sections.append(Section("Parameters", _parameters(report)))
+    sections.append(Section("Measured and simulated", _traces(diagnosis)))
+    if report.where:
+        sections.append(Section("Residual", _residual(report, diagnosis)))
+    sections.append(Section("Ranking of single effects", _ranking(report)))
+    if report.closed_loop is not None:
+        sections.append(Section("Closed loop", _closed_loop(report)))
+    if report.detector is not None:
+        sections.append(Section("Detector", _detector(report.detector)))
+    return page(f"Gap between simulation and reality: station {report.station}", sections)
+
+
+def _map(report: GapReport) -> str:
+    names = [name for name in SIGNALS if any(place.signal == name for place in report.where)]
+    size = {(place.signal, place.regime): place.gap for place in report.where}
+    values = np.array([[size.get((name, regime), np.nan) for regime in REGIMES] for name in names])
+    components = sorted({place.component for place in report.where})
+    by_component = {
+        (component, regime): sum(p.share for p in report.where if (p.component, p.regime) == (component, regime))
+        for component in components
+        for regime in REGIMES
+    }
+    shares = np.array([[by_component[component, regime] for regime in REGIMES] for component in components])
+    return heat_map(
+        "Share of the gap by component and regime", [c.replace("_", " ") for c in components], REGIMES, shares
+    ) + heat_map("Size of the gap by signal and regime, 1 is noise", names, REGIMES, values)
+
+
+def _parameters(report: GapReport) -> str:
+    rows = [
+        [effect.name, name, one.value, "–" if one.ci is None else _interval(one.ci), one.unit]
+        for effect in report.effects
+        for name, one in effect.parameters.items()
+    ]
+    equivalent = [
+        paragraph(f"These data cannot tell {effect.name} from {', '.join(effect.equivalent)}.")
+        for effect in report.effects
+        if effect.equivalent
+    ]
+    return table(["effect", "parameter", "value", "95 % interval", "unit"], rows) + "".join(equivalent)
+
+
+def _traces(diagnosis: Diagnosis) -> str:
+    """Half an hour around the worst held-out cycle of the gap."""
+    traces, replay = diagnosis.traces, diagnosis.replay
+    found, bins = diagnosis.attribution, diagnosis.bins
+    by_cycle = np.bincount(bins.cycle[found.held], found.plain[found.held] ** 2)
+    begin = max(int(np.argmax(diagnosis.regimes.cycle == int(np.argmax(by_cycle)))) - SHOWN_S // 6, 0)
+    window = slice(begin, begin + SHOWN_S)
+    time_ns = traces.start_ns + NS_PER_S * traces.time_s[window].astype(np.int64)
+    added = effects_of(diagnosis.station)[len(replay.own) :]
+    lines: dict[str, list[Series]] = {}
+    running = int(np.argmax((traces.frequency_hz[:, window] > 0.0).sum(axis=1)))
+    for label, effects in (("before", ()), ("after", added)):
+        if label == "after" and not added:
+            continue
+        predicted = replay.run(effects)
+        lines.setdefault("level_m", []).append(Series(label, time_ns, predicted.level_m[window].copy()))
+        for name, values in predicted.signals.items():
+            lines.setdefault(name, []).append(Series(label, time_ns, values[running, window].copy()))
+    charts = []
+    for name, series in lines.items():
+        recorded = traces.level_m if name == "level_m" else traces.signals[name][running]
+        title = name if name == "level_m" else f"pump{running + 1}_{name}"
+        every = [Series("measured", time_ns, recorded[window]), *series]
+        charts.append(line_chart(title, every, y_label=name, is_time=True))
+    return "".join(charts)
+
+
+def _residual(report: GapReport, diagnosis: Diagnosis) -> str:
+    first = report.where[0]
+    covariate = best_covariate(diagnosis, SIGNALS.index(first.signal))
+    series = [Series("before", covariate.values, covariate.before)]
+    if report.effects:
+        series.append(Series("after", covariate.values, covariate.after))
+    return scatter(
+        f"Residual of {first.signal.replace('_', ' ')} against {covariate.name}",
+        series,
+        x_label=covariate.name,
+        y_label="residual in units of noise",
+    )
+
+
+def _ranking(report: GapReport) -> str:
+    best = report.candidates[:RANKED]
+    bars = bar_chart(
+        "Shrinkage by each effect alone", [c.name for c in best], {"shrinkage": [c.shrinkage for c in best]}
+    )
+    rows = [[c.name, c.score, c.shrinkage, _interval(c.shrinkage_ci)] for c in best]
+    return bars + table(["effect", "score", "shrinkage", "95 % interval"], rows)
+
+
+def _closed_loop(report: GapReport) -> str:
+    loop = report.closed_loop
+    if loop is None:
+        return ""
+    rows: list[list[object]] = [
+        ["measured", None, loop.measured_starts_per_day, loop.measured_run_h_per_day],
+        *[
+            [name, f"{one.level_nmae:.2%}", one.starts_per_day, one.run_h_per_day]
+            for name, one in (("simulated before", loop.before), ("simulated after", loop.after))
+        ],
+    ]
+    return table(["", "level NMAE", "starts a day", "run time a day in h"], rows)
+
+
+def _detector(told: DetectorVerdicts) -> str:
+    same = "The detector learns its baseline in the first six hours, so that constant effects make little difference."
+    if not told.has_new_curves:
+        same = "No effect changes a curve that the detector uses: its verdicts stay the same."
+    rows = [["as configured", told.false_per_day_before], ["as diagnosed", told.false_per_day_after]]
+    return (
+        paragraph(f"Verdicts that call a fault on this recording of {told.days:.3g} days, taken to be healthy:")
+        + table(["station", "faults called a day"], rows)
+        + paragraph(same)
+    )
+
+
+def _interval(pair: tuple[float, float]) -> str:
+    return f"{pair[0]:.4g} to {pair[1]:.4g}"

@@ -1,0 +1,1 @@
+"""What every daemon needs: settings, life cycle, clock, connection to the bus, logs, health."""

@@ -1,0 +1,107 @@
+"""What every daemon has: a way to stop, ticks that do not drift, and health figures on the bus."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator, Callable
+
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import alive_key, status_key
+from wetwell.protocols.messages.messages import ServiceState, Status
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.health.board import BOARD
+from wetwell.services.systemd.notify import watched_by_systemd
+
+log = logging.getLogger(__name__)
+
+PARENT_VARIABLE = "WETWELL_STOP_WITH_PARENT"
+"""Set for the children of a supervisor: they stop when their standard input ends, even if it was killed."""
+
+
+@contextlib.asynccontextmanager
+async def stop_event() -> AsyncIterator[asyncio.Event]:
+    """Yield an event that SIGINT, SIGTERM or the end of the parent sets; a second signal acts as usual."""
+    loop, stop = asyncio.get_running_loop(), asyncio.Event()
+    signals = (signal.SIGINT, signal.SIGTERM)
+
+    def request(sig: signal.Signals) -> None:
+        log.info("stopping on %s", sig.name)
+        stop.set()
+        loop.remove_signal_handler(sig)
+
+    def read_parent() -> None:
+        if not os.read(sys.stdin.fileno(), 1024):
+            loop.remove_reader(sys.stdin.fileno())
+            log.info("stopping with the parent process")
+            stop.set()
+
+    has_parent = os.environ.get(PARENT_VARIABLE) == "1"
+    for sig in signals:
+        loop.add_signal_handler(sig, request, sig)
+    if has_parent:
+        loop.add_reader(sys.stdin.fileno(), read_parent)
+    try:
+        async with watched_by_systemd(stop):
+            yield stop
+    finally:
+        for sig in signals:
+            loop.remove_signal_handler(sig)
+        if has_parent:
+            loop.remove_reader(sys.stdin.fileno())
+
+
+async def ticks(period_s: float, stop: asyncio.Event, lead_s: float = 0.0) -> AsyncIterator[float]:
+    """Yield the time since the start, in s, on each multiple of the period until stopped; late ticks are skipped.
+
+    With a lead the start was so long ago: many that begin together tick apart from their second tick on.
+    """
+    loop = asyncio.get_running_loop()
+    start, n = loop.time() - lead_s, 0
+    while not stop.is_set():
+        yield loop.time() - start
+        n = max(n + 1, int((loop.time() - start) // period_s) + 1)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout_at(start + n * period_s):
+                await stop.wait()
+
+
+async def until(stop: asyncio.Event, task: asyncio.Task[None]) -> None:
+    """Wait until stopped or until the task ends; then cancel it. An error of the task is raised."""
+    waiting = asyncio.create_task(stop.wait(), name="stop")
+    try:
+        await asyncio.wait({waiting, task}, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for each in (waiting, task):
+            each.cancel()
+        await asyncio.gather(waiting, task, return_exceptions=True)
+    if not task.cancelled() and (error := task.exception()) is not None:
+        raise error
+
+
+def _running() -> tuple[ServiceState, str]:
+    return "running", ""
+
+
+async def report_health(
+    bus: Bus,
+    station: str,
+    service: str,
+    period_s: float,
+    figures: Callable[[], dict[str, float]],
+    condition: Callable[[], tuple[ServiceState, str]] = _running,
+    lead_s: float = 0.0,
+) -> None:
+    """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`."""
+    bus.announce(alive_key(station, service))
+    publisher = bus.publisher(status_key(station, service))
+    never = asyncio.Event()
+    async for _ in ticks(period_s, never, lead_s):
+        state, reason = condition()
+        status = Status(
+            time=now_ns(), station=station, service=service, state=state, figures=figures(), reason=reason
+        )
+        BOARD.report(station, service, period_s, status.figures)
+        publisher.put(status.encode())

@@ -1,0 +1,61 @@
+"""Samples of one station onto the bus: each by itself, or gathered into messages of many."""
+
+import asyncio
+
+from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import sample_block_key, sample_key
+from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
+
+HISTORY = 600
+"""Samples that the bus keeps for late joiners: ten minutes at one a second."""
+
+
+class SampleSender:
+    """Sends the samples of a station in their order.
+
+    Parameters
+    ----------
+    bus : Bus
+    station : str
+    gather_s : float
+        So long samples are gathered into one message; with 0 each is sent at once, by itself. [s]
+
+    Notes
+    -----
+    To be used within one event loop. What is gathered is lost if the process is killed; call `flush` before it ends.
+    """
+
+    def __init__(self, bus: Bus, station: str, gather_s: float) -> None:
+        self._gather_s = gather_s
+        self._gathered: list[Sample] = []
+        self._timer: asyncio.TimerHandle | None = None
+        key = sample_block_key(station) if gather_s else sample_key(station)
+        self._publisher = bus.publisher(key, history=HISTORY)
+
+    def put(self, sample: Sample) -> None:
+        """Send a sample, or gather it."""
+        if not self._gather_s:
+            self._publisher.put(sample.encode())
+            return
+        if self._gathered and _kind(sample) != _kind(self._gathered[0]):
+            self.flush()
+        self._gathered.append(sample)
+        if len(self._gathered) == MOST_SAMPLES:
+            self.flush()
+        elif self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(self._gather_s, self.flush)
+
+    def flush(self) -> None:
+        """Send what is gathered."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._gathered:
+            self._publisher.put(SampleBlock.of(self._gathered).encode(), len(self._gathered))
+            self._gathered = []
+
+
+def _kind(sample: Sample) -> tuple[str, int]:
+    """What the samples of a message have in common."""
+    return sample.quality, len(sample.pumps)

@@ -1,0 +1,1 @@
+"""Who may look and act: tokens, roles, what may listen beyond this machine."""

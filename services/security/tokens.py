@@ -1,0 +1,126 @@
+"""Tokens for who looks at the dashboard or acts on alarms: a file of names, roles and hashes.
+
+A token is 256 random bits, so one SHA-256 of it tells nothing: a slow hash is for passwords that people think of.
+The file is read at each check. A token that is taken out of it is refused from then on.
+"""
+
+import hashlib
+import hmac
+import os
+import secrets
+from pathlib import Path
+from typing import Annotated, Literal, get_args
+
+import tomli_w
+from pydantic import Field, ValidationError
+
+from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.errors import ConfigError, first_fault
+from wetwell.protocols.station.station_file import NAME_PATTERN, Table, load_toml
+
+Role = Literal["viewer", "operator"]
+"""A viewer may look, an operator may also act. Later ones may all that earlier ones may."""
+
+PREFIX = "wetwell_"
+"""By it, a search for secrets finds a token that was left in a file."""
+
+
+class Holder(Table):
+    """Who holds a token, and what it allows."""
+
+    name: Annotated[str, Field(pattern=NAME_PATTERN)]
+    role: Role
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", repr=False)]
+
+    def may(self, role: Role) -> bool:
+        """Whether this holder may do what a role may.
+
+        Examples
+        --------
+        >>> Holder(name="control-room", role="operator", sha256="0" * 64).may("viewer")
+        True
+        """
+        order = get_args(Role)
+        return bool(order.index(self.role) >= order.index(role))
+
+
+class _File(Table):
+    token: tuple[Holder, ...] = ()
+
+
+def holder_of(file: Path, token: str) -> Holder | None:
+    """Who holds this token; None if nobody does. Takes as long for a wrong token as for a right one.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read or breaks a rule: then nobody may be let in.
+    """
+    digest, found = _digest(token), None
+    for holder in read_holders(file):
+        if hmac.compare_digest(holder.sha256, digest):
+            found = holder
+    return found
+
+
+def read_holders(file: Path) -> tuple[Holder, ...]:
+    """Everybody in a file of tokens.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read or breaks a rule.
+    """
+    try:
+        return _File.model_validate(load_toml(file)).token
+    except ValidationError as error:
+        raise ConfigError(f"{file}: {first_fault(error)}") from error
+
+
+def new_token(file: Path, name: str, role: Role) -> str:
+    """Make a token, and add its hash to a file, which need not exist. The token itself is kept nowhere.
+
+    Raises
+    ------
+    ConfigError
+        If the name is taken or breaks a rule, or the file cannot be read.
+    RecordingError
+        If the file cannot be written.
+    """
+    holders = read_holders(file) if file.exists() else ()
+    if any(holder.name == name for holder in holders):
+        raise ConfigError(f"{file}: '{name}' has a token already; revoke it first")
+    token = PREFIX + secrets.token_urlsafe(32)
+    try:
+        holder = Holder(name=name, role=role, sha256=_digest(token))
+    except ValidationError as error:
+        raise ConfigError(first_fault(error)) from error
+    _write(file, (*holders, holder))
+    return token
+
+
+def revoke_token(file: Path, name: str) -> None:
+    """Take a token out of a file.
+
+    Raises
+    ------
+    ConfigError
+        If nobody of this name is in it, or it cannot be read.
+    RecordingError
+        If the file cannot be written.
+    """
+    holders = read_holders(file)
+    rest = tuple(holder for holder in holders if holder.name != name)
+    if len(rest) == len(holders):
+        raise ConfigError(f"{file}: nobody is named '{name}'")
+    _write(file, rest)
+
+
+def _write(file: Path, holders: tuple[Holder, ...]) -> None:
+    with whole_file(file) as out:
+        os.fchmod(out.fileno(), 0o600)
+        tomli_w.dump(_File(token=holders).model_dump(), out)
+
+
+def _digest(token: str) -> str:
+    return hashlib.sha256(token.encode(errors="surrogateescape")).hexdigest()

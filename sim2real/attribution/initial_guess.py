@@ -1,0 +1,102 @@
+"""Where the search for some parameters begins: what the recording shows directly."""
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.bins import POWER, Bins
+from wetwell.sim2real.residuals.residuals import Misfit
+from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.power import loaded_power_kw
+
+Floats = npt.NDArray[np.float64]
+
+DAY_S = 86_400.0
+LONGEST_S = 14_400.0
+SHORTEST_S = 45.0
+GRID_S = 20.0
+FULL = 0.98
+REFERENCES = (0.0, 1.0, 3.0, 8.0)
+"""Levels at which a lift may be right, in middles between the first start and stop."""
+CUTOFFS = (0.98, 0.85, 0.7, 0.5, 0.35)
+"""Limits that are tried, in least flows that are not 0: a ramp may pass what is between within a second."""
+BENCH = 8.0
+"""Exponent of a sump's area with a bench."""
+EDGES = (0.25, 0.5, 0.75)
+"""Heights of a bench's edge, as shares of the way from the first stop to the first start."""
+FINER = 4
+"""Frequencies between two that the length of the recording tells apart."""
+
+
+def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Floats) -> list[dict[str, float]]:
+    """Sets of start values by parameter: what of deadbands, quanta, limits and swings the recording shows."""
+    fixed = dict(candidate.fixed)
+    hints: dict[str, float] = {}
+    names = {free.name for free in candidate.free}
+    for pattern in misfit.telemetry.patterns:
+        if "deadband" in names and pattern.deadband > 0.0 and fixed.get("channel") == pattern.quantity:
+            hints["deadband"] = pattern.deadband
+        if "quantum_m" in names and pattern.quantum > 0.0:
+            hints["quantum_m"] = pattern.quantum
+    control = replay.station.control
+    middle_m = 0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])
+    hints |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
+    if "rated_factor" in names and "power_kw" in replay.traces.signals:
+        hints["rated_factor"] = _rated_factor(replay)
+    if "fast_period_s" in names:
+        hints |= _swing(misfit.bins, replay.traces.time_s, residuals)
+    if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
+        flow_m3h = replay.traces.signals["flow_m3h"]
+        least_m3h = float(np.min(flow_m3h[flow_m3h > 0.0], initial=np.inf))
+        return [hints | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [hints]
+    if "reference_level_m" in names:
+        return [hints | {"reference_level_m": far * middle_m} for far in REFERENCES]
+    if "exponent" in names:
+        low_m, high_m = control.stop_levels_m[0], control.start_levels_m[0]
+        bench = {"exponent": BENCH, "top_factor": 1.0}
+        edges_m = [low_m + share * (high_m - low_m) for share in EDGES]
+        return [hints, *(hints | bench | {"height_m": edge_m} for edge_m in edges_m)]
+    return [hints]
+
+
+def _rated_factor(replay: Replay) -> float:
+    """Recorded power at nominal speed over that of the load by the configured efficiencies."""
+    plant = plant_parameters(replay.station)
+    shaft_kw = float(np.mean(plant.rated_hydraulic_kw)) / plant.pump_efficiency
+    loaded_kw = loaded_power_kw(shaft_kw, shaft_kw, plant.motor_efficiency, plant.drive_efficiency)
+    is_full = replay.traces.frequency_hz > FULL * plant.nominal_frequency_hz[:, None]
+    seen_kw = replay.traces.signals["power_kw"][is_full]
+    return float(np.nanmedian(seen_kw)) / loaded_kw if np.isfinite(seen_kw).any() else 1.0
+
+
+def _swing(bins: Bins, second_s: Floats, residuals: Floats) -> dict[str, float]:
+    """Period and phase of the strongest sine in the steady residuals of the power; its amplitude is small."""
+    rows = (bins.signal == POWER) & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
+    if rows.sum() < 50:
+        return {}
+    time_s = second_s[bins.second[rows]] + 10.0
+    values = residuals[rows] * bins.deviation[rows]
+    day = 2.0 * np.pi * time_s / DAY_S
+    slow = np.column_stack([np.ones(time_s.size), np.cos(day), np.sin(day)])
+    daily = np.linalg.lstsq(slow, values, rcond=None)[0]
+    values = values - slow @ daily
+    phase_h = float(np.arctan2(daily[2], daily[1]) / (2.0 * np.pi) * 24.0 % 24.0)
+    place = (time_s / GRID_S).astype(np.int64)
+    grid = np.bincount(place, values)
+    frequency_hz = np.fft.rfftfreq(FINER * grid.size, GRID_S)
+    power = np.abs(np.fft.rfft(grid, FINER * grid.size))
+    power[(frequency_hz < 1.0 / LONGEST_S) | (frequency_hz > 1.0 / SHORTEST_S)] = 0.0
+    best = 2.0 * np.pi * float(frequency_hz[int(np.argmax(power))])
+    if best == 0.0:
+        return {}
+    wave = np.column_stack([np.sin(best * time_s), np.cos(best * time_s)])
+    a, b = np.linalg.lstsq(wave, values, rcond=None)[0]
+    phase_s = (-np.arctan2(b, a) / best) % (2.0 * np.pi / best)
+    return {
+        "fast_period_s": 2.0 * np.pi / best,
+        "fast_phase_s": float(phase_s),
+        "fast_amplitude": 0.002,
+        "daily_phase_h": phase_h,
+    }

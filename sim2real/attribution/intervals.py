@@ -1,0 +1,94 @@
+"""Intervals of fitted parameters: noise of every kind, and what a model that is right may still be off."""
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.sim2real.residuals.bins import Bins
+from wetwell.simulator.effects import EFFECTS
+
+Floats = npt.NDArray[np.float64]
+
+TWO_SIDED = 1.96
+BLOCKS = 24
+"""Most blocks of neighbouring cycles: noise that is slower than a cycle stays within one."""
+RISE = 10.0
+"""Of the sum of squares, at the ends of an interval of a parameter that has no slope, such as a limit."""
+SCAN_S = 0.5
+"""Least half width of a time: a sample may stand for the begin or the end of its second."""
+FORM = (0.01, 0.03)
+"""Least half width, as a share of the way from neutral, where a name fixes the equation, and where it does not."""
+STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 0.8)
+"""Steps to such ends, as shares of the way to neutral, or of as far on the other side."""
+
+
+def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
+    r"""(parameters, 2) ends of 95 % intervals, as places in the ranges, in the order of the candidates.
+
+    $$\operatorname{cov} = H^{-1} \left(\sum_b g_b g_b^T + \sum_c g_c g_c^T + \sum_c t_c t_c^T\right) H^{-1},
+    \qquad H = J^T J$$
+
+    with the pulls $g = J^T r$ of blocks b of neighbouring cycles (noise, also slow noise) and of cells c, signals in
+    regimes (what the model does not get right pulls differently in each), and $t = J^T \tau$ with the tolerance τ of
+    a right model, which has one sign in a cell.
+
+    References
+    ----------
+    .. [1] K.-Y. Liang, S. L. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 1986.
+    """
+    x = np.concatenate([*fit.places]) if fit.places else np.zeros(0)
+    if x.size == 0:
+        return np.zeros((0, 2))
+    rows = fitter.rows
+    slopes, residuals = fitter.slopes(fit), fit.residuals[rows]
+    cycles = np.unique(bins.cycle[rows], return_inverse=True)[1]
+    count = int(cycles.max(initial=0)) + 1
+    block = cycles * min(BLOCKS, count) // count
+    cell = np.unique(bins.signal[rows] * len(REGIMES) + bins.regime[rows], return_inverse=True)[1]
+    pulls = [
+        _sums(slopes * residuals[:, None], block),
+        _sums(slopes * residuals[:, None], cell),
+        _sums(slopes * bins.tolerance[rows, None], cell),
+    ]
+    inverse = np.linalg.pinv(slopes.T @ slopes)
+    covariance = inverse @ sum(pull.T @ pull for pull in pulls) @ inverse
+    spread = TWO_SIDED * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    ends = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
+    for flat in np.flatnonzero(~np.any(slopes, axis=0)):
+        ends[flat] = _profile(fitter, fit, x, int(flat))
+    frees = [(free, candidate) for candidate in fit.candidates for free in candidate.free]
+    for k, (free, candidate) in enumerate(frees):
+        form = FORM[0] if EFFECTS[candidate.name].has_one_form else FORM[1]
+        value = free.value(float(x[k]))
+        least = max(form * abs(value - (free.neutral or 0.0)), SCAN_S if free.unit == "s" else 0.0)
+        low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
+        ends[k] = min(ends[k, 0], free.share(low)), max(ends[k, 1], free.share(high))
+    return np.asarray(ends, dtype=np.float64)
+
+
+def _sums(values: Floats, group: npt.NDArray[np.int64]) -> Floats:
+    """(groups, parameters) sums of rows."""
+    return np.array([np.bincount(group, column) for column in values.T]).T
+
+
+def _profile(fitter: Fitter, fit: Fit, x: Floats, place: int) -> tuple[float, float]:
+    """Places on both sides from which on the sum of squares has risen by `RISE`, the others kept."""
+    free = [free for candidate in fit.candidates for free in candidate.free][place]
+    neutral = 0.0 if free.neutral is None else free.share(free.neutral)
+    sizes = np.cumsum([part.size for part in fit.places])[:-1]
+    limit = fitter.cost(fit.residuals) + RISE
+    ends = []
+    for side in (-1.0, 1.0):
+        end = x[place]
+        for stride in STRIDES:
+            moved = x.copy()
+            moved[place] = np.clip(x[place] + side * stride * (x[place] - neutral), 0.0, 1.0)
+            end = moved[place]
+            if fitter.cost(fitter.residuals(fit.candidates, np.split(moved, sizes))) > limit:
+                break
+        else:
+            if side > 0.0:  # away from neutral nothing speaks against it
+                end = float(x[place] > neutral)
+        ends.append(float(end))
+    return min(ends), max(ends)

@@ -1,0 +1,1 @@
+"""A station file fitted to a recording, and the fit checked."""

@@ -1,0 +1,99 @@
+"""Steady operating points of a recording: means over segments of each pump run, the raw material of calibration."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import NS_PER_S
+
+Floats = npt.NDArray[np.float64]
+
+SEGMENT_S = 25.0
+WARM_UP_S = 30.0
+RAMP_STEP = 0.005
+"""A speed ratio that moves by more from one row to the next is a ramp, not a duty."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SteadyPoints:
+    """Means over segments in which nothing was switched, (n,) each.
+
+    `run` numbers the pump runs, so that all segments of one can be drawn together; `pump` counts from 0; `running` is
+    the number of pumps on; `speed_ratio` is frequency over nominal frequency.
+    """
+
+    run: npt.NDArray[np.int64]
+    pump: npt.NDArray[np.int64]
+    running: npt.NDArray[np.int64]
+    flow_m3h: Floats
+    total_flow_m3h: Floats
+    head_m: Floats
+    speed_ratio: Floats
+    level_m: Floats
+
+
+def running_flags(recording: Recording, pumps: int) -> npt.NDArray[np.bool_]:
+    """(pumps, n) whether each pump runs: from its flag, or else from its frequency."""
+    flags = np.array([recording.column(f"pump{i}_running") for i in range(1, pumps + 1)])
+    frequency_hz = np.array([recording.column(f"pump{i}_frequency_hz") for i in range(1, pumps + 1)])
+    running: npt.NDArray[np.bool_] = np.where(np.isnan(flags), frequency_hz, flags) > 0.0
+    return running
+
+
+def steady_points(recording: Recording, station: Station) -> SteadyPoints:
+    """Steady points of all pumps; times must rise."""
+    pumps = len(station.pump)
+    running = running_flags(recording, pumps)
+    time_s = (recording.time_ns - recording.time_ns[0]) / NS_PER_S
+    switched = np.concatenate([[True], np.any(running[:, 1:] != running[:, :-1], axis=0)])
+    period = np.cumsum(switched) - 1
+    since_s = time_s - time_s[switched][period]
+    segment = ((since_s - WARM_UP_S) // SEGMENT_S).astype(np.int64)
+    flow_m3h = np.array([recording.column(f"pump{i}_flow_m3h") for i in range(1, pumps + 1)])
+    total_m3h = np.where(running, flow_m3h, 0.0).sum(axis=0)
+    columns: list[list[Floats]] = [[] for _ in range(8)]
+    for pump in range(pumps):
+        run = np.cumsum(np.diff(running[pump], prepend=False) & running[pump])
+        ratio = recording.column(f"pump{pump + 1}_frequency_hz") / station.pump[pump].nominal_frequency_hz
+        steps = np.abs(np.diff(ratio, prepend=ratio[:1], append=ratio[-1:]))
+        is_level = np.maximum(steps[1:], steps[:-1]) < RAMP_STEP
+        head_m = recording.column(f"pump{pump + 1}_head_m")
+        level_m = np.nan_to_num(recording.column("level_m"), nan=0.0)
+        usable = running[pump] & is_level & (segment >= 0) & np.isfinite(flow_m3h[pump] + head_m + ratio + total_m3h)
+        key = period[usable] * 100_000 + segment[usable]
+        _, first, where, counts = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+        whole = (
+            counts >= 0.8 * SEGMENT_S / max(float(np.median(np.diff(time_s))), 1.0) if time_s.size > 1 else counts > 0
+        )
+        for target, values in zip(
+            columns,
+            (
+                run * pumps + pump,
+                np.full(time_s.size, pump),
+                running.sum(axis=0),
+                flow_m3h[pump],
+                total_m3h,
+                head_m,
+                ratio,
+                level_m,
+            ),
+            strict=True,
+        ):
+            means = np.bincount(where, weights=values[usable].astype(float), minlength=first.size) / np.maximum(
+                counts, 1
+            )
+            target.append(means[whole])
+    runs, numbers, on, flows, totals, heads, ratios, levels = (np.concatenate(column) for column in columns)
+    return SteadyPoints(
+        run=np.rint(runs).astype(np.int64),
+        pump=np.rint(numbers).astype(np.int64),
+        running=np.rint(on).astype(np.int64),
+        flow_m3h=flows,
+        total_flow_m3h=totals,
+        head_m=heads,
+        speed_ratio=ratios,
+        level_m=levels,
+    )

@@ -1,0 +1,1 @@
+"""What is said of the gap: verdict, place, shrinkage, report."""

@@ -1,0 +1,123 @@
+"""What a station does in each second: idle, ramps, steady, several pumps; and its starts and stops."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.traces import Traces
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+Regime = Literal["idle", "start_ramp", "steady", "multi_pump", "stop_ramp"]
+REGIMES: tuple[Regime, ...] = get_args(Regime)
+IDLE, START_RAMP, STEADY, MULTI_PUMP, STOP_RAMP = range(5)
+
+SETTLING_S = 20
+"""Seconds after a ramp in which damped sensors, inertia and observers settle."""
+MOVED_HZ = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """A command: the n-th pump starts, or the n-th running one stops; `second` is the last before."""
+
+    second: int
+    is_start: bool
+    number: int
+    pump: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Regimes:
+    """Regimes, cycles and events of a recording.
+
+    Attributes
+    ----------
+    of_station : (n,) array
+        Index into `REGIMES`.
+    of_pumps : (pumps, n) array
+        The same of each pump; `IDLE` also where it stands and others run.
+    cycle : (n,) array
+        Counts up with every start of a pump while all others stand.
+    events : tuple of Event
+    """
+
+    of_station: Integers
+    of_pumps: Integers
+    cycle: Integers
+    events: tuple[Event, ...]
+
+
+def regimes_of(traces: Traces, station: Station) -> Regimes:
+    """Regimes of a recording, from its frequencies alone."""
+    running = traces.frequency_hz > 0.0
+    commanded = np.array([_commanded(hz, station.control.min_frequency_hz) for hz in traces.frequency_hz])
+    ramp_s = round(station.control.ramp_s) + SETTLING_S
+    of_pumps = np.full(running.shape, IDLE, dtype=np.int64)
+    together = running.sum(axis=0) > 1
+    for i in range(traces.pumps):
+        of_pumps[i][running[i]] = STEADY
+        of_pumps[i][running[i] & together] = MULTI_PUMP
+        _mark(of_pumps[i], _rises(commanded[i]), ramp_s, START_RAMP)
+        _mark(of_pumps[i], _falls(commanded[i]), 2 * ramp_s, STOP_RAMP, ends=_rises(commanded[i]))
+    of_station = np.full(traces.seconds, IDLE, dtype=np.int64)
+    of_station[running.any(axis=0)] = STEADY
+    of_station[together] = MULTI_PUMP
+    switches = np.sort(np.concatenate([np.r_[_rises(c), _falls(c)] for c in commanded]))
+    for i in range(traces.pumps):
+        _mark(of_station, _rises(commanded[i]), ramp_s, START_RAMP, ends=switches)
+        _mark(of_station, _falls(commanded[i]), ramp_s, STOP_RAMP, ends=switches)
+    any_running = np.asarray(running.any(axis=0))
+    cycle = np.cumsum(np.r_[False, any_running[1:] & ~any_running[:-1]])
+    return Regimes(of_station=of_station, of_pumps=of_pumps, cycle=cycle, events=_events(commanded))
+
+
+def _commanded(frequency_hz: Floats, min_frequency_hz: float) -> npt.NDArray[np.bool_]:
+    """Whether a drive is commanded: it runs, and is not on its last way down."""
+    commanded = frequency_hz > 0.0
+    for end in np.flatnonzero(commanded[:-1] & ~commanded[1:]):
+        k = end
+        while k > 0 and (
+            frequency_hz[k - 1] > frequency_hz[k] + MOVED_HZ
+            or (0.0 < frequency_hz[k - 1] <= min_frequency_hz + MOVED_HZ and frequency_hz[k] <= frequency_hz[k - 1])
+        ):
+            k -= 1
+        commanded[k + 1 : end + 1] = False
+    return commanded
+
+
+def _rises(flags: npt.NDArray[np.bool_]) -> Integers:
+    return np.flatnonzero(flags[1:] & ~flags[:-1]) + 1
+
+
+def _falls(flags: npt.NDArray[np.bool_]) -> Integers:
+    return np.flatnonzero(~flags[1:] & flags[:-1]) + 1
+
+
+def _mark(regime: Integers, begins: Integers, length_s: int, code: int, ends: Integers | None = None) -> None:
+    """Set a regime for a time from each beginning on, or to the next of `ends`."""
+    for begin in begins:
+        end = begin + length_s
+        if ends is not None:
+            after = ends[np.searchsorted(ends, begin + 1) :]
+            end = min(end, int(after[0])) if after.size else end
+        regime[begin:end] = code
+
+
+def _events(commanded: npt.NDArray[np.bool_]) -> tuple[Event, ...]:
+    """Single commands; two in one second tell nothing of their levels."""
+    number = commanded.sum(axis=0)
+    change = np.diff(commanded.astype(np.int64), axis=1)
+    seconds = np.flatnonzero(np.abs(change).sum(axis=0) == 1)
+    events = []
+    for second in seconds:
+        pump = int(np.flatnonzero(change[:, second])[0])
+        is_start = bool(change[pump, second] > 0)
+        events.append(
+            Event(second=int(second), is_start=is_start, number=int(number[second]) + int(is_start), pump=pump)
+        )
+    return tuple(events)

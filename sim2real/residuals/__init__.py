@@ -1,0 +1,1 @@
+"""How far the replay is from the recording."""

@@ -1,0 +1,189 @@
+"""Residuals of the controller: the level at which it starts and stops pumps, against its thresholds."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtr
+
+from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
+from wetwell.sim2real.residuals.signals import QUANTUM_SHARE, level_noise_m
+from wetwell.sim2real.residuals.telemetry import Pattern
+from wetwell.simulator.telemetry.channels import LEVEL, channels_of
+
+Floats = npt.NDArray[np.float64]
+
+WINDOW_S = 30
+MIN_POINTS = 8
+SCAN_S = 1.0
+NEVER_S = 10**6
+"""Since the event before the first one."""
+WAITING_S = 2.0
+"""Scans that a timer may take beside its delay."""
+TOLERANCE_M = 0.002
+EVENT_FLOOR = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretches:
+    """Straight stretches of the level before each event, to be read at other times than they were recorded.
+
+    `counted` are the seconds of each, (events, `WINDOW_S`), and `is_counted` which of them count; `level_m` is (n,).
+    """
+
+    second: npt.NDArray[np.int64]
+    counted: npt.NDArray[np.int64]
+    is_counted: npt.NDArray[np.bool_]
+    level_m: Floats
+
+    def lines(self, shift_s: float = 0.0) -> tuple[Floats, Floats]:
+        """(events,) level and slope at each event for a level that was recorded `shift_s` late. [m, m/s].
+
+        Where too few values are left the line of the unshifted stretch is gone on with.
+        """
+        level_m, slope_m_s = self._fitted(0)
+        if shift_s == 0.0:
+            return level_m, slope_m_s
+        whole = int(np.floor(shift_s))
+        share = shift_s - whole
+        near = self._fitted(whole)
+        far = self._fitted(whole + 1) if share > 0.0 else near
+        shifted_m, shifted_m_s = ((1.0 - share) * a + share * b for a, b in zip(near, far, strict=True))
+        is_known = np.isfinite(shifted_m)
+        level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
+        return level_m, np.where(is_known, shifted_m_s, slope_m_s)
+
+    def _fitted(self, later_s: int) -> tuple[Floats, Floats]:
+        place = self.counted + later_s
+        values_m = self.level_m[np.clip(place, 0, self.level_m.size - 1)]
+        is_known = self.is_counted & (place >= 0) & (place < self.level_m.size) & np.isfinite(values_m)
+        count = is_known.sum(axis=1)
+        enough = np.where(count >= MIN_POINTS, count, np.nan)  # NaN is "no line"
+        time_s, values_m = (
+            np.where(is_known, self.counted - self.second[:, None], 0),
+            np.where(is_known, values_m, 0.0),
+        )
+        middle_s, middle_m = time_s.sum(axis=1) / enough, values_m.sum(axis=1) / enough
+        about_s = np.where(is_known, time_s - middle_s[:, None], 0.0)
+        slope_m_s = (about_s * values_m).sum(axis=1) / enough / ((about_s**2).sum(axis=1) / enough)
+        return middle_m - slope_m_s * middle_s, slope_m_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EventMisfit:
+    """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0.
+
+    `since_s` is the time since the event before.
+    """
+
+    bins: Bins
+    number: npt.NDArray[np.int64]
+    since_s: npt.NDArray[np.int64]
+    stretches: Stretches
+    noise_m: float
+    pattern: Pattern | None
+
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
+        """(events,) level that the controller saw, minus its threshold, over the standard deviation.
+
+        A late level shows afterwards what the controller saw; under a late frequency the event was before its record.
+        Whether the timers of a late controller run side by side or one after the other is open: an event that follows
+        another within the delay may find the level past its threshold.
+        """
+        plant = prediction.plant
+        frequency = channels_of("frequency_hz", plant.nominal_frequency_hz.size)[0]
+        level_m, slope_m_s = self.stretches.lines(
+            float(plant.sensors.delay_s[LEVEL] - plant.sensors.delay_s[frequency])
+        )
+        is_start = self.bins.signal == START_LEVEL
+        early_m = self.noise_m * _earliness(np.abs(slope_m_s) / self.noise_m)
+        level_m = level_m + np.where(is_start, 1.0, -1.0) * (0.7 * early_m - 0.5 * SCAN_S * np.abs(slope_m_s))
+        seen_m = level_m - slope_m_s * plant.control_delay_s
+        wanted_m = np.where(is_start, plant.start_levels_m[self.number], plant.stop_levels_m[self.number])
+        error_m = seen_m - wanted_m
+        if plant.control_delay_s > 0.0:
+            is_past = np.where(is_start, error_m > 0.0, error_m < 0.0)
+            error_m[is_past & (self.since_s <= plant.control_delay_s + WAITING_S)] = 0.0
+        if self.pattern is not None:
+            held_m = min(float(plant.sensors.deadband[LEVEL]), self.pattern.deadband)
+            rounded_m = QUANTUM_SHARE * min(float(plant.sensors.quantum[LEVEL]), self.pattern.quantum)
+            error_m = np.sign(error_m) * np.maximum(np.abs(error_m) - held_m - rounded_m, 0.0)
+        return np.asarray(error_m / self.bins.deviation, dtype=np.float64)
+
+
+def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pattern | None) -> EventMisfit:
+    """Of every start and stop that follows a straight stretch of the level."""
+    noise_m = level_noise_m(traces, station)
+    events: list[Event] = []
+    waited_s: list[int] = []
+    calm: list[npt.NDArray[np.bool_]] = []
+    last = -NEVER_S
+    ahead = np.arange(1 - WINDOW_S, 1)
+    for event in regimes.events:
+        window = event.second + ahead
+        is_calm = (window > last) & (regimes.of_station[window] != START_RAMP)
+        since_s = event.second - last
+        last = event.second
+        if window[0] >= 0 and 1 <= event.number <= len(station.control.start_levels_m):
+            events.append(event)
+            waited_s.append(since_s)
+            calm.append(is_calm)
+    second = np.array([event.second for event in events], dtype=np.int64)
+    counted, is_counted = second[:, None] + ahead, np.array(calm, dtype=np.bool_).reshape(-1, WINDOW_S)
+    stretches = Stretches(second=second, counted=counted, is_counted=is_counted, level_m=traces.level_m)
+    sign = np.array([1.0 if event.is_start else -1.0 for event in events])
+    kept = stretches.lines()[1] * sign > 0.0
+    second, sign = second[kept], sign[kept]
+    stretches = Stretches(second=second, counted=counted[kept], is_counted=is_counted[kept], level_m=traces.level_m)
+    slope_m_s = stretches.lines()[1]
+    early_m = noise_m * _earliness(np.abs(slope_m_s) / noise_m)
+    deviation = np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2)
+    return EventMisfit(
+        bins=Bins(
+            signal=np.where(sign > 0, START_LEVEL, STOP_LEVEL),
+            regime=regimes.of_station[second],
+            cycle=regimes.cycle[second],
+            pump=np.full(second.size, NO_PUMP),
+            second=second,
+            deviation=deviation,
+            floor=np.full(second.size, EVENT_FLOOR),
+            tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
+        ),
+        number=np.array([event.number - 1 for event in events], dtype=np.int64)[kept],
+        since_s=np.array(waited_s, dtype=np.int64)[kept],
+        stretches=stretches,
+        noise_m=noise_m,
+        pattern=pattern,
+    )
+
+
+def _earliness(slope_ratio: Floats) -> Floats:
+    """(events,) how far before its threshold a level with noise crosses it, in standard deviations of the noise."""
+    return np.asarray(np.interp(slope_ratio, *_earliness_table()), dtype=np.float64)
+
+
+@cache
+def _earliness_table() -> tuple[Floats, Floats]:
+    ratios = np.r_[0.0, np.geomspace(1e-3, 10.0, 100)]
+    return ratios, np.array([_earliness_at(float(ratio)) for ratio in ratios])
+
+
+def _earliness_at(slope_ratio: float) -> float:
+    r"""How far before its threshold a level with noise is taken to cross it, in standard deviations of the noise.
+
+    The m at which the expected number of crossings before reaches ln 2, $\sum_{k \ge 0} \Phi(-m - k s) = \ln 2$.
+    """
+    steps = np.arange(min(int(6.0 / max(slope_ratio, 1e-3)), 6000) + 1) * slope_ratio
+    low, high = -1.0, 5.0
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        if ndtr(-middle - steps).sum() > np.log(2.0):
+            low = middle
+        else:
+            high = middle
+    return max(0.5 * (low + high), 0.0)

@@ -1,0 +1,50 @@
+"""How far a prediction is from a recording, all signals together, in units of noise."""
+
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.regimes import Regimes
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.residuals.bins import Bins, joined
+from wetwell.sim2real.residuals.events import event_misfit
+from wetwell.sim2real.residuals.signals import level_misfit, pump_misfits
+from wetwell.sim2real.residuals.telemetry import telemetry_misfit
+
+Floats = npt.NDArray[np.float64]
+
+SOFT = 5.0
+
+
+class _Part(Protocol):
+    """Residuals of one kind."""
+
+    @property
+    def bins(self) -> Bins: ...
+
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats: ...
+
+
+class Misfit:
+    """Residuals of a recording; which they are and what they weigh is the same for every prediction."""
+
+    def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> None:
+        self.telemetry = telemetry_misfit(traces, station, regimes)
+        patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
+        self._parts: list[_Part] = [*pump_misfits(traces, station, regimes, plain, patterns), self.telemetry]
+        if np.isfinite(traces.level_m).any():
+            self._parts.append(level_misfit(traces, station, regimes, plain, patterns))
+            self._parts.append(event_misfit(traces, station, regimes, patterns.get("level_m")))
+        self.bins = joined([part.bins for part in self._parts])
+
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:
+        """(bins,) residuals in units of noise; with transients in ramps excused that are over within some seconds."""
+        return np.concatenate([part.residuals(prediction, excused_s) for part in self._parts])
+
+
+def soft(residuals: Floats) -> Floats:
+    r"""Residuals whose large values count less: $5 \operatorname{asinh}(z / 5)$."""
+    return np.asarray(SOFT * np.arcsinh(residuals / SOFT), dtype=np.float64)

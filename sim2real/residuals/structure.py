@@ -1,0 +1,96 @@
+"""What of the residuals repeats itself: the part that a perfect model could explain, whatever the noise is like."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.sim2real.residuals.bins import Bins
+
+Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+MIN_FITTED = 4
+SURE = 3.0
+PHASES_S = np.array([2, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 60, 90, 150, 250, 400, 700, 1200])
+NEIGHBOURS = 4
+
+
+def repeating(residuals: Floats, bins: Bins, fitted: Flags, pumps: int) -> Floats:
+    """(bins,) mean of the residuals by signal, pump, regime and time since it began; then a drift.
+
+    Both are made of the bins that are `fitted` alone; the others are predicted by their neighbours in time.
+
+    Parameters
+    ----------
+    residuals : (bins,) array
+    fitted : (bins,) array
+    pumps : int
+        Cycles over which the drift is averaged, times `NEIGHBOURS`.
+    """
+    group = _group(bins)
+    expected = _table(group * 32 + phase(bins), residuals, fitted)
+    return expected + _drift(group, bins.cycle, residuals - expected, fitted, NEIGHBOURS * pumps)
+
+
+def phase(bins: Bins) -> npt.NDArray[np.int64]:
+    """(bins,) number of the span of `PHASES_S` since the regime of a signal and pump began."""
+    return np.asarray(np.searchsorted(PHASES_S, _since(bins, _group(bins))))
+
+
+def _group(bins: Bins) -> npt.NDArray[np.int64]:
+    """(bins,) number of signal, regime and pump together."""
+    return (bins.signal * len(REGIMES) + bins.regime) * 64 + bins.pump + 1
+
+
+def explained(residuals: Floats, expected: Floats) -> Floats:
+    """(bins,) drop of the square by an expectation; sums to what it explains."""
+    return np.asarray(residuals**2 - (residuals - expected) ** 2, dtype=np.float64)
+
+
+def _since(bins: Bins, group: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Seconds since the first bin of the same group and cycle."""
+    key = group * (int(bins.cycle.max(initial=0)) + 1) + bins.cycle
+    _, inverse = np.unique(key, return_inverse=True)
+    first = np.full(inverse.max(initial=0) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(first, inverse, bins.second)
+    return bins.second - first[inverse]
+
+
+def _table(key: npt.NDArray[np.int64], values: Floats, fitted: Flags) -> Floats:
+    _, inverse = np.unique(key, return_inverse=True)
+    count = np.bincount(inverse[fitted], minlength=inverse.max(initial=0) + 1)
+    total = np.bincount(inverse[fitted], values[fitted], count.size)
+    squares = np.bincount(inverse[fitted], values[fitted] ** 2, count.size)
+    return _certain(total, squares, count)[inverse]
+
+
+def _drift(
+    group: npt.NDArray[np.int64], cycle: npt.NDArray[np.int64], values: Floats, fitted: Flags, width: int
+) -> Floats:
+    """Mean of the fitted bins of the same group in the cycles around."""
+    _, inverse = np.unique(group, return_inverse=True)
+    cycles = int(cycle.max(initial=0)) + 1
+    place = inverse * cycles + cycle
+    size = (int(inverse.max(initial=0)) + 1) * cycles
+    count = np.bincount(place[fitted], minlength=size)
+    means = np.bincount(place[fitted], values[fitted], size) / np.maximum(count, 1)
+    total, squares, weight = (
+        _near(rows.reshape(-1, cycles), width) for rows in (means, means**2, (count > 0).astype(np.float64))
+    )
+    drift: Floats = _certain(total, squares, weight).ravel()[place]
+    return drift
+
+
+def _near(rows: Floats, width: int) -> Floats:
+    """Sums over `width` columns on both sides."""
+    window = np.ones(2 * width + 1)
+    return np.array([np.convolve(row, window, mode="full")[width : width + row.size] for row in rows])
+
+
+def _certain(total: npt.NDArray[Any], squares: npt.NDArray[Any], count: npt.NDArray[Any]) -> Floats:
+    """Means that differ from 0 by `SURE` standard errors or more, else 0."""
+    means = total / np.maximum(count, 1)
+    variance = np.maximum(squares / np.maximum(count, 1) - means**2, 0.0) / np.maximum(count - 1, 1)
+    return np.asarray(np.where((count >= MIN_FITTED) & (means**2 > SURE**2 * variance), means, 0.0), dtype=np.float64)

@@ -1,0 +1,191 @@
+"""Residuals of the telemetry itself: values that are held, values that lie on a lattice."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wetwell.protocols.station.station_file import Sensors, Station
+from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
+from wetwell.simulator.telemetry.channels import Quantity, channels_of
+
+Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+MIN_MOVES, FEWEST = 30, 10
+"""Moves from which their sizes are looked at, and from which a channel is held and not stuck."""
+SMALL = 0.1
+"""Share of the moves that are small."""
+HELD_SHARE = 0.15
+"""Share of repeated values from which a channel counts as held; noise repeats nothing."""
+NEARLY_ALL = 0.9
+"""The same where moves are too few, or most too long after another, to have an edge of their sizes."""
+DEAD_ZONE = 0.35
+"""Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
+EDGE = 1.5
+"""Ratio of the sizes that one move in five and one in ten (or ten and twenty) do not reach; 2 for noise."""
+FEW = 0.005
+"""Share of moves that may be smaller than the deadband: values that were lost, or sent twice."""
+OFTEN_S = 60
+"""A value that is held for less was not sent because its time was up."""
+SEEN = (0.97, 1.03)
+"""Shares of a deadband that was seen between which it may be: in noise or slow moves."""
+IN_RAMPS = (0.1, 1.4)
+"""The same in the steps of ramps, of which the smallest may be far over it."""
+BY_TIME = (0.6, np.inf)
+"""The same over the largest move of a value whose time was up."""
+LATTICE_SHARE = 0.98
+MIN_QUANTUM_M = 0.0015
+STRENGTH = 12.0
+"""Residual of a pattern, in each cycle, that an effect leaves unexplained."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pattern:
+    """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither.
+
+    `within` are the shares of it between which it may be.
+    """
+
+    quantity: Quantity
+    deadband: float = 0.0
+    quantum: float = 0.0
+    within: tuple[float, float] = (1.0, 1.0)
+
+    def missed(self, acting: float) -> float:
+        """Share by which what acts is beyond the ends of where the pattern may be."""
+        low, high = (share * max(self.deadband, self.quantum) for share in self.within)
+        return max(1.0 - acting / low, acting / high - 1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TelemetryMisfit:
+    """One residual a cycle for each pattern that was found."""
+
+    bins: Bins
+    patterns: tuple[Pattern, ...]
+    cycles: int
+
+    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
+        """(patterns * cycles,) nothing where the plant holds or rounds the channel so, else `STRENGTH`."""
+        sensors, pumps = prediction.plant.sensors, prediction.plant.nominal_frequency_hz.size
+        left = []
+        for pattern in self.patterns:
+            channel = channels_of(pattern.quantity, pumps)[0]
+            acting = float(sensors.deadband[channel] if pattern.deadband > 0.0 else sensors.quantum[channel])
+            left.append(STRENGTH * min(pattern.missed(acting) / 0.3, 1.0))
+        return np.repeat(np.array(left), self.cycles)
+
+
+def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> TelemetryMisfit:
+    """Patterns of all channels that carry noise; a recording without noise shows none."""
+    cycle, first = np.unique(regimes.cycle, return_index=True)
+    patterns = tuple(_patterns(traces, station.sensors, regimes))
+    count = len(patterns)
+    return TelemetryMisfit(
+        bins=Bins(
+            signal=np.full(cycle.size * count, TELEMETRY),
+            regime=np.full(cycle.size * count, STEADY),
+            cycle=np.tile(cycle, count),
+            pump=np.full(cycle.size * count, NO_PUMP),
+            second=np.tile(first, count),
+            deviation=np.ones(cycle.size * count),
+            floor=np.zeros(cycle.size * count),
+            tolerance=np.zeros(cycle.size * count),
+        ),
+        patterns=patterns,
+        cycles=cycle.size,
+    )
+
+
+def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Pattern]:
+    running = traces.frequency_hz > 0.0
+    found = []
+    series: list[tuple[Quantity, list[Floats]]] = [("level_m", [traces.level_m])]
+    if traces.inflow_m3h is not None:
+        series.append(("inflow_m3h", [traces.inflow_m3h]))
+    for name, values in traces.signals.items():
+        quantity: Quantity = name  # type: ignore[assignment]
+        series.append((quantity, [np.where(running[i], values[i], np.nan) for i in range(traces.pumps)]))
+    noise = {
+        "level_m": sensors.level_noise_m,
+        "inflow_m3h": sensors.inflow_noise,
+        "flow_m3h": sensors.flow_noise,
+        "head_m": sensors.head_noise,
+        "power_kw": sensors.power_noise,
+    }
+    for quantity, parts in series:
+        is_ramp = np.isin(regimes.of_pumps, (START_RAMP, STOP_RAMP)) & (quantity in traces.signals)
+        if noise[quantity] <= 0.0:
+            continue
+        moves = np.concatenate([np.diff(part) for part in parts])
+        moves = np.abs(moves[np.isfinite(moves)])
+        jumps = moves[moves > 0.0]
+        if jumps.size < FEWEST:
+            continue
+        quantum = _lattice(np.concatenate(parts))
+        if quantity == "level_m" and quantum >= MIN_QUANTUM_M and jumps.size >= MIN_MOVES:
+            found.append(Pattern(quantity=quantity, quantum=quantum))
+            continue
+        held_share = 1.0 - jumps.size / moves.size
+        if held_share > HELD_SHARE and float(np.quantile(jumps, SMALL)) > 2.5 * quantum:
+            pattern = _held(quantity, parts, is_ramp, jumps, held_share)
+            found += [pattern] if pattern is not None else []
+    return found
+
+
+def _held(
+    quantity: Quantity, parts: list[Floats], is_ramp: Flags, jumps: Floats, held_share: float
+) -> Pattern | None:
+    """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon.
+
+    Where such are few, and nearly all values are held, it lies over the largest move outside ramps, which its time
+    being up has brought about.
+    """
+    soon, is_calm = _soon(parts, is_ramp)
+    calm = np.concatenate([np.abs(np.diff(part))[~ramp[1:]] for part, ramp in zip(parts, is_ramp, strict=False)])
+    calm = calm[calm > 0.0]
+    if held_share > NEARLY_ALL and soon.size < MIN_MOVES and calm.size >= FEWEST:
+        return Pattern(quantity=quantity, deadband=float(calm.max()), within=BY_TIME)
+    if jumps.size < MIN_MOVES or not (_has_edge(jumps) or _has_edge(soon)):
+        return None
+    if soon.size < MIN_MOVES:
+        return Pattern(quantity=quantity, deadband=float(np.quantile(jumps, SMALL)), within=IN_RAMPS)
+    within = SEEN if is_calm.sum() >= MIN_MOVES else IN_RAMPS
+    return Pattern(quantity=quantity, deadband=float(np.quantile(soon, FEW)), within=within)
+
+
+def _soon(parts: list[Floats], is_ramp: Flags) -> tuple[Floats, Flags]:
+    """Sizes of the moves that follow another soon, so were not sent as their time was up; which are in no ramp."""
+    sizes: list[Floats] = []
+    calm: list[Flags] = []
+    for part, ramp in zip(parts, is_ramp, strict=False):
+        moves = np.diff(part)
+        at_s = np.flatnonzero(np.isfinite(moves) & (moves != 0.0))
+        at_s = at_s[1:][np.diff(at_s) < OFTEN_S]
+        sizes.append(np.abs(moves[at_s]))
+        calm.append(~ramp[at_s])
+    return np.concatenate(sizes), np.concatenate(calm)
+
+
+def _has_edge(jumps: Floats) -> bool:
+    """Whether moves under a size are missing, as under a deadband."""
+    if jumps.size < MIN_MOVES:
+        return False
+    few, smallest, more, middle = (float(q) for q in np.quantile(jumps, [0.05, SMALL, 0.2, 0.5]))
+    return smallest > DEAD_ZONE * middle or smallest < EDGE * few or more < EDGE * smallest
+
+
+def _lattice(values: Floats) -> float:
+    """Step of the lattice that values lie on, 0 without one."""
+    levels = np.unique(np.round(values[np.isfinite(values)], 9))
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-7]
+    if steps.size == 0 or levels.size > 0.2 * np.isfinite(values).sum():
+        return 0.0
+    step = float(np.median(steps[steps < 1.5 * steps.min()]))
+    off = np.abs(steps / step - np.round(steps / step))
+    return step if float(np.mean(off < 0.02)) > LATTICE_SHARE else 0.0

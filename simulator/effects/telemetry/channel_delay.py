@@ -1,0 +1,41 @@
+"""A channel that is late."""
+
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits, of_channels
+from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.telemetry.channels import Quantity
+
+
+class ChannelDelay(Effect):
+    r"""The recording gets one channel late; the controller, which is wired, does not.
+
+    $$y(t) = x(t - d)$$
+
+    Parameters
+    ----------
+    channel : str
+        Quantity that is late, of every pump if it is one of the pumps.
+    delay_s : float
+        d; 0 is no effect. [s]
+
+    References
+    ----------
+    .. [1] After IEEE 1815, Electric Power Systems Communications, DNP3: polled data without time of their own.
+    """
+
+    component: ClassVar[Component] = "telemetry"
+    has_one_form: ClassVar[bool] = True
+    neutral: ClassVar[dict[str, float]] = {"delay_s": 0.0}
+
+    name: Literal["channel_delay"] = "channel_delay"
+    channel: Quantity
+    delay_s: Annotated[float, limits(0.0, 100.0, "s")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Delay the channel."""
+        return of_channels(parameters, "delay_s", self.channel, self.delay_s)
+
+    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
+        """Whether the delay is a second or more."""
+        return self.delay_s >= RESOLVED_S

@@ -1,0 +1,36 @@
+"""Flow meters that read too much or too little."""
+
+from typing import Annotated, ClassVar, Literal
+
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.telemetry.channels import channels_of
+
+
+class FlowMeterGain(Effect):
+    r"""Every pump's flow meter reads a constant factor off; the inflow meter does not.
+
+    $$y = g\, Q$$
+
+    Parameters
+    ----------
+    factor : float
+        g; 1 is no effect. [1]
+
+    References
+    ----------
+    .. [1] After R. C. Baker, Flow Measurement Handbook, Cambridge University Press: calibration.
+    """
+
+    component: ClassVar[Component] = "flow_meter"
+    has_one_form: ClassVar[bool] = True
+    neutral: ClassVar[dict[str, float]] = {"factor": 1.0}
+
+    name: Literal["flow_meter_gain"] = "flow_meter_gain"
+    factor: Annotated[float, limits(0.3, 3.0, "1")]
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Scale the readings."""
+        gain = parameters.sensors.gain.copy()
+        gain[channels_of("flow_m3h", parameters.nominal_frequency_hz.size)] *= self.factor
+        return parameters.with_sensors(parameters.sensors._replace(gain=gain))

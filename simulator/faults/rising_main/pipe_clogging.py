@@ -1,0 +1,40 @@
+"""Clogging of the rising main."""
+
+from typing import Any, ClassVar, Literal
+
+from wetwell.protocols.station.station_file import NonNegative
+from wetwell.simulator.faults.profile import Floats, SystemFault
+from wetwell.simulator.plant import Forcing
+
+
+class PipeClogging(SystemFault):
+    r"""Deposits and trapped air: more friction, and more static head, for all pumps.
+
+    $$k(t) = k_0 (1 + \Delta k\, r(t)), \qquad H_s(t) = H_{s,0} + \Delta H_s\, r(t)$$
+
+    The operating point climbs along the pump curve.
+
+    Parameters
+    ----------
+    friction_rise : float
+        Δk, relative rise of the friction coefficient at full strength. [1]
+    static_rise_m : float
+        ΔH_s, rise of the static head at full strength. [m]
+
+    References
+    ----------
+    .. [1] Eshkofti et al., Modeling and physics-enhanced fault detection in wastewater pump stations:
+       pipe clogging scenario (Δk = 1, ΔH_s = 0.5 m).
+    """
+
+    neutral: ClassVar[dict[str, Any]] = {"friction_rise": 0.0, "static_rise_m": 0.0}
+
+    kind: Literal["pipe_clogging"] = "pipe_clogging"
+    friction_rise: NonNegative = 1.0
+    static_rise_m: NonNegative = 0.0
+
+    def apply(self, forcing: Forcing, time_s: Floats) -> None:
+        """Raise friction and static head over a block that begins at `time_s[0]`."""
+        share = self.share(time_s)
+        forcing.friction_factor[:] *= 1.0 + self.friction_rise * share
+        forcing.static_rise_m[:] += self.static_rise_m * share

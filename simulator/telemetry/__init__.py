@@ -1,0 +1,1 @@
+"""From true values to telemetry: channels, sensors, what is sent when."""

@@ -1,0 +1,567 @@
+"""The web application over a bus, by an HTTP client: files, states, questions to others, and who is refused."""
+
+import asyncio
+import contextlib
+import json
+
+import httpx
+import pytest
+
+from wetwell.protocols.bus.keys import alarm_act_key, history_key, sample_block_key, sample_key
+from wetwell.protocols.bus.memory_link import MemoryBus
+from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
+from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.recordings.recording import read_recording
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.dashboard.app import Desk, dashboard_app
+from wetwell.services.dashboard.daemon import serve_dashboard
+from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.feed import Feed
+from wetwell.services.dashboard.site_view import ROWS, SiteView
+from wetwell.services.dashboard.web import open_socket, web_server
+from wetwell.services.runtime.settings import DashboardSettings, Settings
+from wetwell.services.security.tokens import new_token
+
+PAGE = "http://127.0.0.1:8080"
+
+
+def client_of(desk):
+    return httpx.AsyncClient(transport=httpx.ASGITransport(dashboard_app(desk)), base_url=PAGE)
+
+
+def desk_with(bus=None, reports=None):
+    return Desk(SiteView(10.0), Hub(), reports, bus)
+
+
+def get(path, desk=None, **headers):
+    async def run():
+        async with client_of(desk or desk_with()) as client:
+            return await client.get(path, headers=headers)
+
+    return asyncio.run(run())
+
+
+def a_sample(second, station="alpha"):
+    pump = PumpReading(frequency_hz=50.0, flow_m3h=200.5, head_m=26.0, power_kw=None, running=True)
+    return Sample(station=station, seq=second, time=second * NS_PER_S, level_m=1.25, pumps=(pump,))
+
+
+@pytest.mark.parametrize("path", ["/", "/station/alpha", "/alarms", "/reports", "/health"])
+def test_every_page_is_the_shell_without_inline_script_and_under_a_strict_policy(path) -> None:
+    answer = get(path)
+    assert answer.status_code == 200
+    policy = answer.headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "script-src 'self'" in policy
+    assert "unsafe" not in policy
+    assert "<script>" not in answer.text
+    assert "style=" not in answer.text
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_all_files_that_the_shell_names_are_there_and_kept_for_ever() -> None:
+    async def run():
+        async with client_of(desk_with()) as client:
+            shell = (await client.get("/")).text
+            names = {part.split('"')[0] for part in shell.split('="') if part.startswith("/static/")}
+            assert len(names) > 20
+            for name in names:
+                answer = await client.get(name)
+                assert answer.status_code == 200, name
+                assert "immutable" in answer.headers["cache-control"]
+                assert answer.headers["content-encoding"] == "gzip"
+                again = await client.get(name, headers={"if-none-match": answer.headers["etag"]})
+                assert (again.status_code, again.content) == (304, b"")
+            plain = await client.get(name, headers={"accept-encoding": "identity"})
+            assert "content-encoding" not in plain.headers
+            old = await client.get("/static/0123456789ab/theme.js")
+            assert old.status_code == 404
+
+    asyncio.run(run())
+
+
+def test_the_favicon_is_served() -> None:
+    assert get("/favicon.ico").headers["content-type"] == "image/svg+xml"
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", ""])
+def test_a_name_that_was_made_to_point_here_is_refused(host) -> None:
+    answer = get("/api/stations", host=host)
+    assert answer.status_code == 421
+    assert "content-security-policy" in answer.headers
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "[::1]:8080", "localhost"])
+def test_names_of_this_machine_are_heard(host) -> None:
+    assert get("/api/stations", host=host).status_code == 200
+
+
+def acting(desk, body, **headers):
+    async def run():
+        async with client_of(desk) as client:
+            kind = {"content-type": "application/json"}
+            return await client.post("/api/stations/alpha/alarm-act", content=body, headers=kind | headers)
+
+    return asyncio.run(run())
+
+
+ACT = AlarmAct(id="1", station="alpha", alarm="pump1.pump_fault", act="acknowledge", by="Ada")
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"content-type": "text/plain"}, 415),
+        ({"content-type": "application/x-www-form-urlencoded"}, 415),
+        ({"origin": "http://evil.example"}, 403),
+        ({"origin": "http://127.0.0.1:9999"}, 403),
+        ({"origin": "null"}, 403),
+    ],
+)
+def test_an_act_that_a_foreign_page_sends_is_refused(headers, status) -> None:
+    assert acting(desk_with(MemoryBus()), ACT.encode(), **headers).status_code == status
+
+
+@pytest.mark.parametrize(
+    ("body", "rule"),
+    [
+        (b"", "json"),
+        (b"{}", "id"),
+        (ACT.model_copy(update={"by": ""}).encode(), "by"),
+        (ACT.model_copy(update={"station": "beta"}).encode(), "station: got 'beta'"),
+        (ACT.model_copy(update={"act": "shelve"}).encode(), "minutes"),
+    ],
+)
+def test_what_is_no_act_is_told(body, rule) -> None:
+    answer = acting(desk_with(MemoryBus()), body)
+    assert answer.status_code == 400
+    assert rule.lower() in answer.json()["error"].lower()
+
+
+def test_without_a_bus_or_an_answer_that_is_told(monkeypatch) -> None:
+    assert acting(desk_with(), ACT.encode()).status_code == 503
+    monkeypatch.setattr("wetwell.services.dashboard.client.ANSWER_S", 0.01)
+    silent = acting(desk_with(MemoryBus()), ACT.encode())
+    assert (silent.status_code, silent.json()["error"]) == (504, "the alarm service does not answer")
+    span = "kind=samples&start=2025-01-01&end=2025-01-02"
+    past = get(f"/api/stations/alpha/history?{span}", desk_with(MemoryBus()))
+    assert past.json()["error"] == "the historian does not answer"
+
+
+@contextlib.asynccontextmanager
+async def answering(bus, key, answer):
+    """A service that answers each question with `answer(payload)`."""
+    questions = bus.answer(key)
+
+    async def run():
+        while True:
+            for request in await questions.receive():
+                request.reply(answer(request.payload))
+
+    task = asyncio.create_task(run())
+    try:
+        yield
+    finally:
+        task.cancel()
+
+
+def test_an_act_goes_to_the_alarm_service_and_its_answer_comes_back() -> None:
+    alarm = Alarm(
+        id=ACT.alarm,
+        time=0,
+        station="alpha",
+        priority="high",
+        state="acknowledged",
+        is_active=True,
+        text="x",
+        by="Ada",
+    )
+
+    def answer(payload):
+        act = AlarmAct.decode(payload)
+        assert act == ACT
+        return AlarmAnswer(id=act.id, is_done=True, alarm=alarm).encode()
+
+    async def run():
+        bus = MemoryBus()
+        async with answering(bus, alarm_act_key("alpha"), answer), client_of(desk_with(bus)) as client:
+            kind = {"content-type": "application/json", "origin": PAGE}
+            return await client.post("/api/stations/alpha/alarm-act", content=ACT.encode(), headers=kind)
+
+    told = asyncio.run(run()).json()
+    assert told["is_done"]
+    assert told["alarm"]["by"] == "Ada"
+
+
+@pytest.mark.parametrize(
+    "query", ["", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
+)
+def test_what_is_no_question_to_the_historian_is_told(query) -> None:
+    answer = get(f"/api/stations/alpha/history?{query}", desk_with(MemoryBus()))
+    assert answer.status_code == 400
+    assert answer.json()["error"]
+
+
+@pytest.mark.parametrize("form", ["messages", "columns"])
+def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkeypatch, form) -> None:
+    monkeypatch.setattr("wetwell.services.dashboard.client.ROWS_A_QUESTION", 100)
+    rows = 250
+    every = [json.loads(a_sample(second).encode()) for second in range(rows)]
+
+    def answer(payload):
+        query = HistoryQuery.decode(payload)
+        assert query.raw
+        found = every[-(-query.start // NS_PER_S) : query.end // NS_PER_S]
+        page, more = found[: query.points], len(found) > query.points
+        if form == "messages":
+            return History(station="alpha", kind="samples", messages=tuple(page), more=more).encode()
+        pumps = [message["pumps"][0] for message in page]
+        columns = {"seq": [message["seq"] for message in page], "level_m": [message["level_m"] for message in page]}
+        columns |= {
+            f"pump1_{name}": [pump[name] for pump in pumps] for name in ("flow_m3h", "frequency_hz", "running")
+        }
+        times = tuple(message["time"] for message in page)
+        return History(station="alpha", kind="samples", time=times, columns=columns, more=more).encode()
+
+    async def run():
+        bus = MemoryBus()
+        async with answering(bus, history_key("*"), answer), client_of(desk_with(bus)) as client:
+            span = {"start": "1970-01-01T00:00:00Z", "end": "1970-01-02T00:00:00Z"}
+            whole = await client.get("/api/stations/alpha/recording.csv", params=span)
+            late = {"start": "1980-01-01T00:00:00Z", "end": "1980-01-02T00:00:00Z"}
+            return whole, await client.get("/api/stations/alpha/recording.csv", params=late)
+
+    whole, nothing = asyncio.run(run())
+    assert nothing.status_code == 404
+    assert 'filename="alpha.csv"' in whole.headers["content-disposition"]
+    path = tmp_path / "alpha.csv"
+    path.write_bytes(whole.content)
+    recording = read_recording(path)
+    assert len(recording.time_ns) == rows
+    assert recording.time_ns.tolist() == [second * NS_PER_S for second in range(rows)]
+    assert recording.column("pump1_flow_m3h")[-1] == 200.5
+    assert recording.column("pump1_running")[-1] == 1.0
+    assert recording.column("level_m").tolist() == [1.25] * rows
+    assert not recording.ignored
+
+
+def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_path) -> None:
+    folder = tmp_path / "reports"
+    (folder / "gap").mkdir(parents=True)
+    (folder / "gap" / "report.html").write_text("<p>gap</p>")
+    (tmp_path / "secret.html").write_text("secret")
+    (folder / "link.html").symlink_to(tmp_path / "secret.html")
+    desk = desk_with(reports=folder)
+    assert [report["name"] for report in get("/api/reports", desk).json()["reports"]] == ["gap/report.html"]
+    page = get("/reports/gap/report.html", desk)
+    assert page.text == "<p>gap</p>"
+    assert "script-src" not in page.headers["content-security-policy"]
+    assert "sandbox" in page.headers["content-security-policy"]
+    for name in ("../secret.html", "%2e%2e/secret.html", "link.html", "gap", "none.html"):
+        assert get(f"/reports/{name}", desk).status_code == 404, name
+    assert get("/api/reports").json()["reason"] == "the setting dashboard.reports names no folder of HTML reports"
+
+
+def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_server() -> None:
+    async def run():
+        bus = MemoryBus()
+        desk = desk_with(bus)
+        listener = open_socket("127.0.0.1", 0)
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        events = []
+        async with (
+            httpx.AsyncClient(base_url=address, timeout=10) as client,
+            web_server(dashboard_app(desk), listener, desk.hub),
+        ):
+            feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+            publisher = bus.publisher(sample_key("alpha"))
+            async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
+                assert stream.headers["content-type"].startswith("text/event-stream")
+                lines = stream.aiter_lines()
+                assert [await anext(lines) for _ in range(2)] == ["retry: 1000", "event: resync"]
+                publisher.put(a_sample(1).encode())
+                async for line in lines:
+                    if line.startswith('data: {"id"'):
+                        events.append(json.loads(line.removeprefix("data: ")))
+                        desk.hub.close()
+            state = (await client.get("/api/stations/alpha")).json()
+            feeding.cancel()
+        return events, state
+
+    events, state = asyncio.run(run())
+    assert [row[0] for event in events for row in event["rows"]] == [1000]
+    assert state["rows"] == events[0]["rows"]
+
+
+class SlowBus(MemoryBus):
+    """Answers only when two questions are on the way."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.both = asyncio.Barrier(2)
+
+    async def ask(self, key, payload=b"", *, timeout_s=5.0):
+        await self.both.wait()
+        return await super().ask(key, payload, timeout_s=timeout_s)
+
+
+def test_stations_that_have_spoken_before_are_there_at_once_single_and_gathered() -> None:
+    async def run():
+        bus = SlowBus()
+        bus.publisher(sample_key("alpha")).put(a_sample(7).encode())
+        gathered = SampleBlock.of([a_sample(second, "beta") for second in range(200)]).encode()
+        beta = bus.publisher(sample_block_key("beta"))
+        beta.put(gathered)
+        desk = desk_with(bus)
+        feed = Feed(bus, desk.view, desk.hub)
+        beta.put(gathered)  # while the feed begins: it comes as an answer, too
+        feeding = asyncio.create_task(feed.run())
+        async with asyncio.timeout(5.0):
+            while desk.view.frame_id < 2:  # noqa: ASYNC110 - nothing else tells it
+                await asyncio.sleep(0.01)
+        feeding.cancel()
+        return {name: [row[0] for row in rows_of(desk, name)] for name in ("alpha", "beta")}
+
+    assert asyncio.run(run()) == {"alpha": [7000], "beta": [1000 * second for second in range(200)]}
+
+
+def past_of(payload):
+    """A historian that has kept a sample each second since 1970."""
+    query = HistoryQuery.decode(payload)
+    seconds = range(max(0, -(-query.start // NS_PER_S)), -(-query.end // NS_PER_S))
+    assert query.kind == "samples"
+    assert len(seconds) <= query.points
+    columns = {"level_m": (2.5,) * len(seconds), "pump1_frequency_hz": (50.0,) * len(seconds)}
+    times = tuple(second * NS_PER_S for second in seconds)
+    return History(station="alpha", kind="samples", time=times, columns=columns).encode()
+
+
+@contextlib.asynccontextmanager
+async def looked_at(bus, monkeypatch):
+    """A desk that hears station alpha since second 2000 and beta, with a page that is open on alpha."""
+    monkeypatch.setattr("wetwell.services.dashboard.backfill.SETTLED_S", 0.0)
+    desk = desk_with(bus)
+    publishers = {name: bus.publisher(sample_key(name)) for name in ("alpha", "beta")}
+    events = desk.hub.listen("alpha")
+    feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+    assert b"resync" in await anext(events)
+    for name, publisher in publishers.items():
+        publisher.put(a_sample(2000, name).encode())
+    try:
+        yield desk, publishers["alpha"], events
+    finally:
+        feeding.cancel()
+
+
+def rows_of(desk, station="alpha"):
+    return json.loads(desk.view.station_state(station))["rows"]
+
+
+def test_charts_of_a_station_that_is_looked_at_begin_with_what_the_historian_has(monkeypatch) -> None:
+    async def run():
+        bus = MemoryBus()
+        questions = []
+
+        def answer(payload):
+            questions.append(payload)
+            return past_of(payload)
+
+        async with answering(bus, history_key("*"), answer), looked_at(bus, monkeypatch) as (desk, alpha, events):
+            async for event in events:
+                if b"resync" in event:  # open pages are told to ask for the whole state
+                    break
+            alpha.put(a_sample(2001).encode())
+            await until(lambda: rows_of(desk)[-1][0] == 2_001_000)
+            return rows_of(desk), rows_of(desk, "beta"), questions
+
+    rows, unseen, questions = asyncio.run(run())
+    assert len(rows) == ROWS[0][1]
+    assert [row[0] for row in rows] == [second * 1000 for second in range(2002 - len(rows), 2002)]
+    assert rows[-3][:4] == [1_999_000, 2.5, None, 50]
+    assert len(unseen) == 1, "nobody looks at beta"
+    assert len(questions) == 1
+
+
+@pytest.mark.parametrize(
+    "answer", [None, b"{}", History(station="alpha", kind="samples", error="disk full").encode()]
+)
+def test_charts_begin_with_what_comes_where_no_historian_tells_more_and_ask_again(monkeypatch, answer) -> None:
+    monkeypatch.setattr("wetwell.services.dashboard.backfill.AGAIN_S", 0.3)
+
+    async def run():
+        bus = MemoryBus()
+        asked = []
+
+        def refuse(payload):
+            asked.append(payload)
+            return answer
+
+        async with contextlib.AsyncExitStack() as stack:
+            if answer is not None:
+                await stack.enter_async_context(answering(bus, history_key("*"), refuse))
+            desk, alpha, _ = await stack.enter_async_context(looked_at(bus, monkeypatch))
+            await until(lambda: len(rows_of(desk)) == 1 and (answer is None or asked))
+            alpha.put(a_sample(2001).encode())
+            await until(lambda: len(rows_of(desk)) == 2)
+            async with answering(bus, history_key("*"), past_of) if answer is None else contextlib.nullcontext():
+                await until(lambda: len(asked) == 2 or len(rows_of(desk)) > 2)
+            return rows_of(desk)
+
+    rows = asyncio.run(run())
+    assert len(rows) == (ROWS[0][1] if answer is None else 2)
+
+
+def test_a_station_in_a_time_that_nobody_keeps_harms_nothing(monkeypatch) -> None:
+    async def run():
+        bus = MemoryBus()
+        async with looked_at(bus, monkeypatch) as (desk, alpha, _):
+            early = a_sample(0, "gamma").model_copy(update={"time": -MAX_STAMP_NS})
+            bus.publisher(sample_key("gamma")).put(early.encode())
+            gamma = desk.hub.listen("gamma")
+            await anext(gamma)
+            assert b'"rows"' in await anext(gamma)
+            alpha.put(a_sample(2001).encode())
+            await until(lambda: len(rows_of(desk)) == 2)  # the feed goes on
+            return rows_of(desk, "gamma")
+
+    assert len(asyncio.run(run())) == 1
+
+
+async def until(is_so):
+    """Wait for what the server does in this very loop."""
+    async with asyncio.timeout(30):
+        while not is_so():  # noqa: ASYNC110 - it is the server's doing, not a wait for time
+            await asyncio.sleep(0)
+
+
+def test_200_open_pages_all_get_each_frame() -> None:
+    pages, frames = 200, 4
+
+    async def look(client, got):
+        async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
+            async for line in stream.aiter_lines():
+                if line.startswith('data: {"id"'):
+                    got.append(json.loads(line.removeprefix("data: "))["id"])
+                    if len(got) == frames:
+                        return
+
+    async def run():
+        desk = desk_with(MemoryBus())
+        listener = open_socket("127.0.0.1", 0)
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        got = [[] for _ in range(pages)]
+        limits = httpx.Limits(max_connections=None)
+        loop = asyncio.get_running_loop()
+        async with (
+            httpx.AsyncClient(base_url=address, timeout=30, limits=limits) as client,
+            web_server(dashboard_app(desk), listener, desk.hub),
+            asyncio.TaskGroup() as group,
+        ):
+            for numbers in got:
+                group.create_task(look(client, numbers))
+            await until(lambda: desk.hub.clients == pages)
+            for number in range(1, frames + 1):
+                desk.view.take_sample(a_sample(number).encode())
+                desk.hub.send("alpha", desk.view.advance(loop.time())["alpha"])
+        return got
+
+    assert asyncio.run(run()) == [[1, 2, 3, 4]] * pages
+
+
+@pytest.fixture(scope="module")
+def tokens(tmp_path_factory):
+    """File of tokens, and the tokens of an operator and a viewer."""
+    file = tmp_path_factory.mktemp("tokens") / "tokens.toml"
+    return file, new_token(file, "ada", "operator"), new_token(file, "eve", "viewer")
+
+
+@contextlib.asynccontextmanager
+async def guarded(file, bus=None):
+    app = dashboard_app(desk_with(bus), file, is_local=False)
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="https://site.example") as client:
+        yield client
+
+
+def test_with_tokens_data_needs_one_and_the_shell_does_not(tokens) -> None:
+    file, _, viewer = tokens
+
+    async def run():
+        async with guarded(file) as client:
+            for path in ("/", "/favicon.ico", "/api/who"):
+                assert (await client.get(path)).status_code == 200, path
+            for path in (
+                "/api/stations",
+                "/api/stations/a",
+                "/api/alarms",
+                "/api/health",
+                "/events",
+                "/reports/x.html",
+            ):
+                for headers in ({}, {"authorization": "Bearer wrong"}, {"cookie": "wetwell_token=wrong"}):
+                    assert (await client.get(path, headers=headers)).status_code == 401, path
+            bearer = {"authorization": f"Bearer {viewer}"}
+            assert (await client.get("/api/stations", headers=bearer)).status_code == 200
+
+    asyncio.run(run())
+
+
+def test_a_login_sets_a_cookie_that_scripts_and_other_sites_do_not_get(tokens) -> None:
+    file, operator, _ = tokens
+
+    async def run():
+        async with guarded(file) as client:
+            assert (await client.get("/api/who")).json() == {"asks": True, "name": None, "role": None}
+            wrong = await client.post("/api/login", json={"token": "wrong"})
+            assert wrong.json()["name"] is None
+            assert (await client.post("/api/login", json={})).status_code == 400
+            right = await client.post("/api/login", json={"token": operator})
+            assert right.json() == {"asks": True, "name": "ada", "role": "operator"}
+            cookie = right.headers["set-cookie"].lower()
+            for word in ("httponly", "samesite=strict", "secure", "path=/"):
+                assert word in cookie
+            assert (await client.get("/api/stations")).status_code == 200  # the client keeps the cookie
+
+    asyncio.run(run())
+
+
+def test_only_operators_act_and_always_in_their_own_name(tokens) -> None:
+    file, operator, viewer = tokens
+    acts = []
+
+    def answer(payload):
+        acts.append(AlarmAct.decode(payload))
+        return AlarmAnswer(id=acts[-1].id, is_done=True).encode()
+
+    async def run():
+        bus = MemoryBus()
+        statuses = []
+        async with answering(bus, alarm_act_key("alpha"), answer), guarded(file, bus) as client:
+            for token in ("", viewer, operator):
+                headers = {"content-type": "application/json", "authorization": f"Bearer {token}"}
+                told = await client.post("/api/stations/alpha/alarm-act", content=ACT.encode(), headers=headers)
+                statuses.append(told.status_code)
+        return statuses
+
+    assert asyncio.run(run()) == [401, 403, 200]
+    assert [act.by for act in acts] == ["ada"]
+
+
+def test_a_file_of_tokens_that_cannot_be_read_lets_nobody_in(tokens, tmp_path) -> None:
+    _, operator, _ = tokens
+    broken = tmp_path / "tokens.toml"
+    broken.write_text("token = 1")
+
+    async def run():
+        async with guarded(broken) as client:
+            return await client.get("/api/stations", headers={"authorization": f"Bearer {operator}"})
+
+    assert asyncio.run(run()).status_code == 503
+
+
+def test_a_page_for_others_is_refused_without_tokens() -> None:
+    settings = Settings(dashboard=DashboardSettings(host="0.0.0.0", port=0))
+    with pytest.raises(ConfigError, match="refuses to listen"):
+        asyncio.run(serve_dashboard(settings))

@@ -1,0 +1,136 @@
+"""A detector that is killed at any moment: its verdicts are those of one that was not."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.detector import Detector
+from wetwell.protocols.bus.interface import Request, Subscription
+from wetwell.protocols.bus.keys import history_key, sample_block_key, sample_key, verdict_key
+from wetwell.protocols.bus.memory_link import MemoryBus
+from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.intake import Intake
+from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.stations import find_scenario
+from wetwell.simulator.simulation import Simulation
+
+HOURS = 9
+KEPT = 600
+
+
+@pytest.fixture(scope="module")
+def samples(alpha) -> list[Sample]:
+    return list(Simulation(alpha, find_scenario("demo"), 5).advance(HOURS * 3600).samples("alpha"))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(alpha, samples) -> list[Verdict]:
+    return judged(alpha, samples)
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch):
+    monkeypatch.setattr("wetwell.services.detector.intake.KEPT_S", 0.0)  # a bus in memory brings it at once
+
+
+def judged(alpha, samples: list[Sample]) -> list[Verdict]:
+    detector = Detector("alpha", nominal_of(alpha))
+    return [verdict for sample in samples for verdict in detector.update(sample)]
+
+
+async def answer(requests: Subscription[Request], historian: Historian) -> None:
+    """Let a historian answer."""
+    while True:
+        for request in await requests.receive():
+            historian.commit(0)
+            request.reply(historian.answer("alpha", request.payload))
+
+
+def source(bus: MemoryBus, historian: Historian, samples: list[Sample], gather: int) -> Callable[[int], None]:
+    """Sends a sample by its number to both, or, with `gather`, all since the last message once in a while."""
+    key = sample_key if gather == 1 else sample_block_key
+    publisher = bus.publisher(key("alpha"), history=KEPT // gather)
+
+    def send(number: int) -> None:
+        if (number + 1) % gather and number + 1 < len(samples):
+            return
+        gathered = samples[number // gather * gather : number + 1]
+        payload = gathered[0].encode() if gather == 1 else SampleBlock.of(gathered).encode()
+        historian.take("samples" if gather == 1 else "blocks", payload)
+        publisher.put(payload)
+
+    return send
+
+
+async def verdicts_of_killed(
+    alpha, samples: list[Sample], folder: Path, cuts: list[int], away: int, gather: int = 1
+) -> list[Verdict]:
+    """Verdicts in order of their first arrival; the judge dies at each cut and comes back `away` samples later."""
+    got: dict[bytes, Verdict] = {}
+    with MemoryBus() as bus:
+        verdicts = bus.subscribe(verdict_key("alpha"))
+        store = FolderStore(folder / "history", keep_live_days=1)
+        historian = Historian(store)
+        answering = asyncio.create_task(answer(bus.answer(history_key("*")), historian))
+        send = source(bus, historian, samples, gather)
+        position = 0
+        for cut in [*cuts, len(samples)]:
+            judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
+            running = asyncio.create_task(Intake(bus, [judge]).run())
+            checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
+            for number in range(position, cut):
+                send(number)
+                if number % 200 == 0 or number + 1 == checkpoint_at:
+                    await asyncio.sleep(0.0)
+                    await asyncio.sleep(0.0)
+                if number + 1 == checkpoint_at:
+                    judge.keep()
+            while (  # noqa: ASYNC110 - the last one may end its work, the others are killed anywhere
+                cut == len(samples) and judge.detector.seen_until_ns < samples[-1].time
+            ):
+                await asyncio.sleep(0.0)
+            for _ in range(5):
+                await asyncio.sleep(0.0)
+            running.cancel()
+            position = min(cut + away, len(samples))
+            for number in range(cut, position):
+                send(number)
+        answering.cancel()
+        store.close()
+        for payload in await verdicts.receive():
+            got.setdefault(payload, Verdict.decode(payload))
+    return list(got.values())
+
+
+@pytest.mark.parametrize(("seed", "away", "gather"), [(2, 300, 1), (3, 3_000, 1), (4, 300, 10), (5, 3_000, 10)])
+def test_verdicts_after_kills_are_those_without(alpha, samples, undisturbed, tmp_path, seed, away, gather):
+    quarter = len(samples) // 4
+    cuts = [
+        int(cut) + quarter * k for k, cut in enumerate(np.random.default_rng(seed).integers(1_000, quarter - away, 4))
+    ]
+    told = asyncio.run(verdicts_of_killed(alpha, samples, tmp_path, cuts, away, gather))
+    assert {verdict.state for verdict in undisturbed} >= {"learning", "normal", "pump_fault"}
+    assert sorted(told, key=key) == sorted(undisturbed, key=key)
+
+
+def test_nor_does_a_kill_after_the_clock_of_the_station_was_set_back_change_them(alpha, samples, tmp_path):
+    set_at, cut = 8 * 3_600, 8 * 3_600 + 1_300
+    hour_ns = 3_600 * NS_PER_S
+    stepped = samples[:set_at] + [
+        sample.model_copy(update={"time": sample.time - hour_ns}) for sample in samples[set_at:]
+    ]
+    told = asyncio.run(verdicts_of_killed(alpha, stepped, tmp_path, [cut], 50))
+    assert sorted(told, key=key) == sorted(judged(alpha, stepped), key=key)
+
+
+def key(verdict: Verdict) -> tuple[int, int, str]:
+    return verdict.time, verdict.pump, verdict.state

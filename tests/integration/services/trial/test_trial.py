@@ -1,0 +1,230 @@
+"""A small trial end to end, with diagnosers whose scores are known before."""
+
+import hashlib
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
+from wetwell.protocols.recordings.recording import read_recording
+from wetwell.protocols.station.station_file import load_station
+from wetwell.services.cli import main
+from wetwell.services.trial.diagnosis import RECALIBRATION
+from wetwell.services.trial.plan import TrialPlan
+from wetwell.services.trial.run import run_trial
+from wetwell.services.trial.sealed_case import publish
+from wetwell.services.trial.swmm_plant import run_swmm
+from wetwell.sim2real.trial.cases import KINDS, trial_case
+from wetwell.sim2real.truth.case import Deviation, TruthCase
+
+FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
+COUNT = 10
+
+
+def run_fake(mode, folder, monkeypatch, **changes):
+    monkeypatch.setenv("FAKE_MODE", mode)
+    monkeypatch.setenv("FAKE_FOLDER", str(folder))
+    plan = TrialPlan(**{"seed": 3, "count": COUNT, "seconds": 3600, "command": FAKE} | changes)
+    return plan, run_trial(plan, folder, workers=1)
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    """Folder of published cases."""
+    folder = tmp_path_factory.mktemp("trial")
+    plan = TrialPlan(seed=3, count=COUNT, seconds=3600)
+    for number in range(COUNT):
+        publish(plan.case(number), folder)
+    return folder
+
+
+@pytest.fixture
+def folder(cases, tmp_path):
+    """A copy of them for one test."""
+    shutil.copytree(cases, tmp_path / "trial")
+    return tmp_path / "trial"
+
+
+def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
+    _, result = run_fake("perfect", folder, monkeypatch)
+    for name in ("verdict_right", "top_1", "top_2", "component_right", "interval_coverage"):
+        assert result["all"][name]["value"] == 1.0, name
+    assert result["all"]["false_attribution"]["value"] == 0.0
+    assert result["all"]["shrinkage"] == {"median": 1.0, "mean": 1.0}
+    assert result["all"]["parameter_error"]["median"] == 0.0
+    assert result["all"]["failed"] == 0
+    assert {kind: scores["cases"] for kind, scores in result["kinds_scored"].items()} == dict.fromkeys(KINDS, 2)
+    assert result["controls"]["permuted_labels"]["verdict_right"] < 0.6
+    page = (folder / "trial.html").read_text()
+    assert "<script" not in page
+    assert "Truth against answer" in page
+    assert len(json.loads((folder / "trial.json").read_text())["cases"]) == COUNT
+
+
+def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_path):
+    plan = TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
+    result = run_trial(plan, tmp_path, workers=1)
+    single, none = (plan.case(number).name for number in range(2))
+    reports = {name: json.loads((tmp_path / "reports" / name / "report.json").read_text()) for name in (single, none)}
+    assert [reports[name]["verdict"] for name in (single, none)] == ["effect", "none"]
+    assert reports[none]["effects"] == []
+    assert result["all"]["failed"] == 0
+    assert result["all"]["verdict_right"]["value"] == 1.0
+    assert result["all"]["top_2"]["value"] == 1.0
+    assert result["all"]["component_right"]["value"] == 1.0
+    for name in (single, none):
+        sealed = (tmp_path / "sealed" / f"{name}.json").read_bytes()
+        seal = (tmp_path / "published" / name / "seal.sha256").read_text().strip()
+        assert seal == hashlib.sha256(sealed).hexdigest()
+    assert json.loads((tmp_path / "sealed" / f"{single}.json").read_text())["names"] == ["static_head_bias"]
+
+
+def test_always_none_scores_what_it_deserves(folder, monkeypatch):
+    _, result = run_fake("none", folder, monkeypatch)
+    assert result["all"]["verdict_right"]["value"] == 0.2
+    assert result["kinds_scored"]["none"]["verdict_right"]["value"] == 1.0
+    assert result["all"]["top_1"]["value"] == 0.0
+    assert result["all"]["component_right"]["value"] == 0.0
+    assert result["all"]["false_attribution"]["value"] == 0.0
+    assert result["all"]["shrinkage"]["mean"] == 0.0
+    assert result["confusion"]["columns"] == ["none"]
+    assert result["controls"]["permuted_labels"]["verdict_right"] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("mode", "said"), [("broken", "exit code 1: cannot do it"), ("garbage", "is not JSON")])
+def test_a_diagnosis_that_fails_is_wrong_and_its_reason_is_kept(mode, said, folder, monkeypatch):
+    _, result = run_fake(mode, folder, monkeypatch)
+    assert result["all"]["failed"] == COUNT
+    assert result["all"]["verdict_right"]["value"] == 0.0
+    assert said in (folder / "reports" / "case-0000" / "failure.txt").read_text()
+
+
+def test_the_diagnosis_gets_two_files_without_truth_and_the_missing_effect_only(folder, monkeypatch):
+    plan, _ = run_fake("perfect", folder, monkeypatch, has_recalibration=True)
+    spied = [json.loads(line) for line in (folder / "spy.jsonl").read_text().splitlines()]
+    assert all(seen["files"] == ["recording.parquet", "station.toml"] for seen in spied)
+    held_out = sorted(name for number in range(COUNT) for name in plan.case(number).without)
+    assert sorted(name for seen in spied for name in seen["without"]) == held_out
+    assert len(held_out) == 2
+    assert sum(seen["only"] == list(RECALIBRATION) for seen in spied) == 4
+    for number in range(COUNT):
+        published = folder / "published" / f"case-{number:04}"
+        assert {path.name for path in published.iterdir()} == {"station.toml", "recording.parquet", "seal.sha256"}
+        recording = read_recording(published / "recording.parquet")
+        assert recording.truth == {}
+        assert recording.ignored == ()
+        assert load_station(published / "station.toml").effect == ()
+
+
+@pytest.mark.parametrize("changed", ["sealed/case-0001.json", "published/case-0001/recording.parquet"])
+def test_what_was_changed_after_sealing_is_refused(changed, folder, monkeypatch):
+    path = folder / changed
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=rf"{changed}: is not what was sealed"):
+        run_fake("none", folder, monkeypatch)
+    assert not (folder / "trial.json").exists()
+
+
+def test_salts_differ_and_cases_do_not_depend_on_their_number(folder, tmp_path):
+    plan = TrialPlan(seed=3, count=2, seconds=3600)
+    publish(plan.case(1), tmp_path / "again")
+    one, other = (json.loads((path / "sealed/case-0001.json").read_text()) for path in (folder, tmp_path / "again"))
+    assert one["salt"] != other["salt"]
+    assert one["sha256"] == other["sha256"]
+    assert one["parameters"] == other["parameters"]
+
+
+def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
+    plan, first = run_fake("perfect", folder, monkeypatch)
+    runs = len((folder / "spy.jsonl").read_text().splitlines())
+    again = run_trial(plan, folder, workers=1)
+    assert again | {"date": ""} == first | {"date": ""}
+    assert len((folder / "spy.jsonl").read_text().splitlines()) == runs == COUNT
+    with pytest.raises(ConfigError, match="holds a trial with another seed"):
+        run_fake("perfect", folder, monkeypatch, seed=4)
+    with pytest.raises(ConfigError, match="holds a trial with another diagnoser"):
+        run_fake("perfect", folder, monkeypatch, command=(*FAKE, "--only", "friction_bias"))
+
+
+def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
+    replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
+    _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
+    unseen = result["unseen"]
+    assert unseen["cases"] == 4
+    assert unseen["after"] == 0.0
+    assert unseen["before"] > 2.0
+    assert 0.5 < unseen["oracle"] < 1.5
+    assert unseen["shrinkage"]["median"] > 1.0
+    assert unseen["regressor"] < 0.7 * unseen["before"]
+    assert "flexible regressor" in (folder / "trial.html").read_text()
+
+
+def test_every_effect_takes_its_turn():
+    plan = TrialPlan(seed=5, count=50, kinds=("single",), seconds=3600)
+    names = [plan.case(number).names[0] for number in range(50)]
+    assert len(set(names[:25])) == 25
+    assert names[:25] == names[25:]
+    other = TrialPlan(seed=6, count=25, kinds=("single",), seconds=3600)
+    assert [other.case(number).names[0] for number in range(25)] != names[:25]
+
+
+def test_stations_of_swmm_have_soft_starters():
+    cases = [trial_case(9, number, kinds=("none",), plants=("fine", "swmm"), seconds=600) for number in range(8)]
+    assert {case.truth().station.control.ramp_s for case in cases if case.plant == "swmm"} <= {1.0, 2.0}
+    assert min(case.truth().station.control.ramp_s for case in cases if case.plant == "fine") >= 6.0
+
+
+def test_command_line(folder, monkeypatch, capsys):
+    monkeypatch.setenv("FAKE_MODE", "none")
+    monkeypatch.setenv("FAKE_FOLDER", str(folder))
+    days = str(3600 / 86_400)
+    options = [
+        "--seed",
+        "3",
+        "--cases",
+        str(COUNT),
+        "--days",
+        days,
+        "--diagnoser",
+        " ".join(FAKE),
+        "--out",
+        str(folder),
+    ]
+    monkeypatch.setattr(sys, "argv", ["wetwell", "gap", "trial", *options])
+    main_ended(0)
+    assert "trial.html" in capsys.readouterr().out
+    monkeypatch.setattr(sys, "argv", ["wetwell", "gap", "trial", *options, "--kinds", "sngle"])
+    main_ended(2)
+    assert "--kinds: got 'sngle'" in capsys.readouterr().err
+
+
+def main_ended(code):
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert int(ended.value.code or 0) == code
+
+
+def test_swmm_without_pyswmm_says_what_to_install(alpha, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyswmm", None)
+    with pytest.raises(WetwellError, match=r"needs pyswmm: pip install 'wetwell\[trial\]'"):
+        run_swmm(TruthCase(station=alpha, seconds=60))
+
+
+def test_swmm_refuses_what_it_cannot_express(alpha):
+    pytest.importorskip("pyswmm", exc_type=ImportError)
+    with pytest.raises(ValueError, match="deviation 'ragging' is not one that SWMM can express"):
+        run_swmm(TruthCase(station=alpha, deviations=(Deviation(name="ragging"),), seconds=60))
+
+
+def test_a_trial_with_swmm(tmp_path, monkeypatch):
+    pytest.importorskip("pyswmm", exc_type=ImportError)
+    _, result = run_fake("perfect", tmp_path, monkeypatch, count=3, kinds=("single",), plants=("swmm",))
+    assert result["plants_scored"]["swmm"]["top_1"]["value"] == 1.0
+    recording = read_recording(tmp_path / "published" / "case-0000" / "recording.parquet")
+    assert np.isfinite(recording.columns["level_m"]).all()

@@ -1,0 +1,83 @@
+"""Free-running comparison of a simulator with a recording."""
+
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.recordings.recording import Recording, write_recording
+from wetwell.services.batch.field_data import validate_file
+from wetwell.services.stations import find_scenario
+from wetwell.sim2real.calibration.validation import Validation, validate
+from wetwell.simulator.simulation import Simulation
+
+DAY_S = 86_400
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def recording(alpha):
+    return Simulation(alpha, find_scenario("clogging"), 5).advance(DAY_S, truth=False)
+
+
+def test_the_right_station_under_the_measured_inflow_agrees_in_starts_and_run_time(alpha, recording):
+    result, simulated = validate(recording, alpha)
+    assert result.inflow == "measured"
+    assert result.days == ("2025-01-01",)
+    assert np.abs(result.starts[0] - result.starts[1]).max() <= 1
+    assert np.abs(result.run_h[0] - result.run_h[1]).max() < 0.1
+    assert result.level_nmae < 0.1
+    assert len(simulated) == len(recording)
+    assert result.starts[0].sum() > 60
+
+
+def test_errors_of_days_are_sums_of_differences_over_the_measured_sum():
+    result = Validation(
+        inflow="measured",
+        level_nmae=0.1,
+        days=("2025-01-01", "2025-01-02"),
+        starts=np.array([[[10, 0], [30, 0]], [[12, 1], [28, 0]]]),
+        run_h=np.array([[[2.0, 0.0], [2.0, 0.0]], [[1.0, 0.0], [2.0, 0.0]]]),
+    )
+    np.testing.assert_allclose(result.starts_nmae, [0.1, np.nan])
+    np.testing.assert_allclose(result.run_h_nmae, [0.25, np.nan])
+
+
+def test_the_page_draws_both_levels_and_every_pump(alpha, recording, tmp_path):
+    source, out = tmp_path / "day.parquet", tmp_path / "page.html"
+    write_recording(recording, source)
+    printed = validate_file(alpha, source, None, None, out)
+    assert printed["level_nmae"] < 0.1
+    assert len(printed["starts_nmae"]) == 3
+    root = ET.fromstring(out.read_text(encoding="utf-8").removeprefix("<!DOCTYPE html>\n"))  # noqa: S314
+    titles = [chart.find(f"{SVG}title").text for chart in root.iter(f"{SVG}svg")]
+    pumps = [f"Pump {pump}: {what}" for what in ("starts", "run time") for pump in (1, 2, 3)]
+    assert titles == ["Level", "Level, the first six hours", *pumps]
+    level = next(root.iter(f"{SVG}svg"))
+    assert [path.get("d", "").count("L") > 500 for path in level.iter(f"{SVG}path")] == [True, True]
+    cells = [cell.text for cell in root.iter("td")]
+    assert cells[:2] == ["level, over its range", f"{printed['level_nmae']:.2%}"]
+    assert len(cells) == 2 * 7
+
+
+def test_without_a_measured_inflow_it_is_inferred(alpha, recording):
+    kept = {name: values for name, values in recording.columns.items() if name != "inflow_m3h"}
+    result, _ = validate(Recording(time_ns=recording.time_ns, columns=kept), alpha)
+    assert result.inflow == "inferred"
+    assert np.abs(result.starts[0] - result.starts[1]).max() <= 2
+
+
+def test_a_wrong_station_shows(alpha, recording):
+    wrong = alpha.model_copy(update={"sump": alpha.sump.model_copy(update={"area_m2": 16.0})})
+    result, _ = validate(recording, wrong)
+    assert result.starts[1].sum() < 0.7 * result.starts[0].sum()
+
+
+def test_what_cannot_be_compared_is_said(alpha, recording):
+    kept = {name: values for name, values in recording.columns.items() if name != "level_m"}
+    blind = Recording(time_ns=recording.time_ns, columns=kept)
+    with pytest.raises(ValueError, match="'level_m' has no values"):
+        validate(blind, alpha)
+    single = alpha.model_copy(update={"pump": alpha.pump[:1]})
+    with pytest.raises(ValueError, match="the recording has 3 pumps, station 'alpha' 1"):
+        validate(recording, single)

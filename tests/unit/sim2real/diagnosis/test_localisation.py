@@ -1,0 +1,82 @@
+"""Which component a gap points to, from how its residuals move."""
+
+import numpy as np
+import pytest
+
+from wetwell.sim2real.diagnosis.localisation import culprit
+from wetwell.sim2real.recording.regimes import START_RAMP, STEADY
+from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins
+from wetwell.simulator.plant import plant_parameters
+
+RUNS, BINS_PER_RUN = 40, 20
+HEAD_DEVIATION = 0.05
+
+
+def bins_of(signals, regime):
+    """Bins of twenty seconds, `BINS_PER_RUN` a run, of one pump; (bins,) second and place in the run."""
+    count = RUNS * BINS_PER_RUN
+    second = np.tile(20 * np.arange(count) + 600 * np.repeat(np.arange(RUNS), BINS_PER_RUN), len(signals))
+    size = second.size
+    return Bins(
+        signal=np.repeat(signals, count),
+        regime=np.full(size, regime),
+        cycle=np.tile(np.repeat(np.arange(RUNS), BINS_PER_RUN), len(signals)),
+        pump=np.zeros(size, dtype=np.int64),
+        second=second,
+        deviation=np.where(np.repeat(signals, count) == HEAD, HEAD_DEVIATION, 1.0),
+        floor=np.zeros(size),
+        tolerance=np.zeros(size),
+    )
+
+
+def blamed(residuals, bins, station):
+    return culprit(residuals**2, residuals, bins, plant_parameters(station))
+
+
+def test_power_that_runs_away_is_its_meter_and_power_that_swings_the_drive(alpha):
+    bins = bins_of([POWER], STEADY)
+    turn = np.linspace(0.0, 1.0, bins.size)
+    assert blamed(10.0 * turn, bins, alpha) == "power_meter"
+    assert blamed(10.0 * np.sin(2.0 * np.pi * turn), bins, alpha) == "drive"
+
+
+@pytest.mark.parametrize(("period_s", "component"), [(60.0, "drive"), (4000.0, "pump")])
+def test_a_speed_that_swings_within_a_run_is_the_drive(alpha, period_s, component):
+    bins = bins_of([FLOW, HEAD], STEADY)
+    swing = 10.0 * np.sin(2.0 * np.pi * bins.second / period_s)
+    plant = plant_parameters(alpha)
+    along = 2.0 * plant.friction_h2_m5 * float(plant.rated_flow_m3h[0]) / HEAD_DEVIATION
+    assert blamed(np.where(bins.signal == FLOW, swing, along * swing), bins, alpha) == component
+
+
+@pytest.mark.parametrize(("growth", "component"), [(1.0, "telemetry"), (0.0, "flow_meter")])
+def test_a_flow_that_is_ever_later_is_telemetry(alpha, growth, component):
+    bins = bins_of([FLOW, HEAD], START_RAMP)
+    turn = bins.second / bins.second.max()
+    late = np.where(bins.signal == FLOW, 20.0 * (growth * turn + (1.0 - growth)), 0.0)
+    assert blamed(late, bins, alpha) == component
+
+
+@pytest.mark.parametrize(("sign", "component"), [(-1.0, "telemetry"), (1.0, "controller")])
+def test_a_level_that_is_ever_later_is_too_low_at_starts_and_too_high_at_stops(alpha, sign, component):
+    bins = bins_of([LEVEL, START_LEVEL, STOP_LEVEL], START_RAMP)
+    turn = bins.second / bins.second.max()
+    size = np.select([bins.signal == START_LEVEL, bins.signal == STOP_LEVEL], [sign * 10.0, 10.0], 1.0)
+    assert blamed(size * turn, bins, alpha) == component
+
+
+@pytest.mark.parametrize(("lasting", "component"), [(True, "sump"), (False, "level_sensor")])
+def test_a_level_that_wanders_is_its_sensor_and_a_balance_that_stays_open_the_sump(alpha, lasting, component):
+    bins = bins_of([LEVEL], STEADY)
+    rng = np.random.default_rng(3)
+    since_s = bins.second - np.repeat(bins.second[::BINS_PER_RUN], BINS_PER_RUN)
+    open_balance = 6.0 * (1.0 - np.exp(-since_s / 150.0))
+    assert blamed(open_balance if lasting else rng.normal(0.0, 5.0, bins.size), bins, alpha) == component
+
+
+def test_flow_that_comes_late_at_starts_alone_is_the_check_valve(alpha):
+    bins = bins_of([FLOW, HEAD], START_RAMP)
+    plant = plant_parameters(alpha)
+    _, c1, c2 = plant.curves[0]
+    on_curve = (c1 + 2.0 * c2 * float(plant.rated_flow_m3h[0])) / HEAD_DEVIATION
+    assert blamed(np.where(bins.signal == FLOW, -10.0, -10.0 * on_curve), bins, alpha) == "pump"

@@ -1,0 +1,60 @@
+"""Channels that are held, from their values alone."""
+
+import numpy as np
+import pytest
+
+from wetwell.services.stations import find_scenario
+from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.residuals.telemetry import telemetry_misfit
+from wetwell.simulator.simulation import Simulation
+
+NAMES = [f"pump{i}_power_kw" for i in (1, 2, 3)]
+
+
+def held(values, deadband, report_s):
+    """What is sent of values: after a move by a deadband, or a time."""
+    sent, since = values.copy(), 0
+    for row in range(1, values.size):
+        since += 1
+        if abs(values[row] - sent[row - 1]) >= deadband or since >= report_s:
+            since = 0
+        else:
+            sent[row] = sent[row - 1]
+    return sent
+
+
+@pytest.fixture(scope="module", params=[1.0, 2.0, 6.0])
+def recorded(request, alpha):
+    station = alpha.model_copy(update={"control": alpha.control.model_copy(update={"ramp_s": request.param})})
+    return station, Simulation(station, find_scenario("nominal"), 3).advance(21_600, truth=False)
+
+
+def patterns(station, recording, **changed):
+    columns = recording.columns | changed
+    traces = traces_of(type(recording)(time_ns=recording.time_ns, columns=columns), station)
+    return telemetry_misfit(traces, station, regimes_of(traces, station)).patterns
+
+
+def test_noise_and_a_meter_that_is_stuck_are_not_held(recorded):
+    station, recording = recorded
+    stuck = {name: np.where(recording.columns[name] > 0.0, 17.0, 0.0) for name in NAMES}
+    assert patterns(*recorded) == patterns(station, recording, **stuck) == ()
+
+
+@pytest.mark.parametrize("report_s", [240, 1000])
+def test_a_deadband_that_only_time_and_ramps_pass_is_at_least_what_time_moved(recorded, report_s):
+    station, recording = recorded
+    found = patterns(station, recording, **{name: held(recording.columns[name], 3.0, report_s) for name in NAMES})
+    for pattern in found:
+        assert pattern.quantity == "power_kw"
+        assert pattern.missed(3.0) == 0.0
+        assert pattern.missed(0.0) > 0.0
+    assert len(found) == 1 or report_s > 240
+
+
+def test_a_deadband_that_noise_passes_is_known_to_a_few_percent(recorded):
+    station, recording = recorded
+    (found,) = patterns(station, recording, **{name: held(recording.columns[name], 0.25, 10**6) for name in NAMES})
+    assert found.deadband == pytest.approx(0.25, rel=0.05)
+    assert found.missed(0.3) > 0.0
