@@ -26,7 +26,7 @@ from typing import Any
 
 import httpx
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.keys import model_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
@@ -84,7 +84,7 @@ class Fleet:
             )
             bus.publisher(verdict_key(name, 1)).put(verdict.encode())
         first = StationModel(station.model_copy(update={"name": names[0]}))
-        model = first.message((None,) * nominal_of(station).pumps, {}, now_ns())
+        model = first.message((None,) * datasheet_of(station).pumps, {}, now_ns())
         bus.publisher(model_key(names[0])).put(model.encode())
 
     async def run(self) -> None:

@@ -18,14 +18,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from timing import least_s
 
-from wetwell.detector.curves.datasheet import Nominal, nominal_of
+from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.pump_judge import ROLLING_SAMPLES
 from wetwell.detector.statistics.rolling_f_test import LOG_P, RollingFTest, scan
 from wetwell.detector.stream.block import blocks
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import Sample
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
@@ -40,27 +40,25 @@ MEMORY_DAYS = (1, 10, 40)
 YEAR_DAYS = 365
 REFITS = 200
 
-Floats = npt.NDArray[np.float64]
 
-
-def judge(nominal: Nominal, recording: Recording) -> None:
+def judge(datasheet: Datasheet, recording: Recording) -> None:
     """The whole pipeline over a recording, as `wetwell detect` has it."""
-    detector = Detector("alpha", nominal)
-    for block in blocks(recording, nominal.pumps):
+    detector = Detector("alpha", datasheet)
+    for block in blocks(recording, datasheet.pumps):
         detector.take(block)
     detector.finish()
 
 
-def judge_by_samples(nominal: Nominal, recording: Recording) -> None:
+def judge_by_samples(datasheet: Datasheet, recording: Recording) -> None:
     """The same, a sample at a time."""
-    detector = Detector("alpha", nominal)
+    detector = Detector("alpha", datasheet)
     for row in recording.rows():
         detector.update(row)
     detector.finish()
 
 
-def blocks_alone(nominal: Nominal, recording: Recording) -> None:
-    for _ in blocks(recording, nominal.pumps):
+def blocks_alone(datasheet: Datasheet, recording: Recording) -> None:
+    for _ in blocks(recording, datasheet.pumps):
         pass
 
 
@@ -69,16 +67,16 @@ def decode(payloads: list[bytes]) -> None:
         Sample.decode(payload)
 
 
-def live_s(nominal: Nominal, recording: Recording, repeats: int) -> dict[str, float]:
+def live_s(datasheet: Datasheet, recording: Recording, repeats: int) -> dict[str, float]:
     """Time of a live sample of a station that has learnt: decoded and judged, and decoded alone."""
     payloads = [sample.encode() for sample in recording.samples("alpha")]
-    learnt = Detector("alpha", nominal)
+    learnt = Detector("alpha", datasheet)
     for payload in payloads[:LIVE_FROM_S]:
         learnt.update(Sample.decode(payload))
     state, live = learnt.snapshot(), payloads[LIVE_FROM_S : LIVE_FROM_S + LIVE_SAMPLES]
 
     def run() -> None:
-        detector = Detector("alpha", nominal)
+        detector = Detector("alpha", datasheet)
         detector.restore(state)
         for payload in live:
             detector.update(Sample.decode(payload))
@@ -95,17 +93,17 @@ def memory_kb(seed: int, days: Sequence[int]) -> dict[str, dict[str, float]]:
     The detector is made anew from its snapshot while its memory is traced: the samples of a day are no part of it.
     """
     station = find_station("alpha")
-    nominal = nominal_of(station)
-    simulation, detector = Simulation(station, find_scenario("nominal"), seed), Detector("alpha", nominal)
+    datasheet = datasheet_of(station)
+    simulation, detector = Simulation(station, find_scenario("nominal"), seed), Detector("alpha", datasheet)
     figures = {}
     largest = 0.0
     for day in range(1, max(days) + 1):
-        for block in blocks(simulation.advance(DAY_S, truth=False), nominal.pumps):
+        for block in blocks(simulation.advance(DAY_S, truth=False), datasheet.pumps):
             detector.take(block)
         state = detector.snapshot()
         gc.collect()
         tracemalloc.start()
-        twin = Detector("alpha", nominal)
+        twin = Detector("alpha", datasheet)
         twin.restore(state)
         gc.collect()
         held_bytes = tracemalloc.get_traced_memory()[0]
@@ -181,11 +179,11 @@ def _us(seconds: float) -> float:
 
 def pipeline(station: Station, scenario: str, seed: int, repeats: int) -> dict[str, float]:
     """Speed of the whole pipeline over a day of a station."""
-    nominal, pumps = nominal_of(station), len(station.pump)
+    datasheet, pumps = datasheet_of(station), len(station.pump)
     recording = Simulation(station, find_scenario(scenario), seed).advance(DAY_S, truth=False)
-    whole_s = least_s(partial(judge, nominal, recording), repeats)
-    single_s = least_s(partial(judge_by_samples, nominal, recording), repeats)
-    blocks_s = least_s(partial(blocks_alone, nominal, recording), repeats)
+    whole_s = least_s(partial(judge, datasheet, recording), repeats)
+    single_s = least_s(partial(judge_by_samples, datasheet, recording), repeats)
+    blocks_s = least_s(partial(blocks_alone, datasheet, recording), repeats)
     return {
         "k_pump_samples_per_s": round(pumps * len(recording) / whole_s / 1000),
         "station_sample_us": _us(whole_s / len(recording)),
@@ -211,7 +209,7 @@ def figures(seed: int, repeats: int, days: Sequence[int]) -> dict[str, Any]:
             "nominal, PID on a common header": pipeline(by_speed, "nominal", seed, repeats),
         },
         "live_sample_us": {
-            name: _us(cost_s) for name, cost_s in live_s(nominal_of(station), day["paper"], repeats).items()
+            name: _us(cost_s) for name, cost_s in live_s(datasheet_of(station), day["paper"], repeats).items()
         },
         "f_tests": f_tests(day["nominal"], repeats),
         "memory_kb": memory_kb(seed, days),

@@ -24,7 +24,7 @@ import numpy as np
 from site_load import SETTLE_S, Played, play, prepare
 from site_processes import PATIENCE_S, Site, cpu_and_memory, free_endpoint, started
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.bus.zenoh.link import connect_client
@@ -44,7 +44,7 @@ def wanted(folder: Path, load: list[Played]) -> Told:
     told: Told = {}
     for each in load:
         station = load_station(folder / "stations" / f"{each.name}.toml")
-        detector = Detector(station.name, nominal_of(station))
+        detector = Detector(station.name, datasheet_of(station))
         detector.restore((folder / "state" / f"{each.name}.detector.json").read_bytes())
         for block in blocks(each.recording, len(station.pump)):
             for verdict in detector.take(block._replace(seq=block.seq + each.begin_s)):

@@ -14,9 +14,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import Nominal, nominal_of
+from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.evaluation.methods import detector_class
 from wetwell.detector.evaluation.methods.run_detector import RunDetector
 from wetwell.detector.evaluation.scores import (
@@ -31,13 +30,12 @@ from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.f_distribution import log_f_survival
 from wetwell.detector.statistics.tangent import tangent_residuals
 from wetwell.detector.stream.block import Block, blocks
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
-
-Floats = npt.NDArray[np.float64]
 
 CYCLES = 81
 FRICTION_H2_M5 = 5e-4
@@ -56,8 +54,8 @@ class NominalNullFTest(RunDetector):
     The alternative has coefficients that are linear in time, as before. Of two p below 5 % the smaller is told.
     """
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
         self._fits: dict[int, list[Floats]] = {}
 
     def _learn(self, pump: int, runs: list[Run]) -> None:
@@ -94,8 +92,8 @@ def _curves(run: Run) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
 class Cycles(RunDetector):
     """Keeps the steady samples of each cycle of pump 1."""
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
         self.runs: list[Run] = []
 
     def _learn(self, pump: int, runs: list[Run]) -> None:
@@ -163,8 +161,8 @@ def score(cycles: list[list[ScoredRun]]) -> dict[str, Any]:
 
 def reasons(station: Station, recording: Recording) -> dict[str, Any]:
     """What the noise does to one-second steps, and how far the curves move within a cycle and between cycles."""
-    nominal = nominal_of(station)
-    keeper = Cycles(station.name, nominal)
+    datasheet = datasheet_of(station)
+    keeper = Cycles(station.name, datasheet)
     for block in blocks_of(recording):
         keeper.take(block)
     keeper.finish()
@@ -182,8 +180,8 @@ def reasons(station: Station, recording: Recording) -> dict[str, Any]:
                 run.flow_m3h,
                 run.head_m,
                 run.speed_ratio,
-                curve=nominal.curves[0],
-                friction_h2_m5=nominal.friction_h2_m5,
+                curve=datasheet.curves[0],
+                friction_h2_m5=datasheet.friction_h2_m5,
             )
             noise.append(float(np.std(steps[component])))
             between.append(abs(float(run.segments.residual_m[:, component].mean() - usual_m)))
@@ -212,7 +210,7 @@ def main() -> None:
         print(f"seed {seed}", file=sys.stderr)
         seeds.append(seed)
         for name, make in classes.items():
-            cycles[name].append(judged(make(station.name, nominal_of(station)), recording))
+            cycles[name].append(judged(make(station.name, datasheet_of(station)), recording))
         why = why or reasons(station, recording)
     told = {name: score(found) for name, found in cycles.items()}
     print(

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.messages.readings import PumpRow, Row
 from wetwell.protocols.recordings.importers.skab import read_skab
@@ -58,7 +58,7 @@ def station(name: str, curve: list[float], static_head_m: float, friction_h2_m5:
 def skab(path: Path) -> tuple[list[Verdict], dict[str, Any]]:
     """Verdicts on a file of SKAB, and what came of it; delays are from the first second that is labelled."""
     recording, rig = read_skab(path), station("skab", [20.0, 0.0, -1.2], 0.5, 1.0)
-    detector = Detector(rig.name, nominal_of(rig))
+    detector = Detector(rig.name, datasheet_of(rig))
     verdicts = [verdict for row in recording.rows() for verdict in detector.update(row)]
     verdicts += detector.finish()
     labelled_ns = recording.time_ns[recording.truth.get("truth_anomaly", np.zeros(len(recording))) > 0.0]
@@ -98,7 +98,7 @@ def whut(folder: Path, pumps: int, learns_from: str) -> list[Verdict]:
                 yield PumpRow(50.0, q, h, np.nan, True)
             yield from [PumpRow(0.0, 0.0, 0.0, np.nan, False)] * IDLE_S
 
-    detector = Detector(rig.name, nominal_of(rig))
+    detector = Detector(rig.name, datasheet_of(rig))
     begin_s = LEARNING_RUNS * (RUN_S + IDLE_S)
     verdicts = [
         verdict
@@ -108,7 +108,7 @@ def whut(folder: Path, pumps: int, learns_from: str) -> list[Verdict]:
     return [verdict for verdict in verdicts if verdict.window[0] >= begin_s * NS_PER_S]
 
 
-def _whut_readings(path: Path) -> npt.NDArray[np.float64]:
+def _whut_readings(path: Path) -> Floats:
     """(n, 2) flow and head by the second, as the rig's first flow meter and pressure gauge show them."""
     with gzip.open(path, "rt") as file:
         names = file.readline().strip().split(",")

@@ -27,10 +27,10 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-import numpy.typing as npt
 from swmm_station import INFLOW_STEP_S, swmm_input
 from timing import least_s
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.plant import Plant, healthy_forcing
@@ -59,7 +59,6 @@ SIX_EFFECTS: tuple[dict[str, Any], ...] = (
     {"name": "level_quantisation", "quantum_m": 0.01},
 )
 
-Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
 
 

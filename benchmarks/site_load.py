@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.bus.keys import sample_block_key, sample_key
@@ -60,7 +60,7 @@ def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
         length_s = LEARNT_S + SHIFT_S * shares + seconds
         simulation = Simulation(small, find_scenario(SCENARIOS[number % 2]), seed=number + 1)
         recording = simulation.advance(length_s, truth=False)
-        detector, begin_s = Detector("", nominal_of(small)), 0
+        detector, begin_s = Detector("", datasheet_of(small)), 0
         for share in range(shares):
             if (index := share * RECORDINGS + number) >= stations:
                 break

@@ -13,11 +13,11 @@ from site_processes import cpu_and_memory
 from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.protocols.bus.memory_link import MemoryBus
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.runtime.settings import AlarmSettings
@@ -40,9 +40,9 @@ class Week:
         files = [plant.station for plant in self._plants]
         bus, self._clock = MemoryBus(), Now(0, 0.0)
         self._historian = Historian(FolderStore(folder / "history"))
-        self._keeper = AlarmKeeper(bus, AlarmSettings(state_dir=folder / "alarms"), files, lambda: self._clock)
+        self._keeper = AlarmService(bus, AlarmSettings(state_dir=folder / "alarms"), files, lambda: self._clock)
         self._judges = [
-            StationJudge(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
+            StationDetector(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
         ]
         self._intake = Intake(bus, self._judges)
         self._publishers = [bus.publisher(sample_key(station.name), history=SAMPLE_HISTORY) for station in files]

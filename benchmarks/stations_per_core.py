@@ -20,7 +20,7 @@ from wetwell.protocols.messages.messages import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import load_station
 from wetwell.services.detector.checkpoint import Checkpoint
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.reports.charts.bar_chart import bar_chart
@@ -81,7 +81,7 @@ def detector(folder: Path, load: list[Played], gather: int) -> float:
     kind = Sample if gather == 1 else SampleBlock
     with MemoryBus() as bus:
         judges = [
-            StationJudge(
+            StationDetector(
                 bus,
                 load_station(folder / "stations" / f"{each.name}.toml"),
                 checkpoint=Checkpoint(folder / "state", each.name),

@@ -7,8 +7,8 @@ curves, so that only level, duty and switching are left to compare.
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 
 SECONDS_PER_HOUR = 3600.0
@@ -37,8 +37,6 @@ THREADS 1
 SKIP_STEADY_STATE NO
 """
 PRECISE = "HEAD_TOLERANCE 0.000001\nMAX_TRIALS 20"
-
-Floats = npt.NDArray[np.float64]
 
 
 def swmm_input(

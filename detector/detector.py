@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline.learning import sibling_objection
 from wetwell.detector.baseline.model import Baseline
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.decision import decide, onset_component
 from wetwell.detector.inference.observation import observe
 from wetwell.detector.inference.posterior import (
@@ -65,25 +65,25 @@ class Detector:
     ----------
     station : str
         Name for the verdicts.
-    nominal : Nominal
+    datasheet : Datasheet
         Datasheet curves.
     costs : Costs, optional
         For the expected cost of each act.
     """
 
-    def __init__(self, station: str, nominal: Nominal, costs: Costs | None = None) -> None:
+    def __init__(self, station: str, datasheet: Datasheet, costs: Costs | None = None) -> None:
         self._station = station
-        self._nominal = nominal
+        self._datasheet = datasheet
         self._costs = costs or Costs()
-        self._gate = Gate(nominal)
-        self._runs = RunTracker(nominal)
+        self._gate = Gate(datasheet)
+        self._runs = RunTracker(datasheet)
         self._phases = new_phases()
-        self._meters = new_meters(nominal.pumps)
-        self._blinds = new_blinds(nominal.pumps)
-        self._rolling = RollingFTest(ROLLING_SAMPLES, nominal.pumps)
-        self._live = LiveBlock(nominal.pumps)
+        self._meters = new_meters(datasheet.pumps)
+        self._blinds = new_blinds(datasheet.pumps)
+        self._rolling = RollingFTest(ROLLING_SAMPLES, datasheet.pumps)
+        self._live = LiveBlock(datasheet.pumps)
         self._system = SystemBelief()
-        self._pumps = [PumpRecord() for _ in range(nominal.pumps)]
+        self._pumps = [PumpRecord() for _ in range(datasheet.pumps)]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -144,7 +144,7 @@ class Detector:
         gate, runs, rolling = self._gate, self._runs, self._rolling
         return (
             *(runs.table, gate.state, gate.ranges, gate.frame, runs.pumps, runs.pace, runs.rows),
-            *(self._phases, self._nominal.area_m2, self._meters, self._blinds),
+            *(self._phases, self._datasheet.area_m2, self._meters, self._blinds),
             *(rolling.windows, rolling.moments, rolling.counts),
         )
 
@@ -157,7 +157,7 @@ class Detector:
         """The whole state, from which `restore` goes on bit for bit."""
         arrays = dict(zip(_ARRAYS, self._stateful_arrays(), strict=True))
         state = {"arrays": arrays, "system": self._system, "pumps": self._pumps}
-        return encode_snapshot(self._station, self._nominal, state)
+        return encode_snapshot(self._station, self._datasheet, state)
 
     def restore(self, data: bytes) -> None:
         """Go on from a snapshot of the same station.
@@ -167,8 +167,8 @@ class Detector:
         SnapshotError
             If it is damaged, of another format or station; this detector is left as it was.
         """
-        state = decode_snapshot(data, self._station, self._nominal)
-        blank = Detector(self._station, self._nominal)
+        state = decode_snapshot(data, self._station, self._datasheet)
+        blank = Detector(self._station, self._datasheet)
         arrays = dict(zip(_ARRAYS, blank._stateful_arrays(), strict=True)) | state["arrays"]
         self._runs.rows = np.empty_like(arrays["rows"])
         for name, array in zip(_ARRAYS, self._stateful_arrays(), strict=True):
@@ -248,7 +248,7 @@ class Detector:
         if pump.known is None:
             self._learn(run, log_ratio, time_ns)
         rng = np.random.default_rng(abs(run.window_ns[0]) + run.pump)
-        evidence |= run_evidence(run, self._nominal, rng)
+        evidence |= run_evidence(run, self._datasheet, rng)
         if pump.known is None:
             pump.state = "learning"
             evidence["reason"] = pump.learning.reason if pump.learning is not None else ""
@@ -264,7 +264,7 @@ class Detector:
         pump.take_state(state, run.window_ns, onset_component(state))
         evidence["index"] = pump.limits.figures(run.segments, pump.known.baseline, rng)
         if state == "normal":
-            pump.known = replace(pump.known, baseline=_with_noise(pump.known.baseline, run, self._nominal))
+            pump.known = replace(pump.known, baseline=_with_noise(pump.known.baseline, run, self._datasheet))
             pump.limits.add(run.segments, pump.known.baseline)
         probability = weighed.by_state()
         if state == "sensor_fault" and wrong:
@@ -305,7 +305,7 @@ class Detector:
             pump.early = None
             return []
         run = self._runs.last_segments(index, min(since, filled))
-        is_dry = median(run.total_flow_m3h) < NO_FLOW_SHARE * self._nominal.runout_flow_m3h(index)
+        is_dry = median(run.total_flow_m3h) < NO_FLOW_SHARE * self._datasheet.runout_flow_m3h(index)
         if is_dry and math.isfinite(pump.known.drawdown.mean):
             return []  # the drawdown will tell at the end of the run whether the flow meter is dead
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
@@ -319,19 +319,19 @@ class Detector:
         pump.recent.append((sum(run.window_ns) // 2, weighed.shift_m))
         pump.take_state(state, run.window_ns, onset_component(state))
         pump.recent.pop()
-        evidence |= run_evidence(run, self._nominal, rng)
+        evidence |= run_evidence(run, self._datasheet, rng)
         evidence["index"] = pump.limits.figures(run.segments, baseline, rng)
         evidence |= self._consequences(run, weighed, weighed.by_state(), state, remark)
         return [self._verdict(index, time_ns, run.window_ns, weighed.by_state(), evidence)]
 
     def _learn(self, run: Run, log_ratio: float, time_ns: int) -> None:
         pump = self._pumps[run.pump]
-        curve = self._nominal.curves[run.pump]
-        baseline = pump.learn(run, log_ratio, self._seen_s, curve, self._nominal.friction_h2_m5)
+        curve = self._datasheet.curves[run.pump]
+        baseline = pump.learn(run, log_ratio, self._seen_s, curve, self._datasheet.friction_h2_m5)
         if baseline is None or pump.learning is None:
             return
         offsets_m = [other.offset_m for other in self._pumps]
-        doubt = sibling_objection(run.pump, offsets_m, self._nominal.curves)
+        doubt = sibling_objection(run.pump, offsets_m, self._datasheet.curves)
         if doubt is None:
             pump.settle(baseline, time_ns, self._seen_s)
             self._runs.pumps["is_learning"][run.pump] = 0
@@ -342,14 +342,14 @@ class Detector:
         observation = observe(
             run,
             known.baseline,
-            self._nominal.curves[run.pump],
-            self._nominal.friction_h2_m5,
+            self._datasheet.curves[run.pump],
+            self._datasheet.friction_h2_m5,
             drawdown=(log_ratio, known.drawdown),
             power=known.power,
         )
         evidence |= shift_evidence(observation)
         evidence["baseline"] = known.version
-        scales = fault_scales(self._nominal, run.pump, known.baseline)
+        scales = fault_scales(self._datasheet, run.pump, known.baseline)
         return weigh(observation, scales, joint_prior(self._pumps[run.pump].belief, self._system))
 
     def _consequences(
@@ -358,12 +358,12 @@ class Detector:
         """Severity, advice and expected costs."""
         known, segments = self._pumps[run.pump].known, run.segments
         flow_m3h = float(median(segments.flow_m3h))
-        friction_m = self._nominal.friction_h2_m5 * float(median(segments.total_m3h)) ** 2
+        friction_m = self._datasheet.friction_h2_m5 * float(median(segments.total_m3h)) ** 2
         healthy_m3h = known.baseline.explained_flows(segments)[0] if known is not None else flow_m3h
         power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
         run_share = float(self._runs.pumps["run_s"][run.pump]) / max(self._seen_s, 1.0)
         wasted_kwh = power_kw * 24.0 * run_share * max(1.0 - flow_m3h / max(healthy_m3h, 1e-9), 0.0)
-        curve = self._nominal.curves[run.pump]
+        curve = self._datasheet.curves[run.pump]
         figures: dict[str, Any] = {
             "severity": severity(weighed.shift_m, weighed.deviation_m, curve, flow_m3h, friction_m),
             "advice": advice(state, remark),
@@ -404,5 +404,5 @@ def _blind(lacking: list[str]) -> str:
     return f"without {', '.join(lacking)} pump and system cannot be told apart"
 
 
-def _with_noise(baseline: Baseline, run: Run, nominal: Nominal) -> Baseline:
-    return baseline.with_noise_of(run.segments, NOISE_WEIGHT, nominal.curves[run.pump][0])
+def _with_noise(baseline: Baseline, run: Run, datasheet: Datasheet) -> Baseline:
+    return baseline.with_noise_of(run.segments, NOISE_WEIGHT, datasheet.curves[run.pump][0])

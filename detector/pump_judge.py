@@ -3,9 +3,6 @@
 from collections import deque
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
 from wetwell.detector.baseline.learning import Learning
 from wetwell.detector.baseline.model import Baseline, Curve
 from wetwell.detector.inference.observation import Check, learn_check, log_power
@@ -16,10 +13,9 @@ from wetwell.detector.statistics.cusum import Cusum
 from wetwell.detector.stream.missing_signals import BlindWatch
 from wetwell.detector.stream.stuck_sensors import healthy_noise, reading_noise
 from wetwell.detector.verdict.control_limits import IndexLimits
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 ROLLING_SAMPLES = 300
 RECENT_RUNS = 12

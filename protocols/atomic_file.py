@@ -10,7 +10,7 @@ from wetwell.protocols.errors import RecordingError
 
 
 @contextlib.contextmanager
-def whole_file(path: Path) -> Iterator[io.BufferedWriter]:
+def atomic_file(path: Path) -> Iterator[io.BufferedWriter]:
     """File to write; it gets its name when the block ends without an error, and is gone otherwise.
 
     Raises

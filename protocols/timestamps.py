@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Integers
+
 NS_PER_S = 1_000_000_000
 MAX_STAMP_NS = 2**63 - 1
 """In the year 2262; the first stamp is as far before 1970."""
@@ -57,7 +59,7 @@ def from_iso(text: str) -> int:
     return stamp_ns
 
 
-def to_iso_array(stamps_ns: npt.NDArray[np.int64]) -> npt.NDArray[np.str_]:
+def to_iso_array(stamps_ns: Integers) -> npt.NDArray[np.str_]:
     """ISO 8601 texts of (n,) stamps, all with the same number of decimals."""
     unit: Literal["s", "ms", "ns"] = (
         "s" if not np.any(stamps_ns % NS_PER_S) else "ms" if not np.any(stamps_ns % 1_000_000) else "ns"

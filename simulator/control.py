@@ -1,11 +1,7 @@
 """Supervisory logic: start and stop pumps by the measured level, in rotation, or hold the level by their speed."""
 
-import numpy as np
-import numpy.typing as npt
-
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
-
-Floats = npt.NDArray[np.float64]
 
 NOTHING = -1
 ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)

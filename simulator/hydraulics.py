@@ -2,12 +2,8 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
-
-Floats = npt.NDArray[np.float64]
 
 FLOW_TOLERANCE_M3H = 1e-10
 MAX_ITERATIONS = 200

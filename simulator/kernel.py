@@ -6,8 +6,8 @@ The arrays and their rows are those of `layout` (here `at`); `plant` makes them.
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
 from wetwell.simulator.drive import turned_ratio
@@ -18,9 +18,6 @@ from wetwell.simulator.telemetry.channels import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_pumps, send, silence
 from wetwell.simulator.telemetry.sensors import delayed, sense
 from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 INERTIA_STEPS = 3
 """Steps within a second in which the column of water is accelerated."""

@@ -7,8 +7,8 @@ works into the forcing, a fault works into the forcing, and the kernel knows nei
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.simulator import layout as at
 from wetwell.simulator.control import ROTATIONS
@@ -17,8 +17,6 @@ from wetwell.simulator.power import hydraulic_power_kw
 from wetwell.simulator.telemetry.channels import channels
 from wetwell.simulator.telemetry.sensors import MAX_DELAY_S, SensorParameters, followed_share, sensor_parameters
 from wetwell.simulator.wet_well import level_at_volume_m, profile_of, volume_at_level_m3
-
-Floats = npt.NDArray[np.float64]
 
 MAX_STARTS_PER_HOUR = 60
 SMALLEST_HEAD_M = 1e-6

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station, check_levels
 from wetwell.protocols.timestamps import NS_PER_S
@@ -16,9 +17,6 @@ from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFaul
 from wetwell.simulator.plant import Forcing, Plant, Record, healthy_forcing
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
 from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
-
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 class Simulation:

@@ -3,9 +3,7 @@
 The rules are those of `control` and `drive`; here they act on the arrays of `layout`.
 """
 
-import numpy as np
-import numpy.typing as npt
-
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
 from wetwell.simulator.control import (
@@ -16,9 +14,6 @@ from wetwell.simulator.control import (
     wanted_change,
 )
 from wetwell.simulator.drive import next_frequency_hz
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 
 @compiled

@@ -4,12 +4,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
-
-Floats = npt.NDArray[np.float64]
 
 SECONDS_PER_HOUR = 3600.0
 WEIR_COEFFICIENT_M05_S = 1.84

@@ -4,14 +4,12 @@ from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.baseline.model import FLOOR_SHARE, MIN_RUNS, MIN_SEGMENTS, Baseline, Curve, learn
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.runs.run import Segments
 from wetwell.detector.statistics.robust import step_variance
-
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 LEARNING_S = 6.0 * 3600.0
 DAY_S = 24.0 * 3600.0

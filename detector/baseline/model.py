@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.runs.run import SEGMENT_SAMPLES, Segments
 from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 
-Floats = npt.NDArray[np.float64]
 Curve = tuple[float, float, float]
 
 MIN_RUNS = 4

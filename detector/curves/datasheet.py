@@ -24,7 +24,7 @@ MAX_STEPS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Nominal:
+class Datasheet:
     """Datasheet curves of a station.
 
     Attributes
@@ -87,7 +87,7 @@ def duty_flows(table: Any, duty: Any) -> None:
 
     Parameters
     ----------
-    table : Nominal.table()
+    table : Datasheet.table()
     duty : (pumps,) records
         `duty_speed` is read, a share of nominal; `duty_m3h` is set. [m³/h]
     """
@@ -126,9 +126,9 @@ def duty_flows(table: Any, duty: Any) -> None:
             head_m = 0.5 * (low_m + high_m)
 
 
-def nominal_of(station: Station) -> Nominal:
+def datasheet_of(station: Station) -> Datasheet:
     """Datasheet curves in a station file."""
-    return Nominal(
+    return Datasheet(
         curves=tuple(pump.coefficients for pump in station.pump),
         frequencies_hz=tuple(pump.nominal_frequency_hz for pump in station.pump),
         static_head_m=station.rising_main.static_head_m,

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 
-Array = npt.NDArray[np.float64]
 Curve = tuple[float, float, float]
 """(c0, c1, c2) of the pump curve at nominal speed, Q in m³/h."""
 
@@ -15,8 +15,10 @@ Curve = tuple[float, float, float]
 def _distances(
     flow: Any, head: Any, speed: Any, total: Any, c0: float, c1: float, c2: float, static_m: float, friction: float
 ) -> tuple[Any, Any]:
-    nominal = flow / speed
-    return head / (speed * speed) - c0 - (c1 + c2 * nominal) * nominal, head - static_m - friction * total * total
+    reduced = flow / speed
+    return head / (speed * speed) - c0 - (
+        c1 + c2 * reduced
+    ) * reduced, head - static_m - friction * total * total
 
 
 distances = compiled(_distances)
@@ -32,7 +34,7 @@ def level_residuals(
     static_head_m: float,
     friction_h2_m5: float,
     total_flow_m3h: npt.ArrayLike | None = None,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     r"""Distance of the head from the nominal-speed pump curve and from the system curve.
 
     $$r_p = \frac{H}{N^2} - c_0 - c_1 \frac{Q}{N} - c_2 \Big(\frac{Q}{N}\Big)^2, \qquad r_s = H - H_s - k Q_{tot}^2$$

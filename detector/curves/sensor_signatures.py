@@ -1,9 +1,9 @@
 """What a wrong meter does to the residuals: it moves both at once, in a direction of its own."""
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
+
 Curve = tuple[float, float, float]
 
 

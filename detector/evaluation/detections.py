@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 
 from wetwell.detector.evaluation.scores import FAULTS, LEARNING_S, learning_end_ns, severity_column, step_s, truth_of
 from wetwell.detector.stream.run_state import WARM_UP_S
+from wetwell.protocols.arrays import Flags
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
@@ -18,8 +18,6 @@ MERGE_S = 3600.0
 """A fault that comes again within this time is the same fault. [s]"""
 ORIGINS: tuple[State, ...] = ("pump_fault", "system_fault", "sensor_fault")
 _BOTH: State = "pump_and_system_fault"
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Integers
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.recordings.recording import TRUTH_PREFIX, Recording
 from wetwell.protocols.timestamps import NS_PER_S
@@ -122,7 +123,7 @@ def _fault_probability(verdict: Verdict) -> float:
     return min(sum(verdict.probability.get(state, 0.0) for state in FAULTS), 1.0)
 
 
-def confusion(runs: Sequence[ScoredRun]) -> npt.NDArray[np.int64]:
+def confusion(runs: Sequence[ScoredRun]) -> Integers:
     """(5, 7) number of runs by true class (`CLASSES`) and told state (`CLASSES`, then `ABSTENTIONS`)."""
     told = (*CLASSES, *ABSTENTIONS)
     table = np.zeros((len(CLASSES), len(told)), dtype=np.int64)

@@ -1,7 +1,6 @@
 """From probabilities to the state that is told."""
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr
 
 from wetwell.detector.inference.observation import PUMP, SYSTEM
@@ -15,9 +14,8 @@ from wetwell.detector.inference.posterior import (
     SYSTEM_FAULT,
     Weighed,
 )
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
-
-Floats = npt.NDArray[np.float64]
 
 ALARM_PROBABILITY = 0.99
 SEPARATED_SHARE = 0.7

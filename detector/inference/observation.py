@@ -5,14 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.baseline.model import MIN_RUNS, Baseline, Curve
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction, head_sensor_direction
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median, step_variance
-
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 PUMP, SYSTEM, DRAWDOWN, POWER = range(4)
 """Components of an observation."""

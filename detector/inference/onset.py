@@ -3,9 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
-
-Floats = npt.NDArray[np.float64]
 
 CANDIDATES = 60
 

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr
 
 from wetwell.detector.baseline.model import Baseline
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.observation import DRAWDOWN, POWER, PUMP, SYSTEM, Observation
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.messages.messages import State
-
-Floats = npt.NDArray[np.float64]
 
 STATES: tuple[State, ...] = ("normal", "pump_fault", "system_fault", "pump_and_system_fault")
 FAULTS = STATES[1:]
@@ -91,9 +89,7 @@ class Weighed:
         return named | {"sensor_fault": float(p[FLOW_METER] + p[HEAD_SENSOR])}
 
 
-def _ways(
-    observation: Observation, scales: Scales, known: npt.NDArray[np.bool_]
-) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+def _ways(observation: Observation, scales: Scales, known: Flags) -> tuple[Integers, Floats, Floats]:
     """(w,) hypothesis, (w,) logarithm of its share in that, (w, 4, 4) covariance of the shift, of each way to shift.
 
     The first way of each hypothesis is the one at full scale.
@@ -129,12 +125,12 @@ def _log_sums(log_values: Floats) -> Floats:
     return log_sums
 
 
-def fault_scales(nominal: Nominal, pump: int, baseline: Baseline) -> Scales:
+def fault_scales(datasheet: Datasheet, pump: int, baseline: Baseline) -> Scales:
     """Scales for a pump (from 0)."""
-    shutoff_m = nominal.curves[pump][0]
+    shutoff_m = datasheet.curves[pump][0]
     return Scales(
         pump_m=PUMP_SHIFT_SHARE * shutoff_m,
-        system_m=SYSTEM_SHIFT_SHARE * nominal.friction_h2_m5 * baseline.total_m3h**2 + SYSTEM_SHIFT_M,
+        system_m=SYSTEM_SHIFT_SHARE * datasheet.friction_h2_m5 * baseline.total_m3h**2 + SYSTEM_SHIFT_M,
         head_m=HEAD_SENSOR_SHARE * shutoff_m,
     )
 

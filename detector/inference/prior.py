@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.inference.posterior import BOTH, FLOW_METER, HEAD_SENSOR, PUMP_FAULT, SYSTEM_FAULT
-
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 PUMP_PRIOR = 0.05
 SYSTEM_PRIOR = 0.05

@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 SEGMENT_SAMPLES = 25
 SEGMENT_S = 25.0

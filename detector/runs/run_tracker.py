@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal
-from wetwell.detector.runs.run import SEGMENT_S, SEGMENT_SAMPLES, SIGNALS, Floats, Run, Segments
+from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.runs.run import SEGMENT_S, SEGMENT_SAMPLES, SIGNALS, Run, Segments
 from wetwell.detector.statistics.robust import median
 from wetwell.detector.stream.gate import Frame
 from wetwell.detector.stream.run_state import (
@@ -19,6 +19,7 @@ from wetwell.detector.stream.run_state import (
     note_running,
     steady_rows,
 )
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.timestamps import NS_PER_S
 
 
@@ -32,10 +33,10 @@ class RunTracker:
     Memory: 80 bytes a steady sample of the open runs, at most `MAX_RUN_S` of each.
     """
 
-    def __init__(self, nominal: Nominal) -> None:
-        self._nominal = nominal
-        self.table = nominal.table()
-        self.pumps = new_pumps(nominal)
+    def __init__(self, datasheet: Datasheet) -> None:
+        self._datasheet = datasheet
+        self.table = datasheet.table()
+        self.pumps = new_pumps(datasheet)
         self.pace = new_pace()
         self.rows = np.zeros((LEAST_ROOM, COLUMNS))
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from wetwell.detector.baseline.learning import Learning
 from wetwell.detector.baseline.model import Baseline, Model
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.observation import Check
 from wetwell.detector.inference.prior import PumpBelief, SystemBelief
 from wetwell.detector.pump_judge import Knowledge, PumpRecord
@@ -51,19 +51,19 @@ class SnapshotError(WetwellError):
     """A snapshot is damaged, of another format, or of another station."""
 
 
-def encode_snapshot(station: str, nominal: Nominal, state: Mapping[str, Any]) -> bytes:
+def encode_snapshot(station: str, datasheet: Datasheet, state: Mapping[str, Any]) -> bytes:
     """Bytes of a detector's state; the datasheet is not kept, only its fingerprint."""
     text = json.dumps(_encoded(dict(state)), separators=(",", ":"), allow_nan=False)
     header = {
         "schema": SCHEMA,
         "station": station,
-        "datasheet": _fingerprint(nominal),
+        "datasheet": _fingerprint(datasheet),
         "sha256": hashlib.sha256(text.encode()).hexdigest(),
     }
     return f"{json.dumps(header)}\n{text}\n".encode()
 
 
-def decode_snapshot(data: bytes, station: str, nominal: Nominal) -> dict[str, Any]:
+def decode_snapshot(data: bytes, station: str, datasheet: Datasheet) -> dict[str, Any]:
     """State in a snapshot; one of an older form is taken over, see `UPGRADES`.
 
     Raises
@@ -85,20 +85,21 @@ def decode_snapshot(data: bytes, station: str, nominal: Nominal) -> dict[str, An
         raise SnapshotError(f"snapshot of station '{station}': damaged, its checksum differs")
     if header.get("station") != station:
         raise SnapshotError(f"snapshot of station '{header.get('station')}': this is station '{station}'")
-    if header.get("datasheet") != _fingerprint(nominal):
+    if header.get("datasheet") != _fingerprint(datasheet):
         raise SnapshotError(f"snapshot of station '{station}': the curves in the station file have changed since")
     try:
         encoded = json.loads(text)
         while form < FORM:
-            encoded, form = UPGRADES[form](encoded, nominal), form + 1
-        state: dict[str, Any] = _decoded(encoded, nominal)
+            encoded, form = UPGRADES[form](encoded, datasheet), form + 1
+        state: dict[str, Any] = _decoded(encoded, datasheet)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
     return state
 
 
-def _fingerprint(nominal: Nominal) -> str:
-    return hashlib.sha256(repr(nominal).encode()).hexdigest()
+def _fingerprint(datasheet: Datasheet) -> str:
+    """Hash of a datasheet, under the name that the class bore when form 2 was made."""
+    return hashlib.sha256(repr(datasheet).replace("Datasheet(", "Nominal(", 1).encode()).hexdigest()
 
 
 def _attributes(value: object) -> list[str]:
@@ -141,49 +142,49 @@ _ENCODERS: tuple[tuple[type | UnionType, Callable[[Any], Any]], ...] = (
     (deque, lambda value: {"deque": [value.maxlen, [_encoded(item) for item in value]]}),
     (Counter, lambda value: {"counter": _encoded_pairs(value)}),
     (dict, lambda value: {"dict": _encoded_pairs(value)}),
-    (Nominal, lambda _: {"nominal": None}),
+    (Datasheet, lambda _: {"nominal": None}),
 )
 
 
-def _decoded(value: Any, nominal: Nominal) -> Any:
+def _decoded(value: Any, datasheet: Datasheet) -> Any:
     if isinstance(value, list):
-        return [_decoded(item, nominal) for item in value]
+        return [_decoded(item, datasheet) for item in value]
     if not isinstance(value, dict):
         return value
     ((kind, content),) = value.items()
-    return _DECODERS[kind](content, nominal)
+    return _DECODERS[kind](content, datasheet)
 
 
-def _array(content: list[Any], _nominal: Nominal) -> Any:
+def _array(content: list[Any], _datasheet: Datasheet) -> Any:
     dtype, shape, order, data = content
     dtype = dtype if isinstance(dtype, str) else [(name, kind) for name, kind in dtype]
     return np.frombuffer(base64.b64decode(data), dtype=dtype).reshape(shape, order=order).copy(order)
 
 
-def _object(content: list[Any], nominal: Nominal) -> Any:
+def _object(content: list[Any], datasheet: Datasheet) -> Any:
     name, fields = content
     lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys()
     if lacking:
         raise ValueError(f"a {name} without {', '.join(sorted(lacking))}")
     made: Any = object.__new__(_CLASSES[name])
     for field, value in fields.items():
-        object.__setattr__(made, field, _decoded(value, nominal))
+        object.__setattr__(made, field, _decoded(value, datasheet))
     return made
 
 
-def _pairs(content: list[Any], nominal: Nominal) -> dict[Any, Any]:
-    return {_decoded(key, nominal): _decoded(item, nominal) for key, item in content}
+def _pairs(content: list[Any], datasheet: Datasheet) -> dict[Any, Any]:
+    return {_decoded(key, datasheet): _decoded(item, datasheet) for key, item in content}
 
 
-_DECODERS: Mapping[str, Callable[[Any, Nominal], Any]] = {
+_DECODERS: Mapping[str, Callable[[Any, Datasheet], Any]] = {
     "float": lambda content, _: float(content),
     "array": _array,
-    "tuple": lambda content, nominal: tuple(_decoded(content, nominal)),
-    "frozenset": lambda content, nominal: frozenset(_decoded(content, nominal)),
-    "set": lambda content, nominal: set(_decoded(content, nominal)),
-    "deque": lambda content, nominal: deque(_decoded(content[1], nominal), maxlen=content[0]),
-    "counter": lambda content, nominal: Counter(_pairs(content, nominal)),
+    "tuple": lambda content, datasheet: tuple(_decoded(content, datasheet)),
+    "frozenset": lambda content, datasheet: frozenset(_decoded(content, datasheet)),
+    "set": lambda content, datasheet: set(_decoded(content, datasheet)),
+    "deque": lambda content, datasheet: deque(_decoded(content[1], datasheet), maxlen=content[0]),
+    "counter": lambda content, datasheet: Counter(_pairs(content, datasheet)),
     "dict": _pairs,
-    "nominal": lambda _, nominal: nominal,
+    "nominal": lambda _, datasheet: datasheet,
     "object": _object,
 }

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.statistics.cusum import Cusum
 from wetwell.detector.stream.gate import COUNTS, STATE
 from wetwell.detector.stream.missing_signals import BlindWatch
@@ -18,14 +18,14 @@ MOVED = ("run_s", "stuck", "rolling")
 """Of a pump in form 1: kept in arrays now, where it goes on."""
 
 
-def from_1(encoded: Any, nominal: Nominal) -> Any:
+def from_1(encoded: Any, datasheet: Datasheet) -> Any:
     """Form 2 of a state of form 1, which kept objects where there are arrays now.
 
     Open runs, the drawdown, the rolling tests and the look within a run begin anew. Arrays that are not set here are
     as before the first sample.
     """
     state = dict(encoded["dict"])
-    gate, pumps, meters = np.zeros(1, dtype=STATE), new_pumps(nominal), new_meters(nominal.pumps)
+    gate, pumps, meters = np.zeros(1, dtype=STATE), new_pumps(datasheet), new_meters(datasheet.pumps)
     _take_gate(gate, _fields(state["_gate"]), state["_seen_s"])
     _take_meters(meters, _fields(state["_repeats"]))
     for number, fields in enumerate(map(_fields, state["_pumps"])):
@@ -43,7 +43,7 @@ def from_1(encoded: Any, nominal: Nominal) -> Any:
     return {"dict": [["arrays", {"dict": arrays}], ["system", state["_system"]], ["pumps", state["_pumps"]]]}
 
 
-UPGRADES: Mapping[int, Callable[[Any, Nominal], Any]] = {1: from_1}
+UPGRADES: Mapping[int, Callable[[Any, Datasheet], Any]] = {1: from_1}
 """By the form that each begins with."""
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.curves.residuals import Array
 from wetwell.detector.statistics.f_test import FTest, compare
+from wetwell.protocols.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +18,7 @@ class CurveFTests:
     system: FTest
 
 
-def _arrays(**values: npt.ArrayLike) -> list[Array]:
+def _arrays(**values: npt.ArrayLike) -> list[Floats]:
     """Columns as finite float arrays of one length."""
     arrays = [np.asarray(value, dtype=float) for value in values.values()]
     for name, array in zip(values, arrays, strict=True):
@@ -29,7 +29,7 @@ def _arrays(**values: npt.ArrayLike) -> list[Array]:
     return arrays
 
 
-def _centred(values: Array) -> Array:
+def _centred(values: Floats) -> Floats:
     """Values with mean 0 and deviation 1; all 0 if they differ by no more than rounding."""
     mean = float(values.sum()) / max(values.size, 1)
     deviation = values - mean
@@ -37,7 +37,7 @@ def _centred(values: Array) -> Array:
     return deviation / scale if scale > 1e-13 * abs(mean) else np.zeros_like(values)
 
 
-def _drift_test(u: Array, variable: Array, response: Array, degree: int) -> FTest:
+def _drift_test(u: Floats, variable: Floats, response: Floats, degree: int) -> FTest:
     """Test a polynomial in the variable against the same with coefficients linear in the centred time u."""
     x = _centred(variable)
     columns = np.empty((2 * degree + 3, u.size))

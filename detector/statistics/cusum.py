@@ -3,11 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
-
-Floats = npt.NDArray[np.float64]
 
 DEAD_BAND = 0.75
 THRESHOLD = 5.0

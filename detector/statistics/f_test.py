@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.curves.residuals import Array
 from wetwell.detector.statistics.f_distribution import log_f_survival
+from wetwell.protocols.arrays import Floats
 
 RANK_TOLERANCE: Final = 1e-11
 """A column counts as a parameter if this share of its length, or more, is independent of the columns before it."""
@@ -32,10 +32,10 @@ class FTest:
     samples: int
 
 
-def _triangle(table: Array, null_columns: int) -> tuple[Array, int]:
+def _triangle(table: Floats, null_columns: int) -> tuple[Floats, int]:
     """Triangular factor of [null, extra, response] without the dependent columns, and how many null ones are left."""
     while True:
-        triangle: Array = np.asarray(np.linalg.qr(table, mode="r"))  # NumPy's stubs say (Q, R) for every mode
+        triangle: Floats = np.asarray(np.linalg.qr(table, mode="r"))  # NumPy's stubs say (Q, R) for every mode
         squares = triangle * triangle
         dependent = squares.diagonal()[:-1] <= RANK_TOLERANCE**2 * squares.sum(axis=0)[:-1]
         if not dependent.any():
@@ -45,7 +45,7 @@ def _triangle(table: Array, null_columns: int) -> tuple[Array, int]:
         null_columns -= first < null_columns
 
 
-def compare(table: Array, null_columns: int) -> FTest:
+def compare(table: Floats, null_columns: int) -> FTest:
     """F-test on the columns [null, extra, response] of a finite (m, p + 1) table, the first of them the null ones.
 
     Raises

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 NORMAL_MEDIAN = 1.4826
 """Standard deviation of normal numbers over the median of their size."""

@@ -13,15 +13,12 @@ sample comes or goes that lies further than `REACH` from the origin: a spike lea
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.statistics.curve_drift import CurveFTests, pump_curve_f_test, system_curve_f_test
 from wetwell.detector.statistics.f_distribution import log_f_survival
 from wetwell.detector.statistics.f_test import FTest
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 LEAST_SAMPLES = 7
 REACH = 8.0

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.curves.residuals import Array, Curve
+from wetwell.detector.curves.residuals import Curve
+from wetwell.protocols.arrays import Floats
 
 
-def normalise(flow_m3h: npt.ArrayLike, head_m: npt.ArrayLike, speed_ratio: npt.ArrayLike) -> tuple[Array, Array]:
+def normalise(flow_m3h: npt.ArrayLike, head_m: npt.ArrayLike, speed_ratio: npt.ArrayLike) -> tuple[Floats, Floats]:
     r"""Flow and head of the same duty at nominal speed.
 
     $$Q^\star = Q / N, \qquad H^\star = H / N^2, \qquad N = f / f_n$$
@@ -29,7 +30,7 @@ def normalise(flow_m3h: npt.ArrayLike, head_m: npt.ArrayLike, speed_ratio: npt.A
     return np.asarray(flow_m3h, dtype=float) / speed, np.asarray(head_m, dtype=float) / (speed * speed)
 
 
-def segment_means(values: npt.ArrayLike, samples_per_segment: int) -> Array:
+def segment_means(values: npt.ArrayLike, samples_per_segment: int) -> Floats:
     """Means of consecutive segments, in the unit of the values.
 
     Parameters
@@ -63,7 +64,7 @@ def segment_means(values: npt.ArrayLike, samples_per_segment: int) -> Array:
     return np.asarray(array[: segments * samples_per_segment].reshape(segments, samples_per_segment).mean(axis=1))
 
 
-def pump_slope(flow_m3h: npt.ArrayLike, curve: Curve) -> Array:
+def pump_slope(flow_m3h: npt.ArrayLike, curve: Curve) -> Floats:
     r"""Slope of the nominal-speed pump curve, $m_p = c_1 + 2 c_2 Q^\star$. [m/(m³/h)].
 
     Examples
@@ -74,7 +75,7 @@ def pump_slope(flow_m3h: npt.ArrayLike, curve: Curve) -> Array:
     return np.asarray(curve[1] + 2.0 * curve[2] * np.asarray(flow_m3h, dtype=float))
 
 
-def system_slope(flow_m3h: npt.ArrayLike, friction_h2_m5: float) -> Array:
+def system_slope(flow_m3h: npt.ArrayLike, friction_h2_m5: float) -> Floats:
     r"""Slope of the system curve, $m_s = 2 k Q$. [m/(m³/h)].
 
     Examples
@@ -94,7 +95,7 @@ def tangent_residuals(
     friction_h2_m5: float,
     samples_per_segment: int = 1,
     total_flow_m3h: npt.ArrayLike | None = None,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     r"""Part of each move of the duty point that leaves the pump curve, and part that leaves the system curve.
 
     $$\psi_p = \Delta H^\star - m_p(\bar{Q}^\star)\, \Delta Q^\star, \qquad

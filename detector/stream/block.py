@@ -4,13 +4,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 LEVEL, INFLOW, FIRST_PUMP = 0, 1, 2
 """Values of a row: the two of the station, then five a pump."""

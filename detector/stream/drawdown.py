@@ -17,10 +17,9 @@ import numpy.typing as npt
 from wetwell.detector.stream.block import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.detector.stream.gate import seconds_between
 from wetwell.detector.stream.run_state import is_break
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 SETTLED_S = 15.0
 SETTLED_NS = int(SETTLED_S * NS_PER_S)

@@ -5,9 +5,8 @@ from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.stream.block import (
     FIRST_PUMP,
     FLOW,
@@ -21,11 +20,10 @@ from wetwell.detector.stream.block import (
     Block,
     LiveBlock,
 )
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
@@ -109,11 +107,11 @@ class Gate:
     Memory: constant.
     """
 
-    def __init__(self, nominal: Nominal) -> None:
+    def __init__(self, datasheet: Datasheet) -> None:
         self.state = np.zeros(1, dtype=STATE)
-        self.ranges = np.array([_ranges(nominal, pump) for pump in range(nominal.pumps)], dtype=RANGES)
-        self.frame = np.full(FIRST_PUMP + PUMP_VALUES * nominal.pumps, math.nan)
-        self._live = LiveBlock(nominal.pumps)
+        self.ranges = np.array([_ranges(datasheet, pump) for pump in range(datasheet.pumps)], dtype=RANGES)
+        self.frame = np.full(FIRST_PUMP + PUMP_VALUES * datasheet.pumps, math.nan)
+        self._live = LiveBlock(datasheet.pumps)
 
     @property
     def counts(self) -> Counter[str]:
@@ -141,16 +139,16 @@ class Gate:
         )
 
 
-def _ranges(nominal: Nominal, pump: int) -> tuple[float, ...]:
+def _ranges(datasheet: Datasheet, pump: int) -> tuple[float, ...]:
     """Lowest and highest frequency, flow and head that a pump can show."""
-    runout_m3h = nominal.runout_flow_m3h(pump)
+    runout_m3h = datasheet.runout_flow_m3h(pump)
     return (
         -0.5,
-        2.0 * nominal.frequencies_hz[pump],
+        2.0 * datasheet.frequencies_hz[pump],
         -0.1 * runout_m3h,
         2.0 * runout_m3h,
         -10.0,
-        3.0 * nominal.curves[pump][0],
+        3.0 * datasheet.curves[pump][0],
     )
 
 

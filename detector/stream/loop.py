@@ -9,7 +9,6 @@ go on from there.
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.curves.datasheet import Table
 from wetwell.detector.statistics.rolling_f_test import FIGURES, LEAST_SAMPLES, LOG_P, solve, take
@@ -18,11 +17,9 @@ from wetwell.detector.stream.gate import let_through
 from wetwell.detector.stream.missing_signals import gather
 from wetwell.detector.stream.run_state import collect, note_gap, note_running, steady_rows
 from wetwell.detector.stream.stuck_sensors import watch_meters
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 DONE, FULL, ENDED, BLIND, GATHERED, LOOK = range(6)
 """Why the loop stops: no sample is left, rows are full, runs have ended, one is blind, a segment is full: of a pump

@@ -14,10 +14,9 @@ from wetwell.detector.stream.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POW
 from wetwell.detector.stream.gate import seconds_between
 from wetwell.detector.stream.run_state import WARM_UP_S
 from wetwell.detector.verdict.maintenance import advice
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 WATCHED = ("flow_m3h", "head_m", "power_kw")
 REFERENCE_SEGMENTS = 12

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import Nominal, Table, duty_flows
+from wetwell.detector.curves.datasheet import Datasheet, Table, duty_flows
 from wetwell.detector.curves.residuals import distances
-from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, SIGNALS, Floats
+from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, SIGNALS
 from wetwell.detector.stream.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -72,9 +73,9 @@ LEAST_ROOM = 256
 SEGMENT_MEANS = 8
 
 
-def new_pumps(nominal: Nominal) -> npt.NDArray[np.void]:
+def new_pumps(datasheet: Datasheet) -> npt.NDArray[np.void]:
     """State of the pumps of a station before the first sample."""
-    pumps = np.zeros(nominal.pumps, dtype=PUMP)
+    pumps = np.zeros(datasheet.pumps, dtype=PUMP)
     pumps["speed_ratio"] = pumps["log_ratio"] = math.nan
     pumps["is_learning"] = 1
     return pumps

@@ -10,10 +10,9 @@ import numpy.typing as npt
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median
 from wetwell.detector.stream.block import FIRST_PUMP, FLOW, LEVEL, PUMP_VALUES
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 STUCK_NS = 60 * NS_PER_S
 STUCK_FACTOR = 5.0

@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal
-from wetwell.detector.curves.residuals import Array
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.observation import COMPONENTS, Observation
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.bootstrap import block_bootstrap_interval
 from wetwell.detector.statistics.curve_drift import pump_curve_f_test, system_curve_f_test
 from wetwell.detector.statistics.f_test import FTest
 from wetwell.detector.statistics.tangent import attribution_index, tangent_residuals
+from wetwell.protocols.arrays import Floats
 
 MIN_SAMPLES = 10
 RESAMPLES = 500
@@ -19,7 +19,7 @@ CONFIDENCE = 0.95
 BLOCK_SEGMENTS = 2
 
 
-def run_evidence(run: Run, nominal: Nominal, rng: np.random.Generator) -> dict[str, Any]:
+def run_evidence(run: Run, datasheet: Datasheet, rng: np.random.Generator) -> dict[str, Any]:
     """Figures of both methods of the paper on a run by itself.
 
     `f_test`: drift of either curve within the run. `tangent`: the attribution index of the steps between its
@@ -36,8 +36,8 @@ def run_evidence(run: Run, nominal: Nominal, rng: np.random.Generator) -> dict[s
             run.flow_m3h,
             run.head_m,
             run.speed_ratio,
-            curve=nominal.curves[run.pump],
-            friction_h2_m5=nominal.friction_h2_m5,
+            curve=datasheet.curves[run.pump],
+            friction_h2_m5=datasheet.friction_h2_m5,
             samples_per_segment=run.segments.samples,
             total_flow_m3h=run.total_flow_m3h,
         )
@@ -45,7 +45,7 @@ def run_evidence(run: Run, nominal: Nominal, rng: np.random.Generator) -> dict[s
     return evidence
 
 
-def index_figures(pump_m: Array, system_m: Array, rng: np.random.Generator) -> dict[str, Any]:
+def index_figures(pump_m: Floats, system_m: Floats, rng: np.random.Generator) -> dict[str, Any]:
     """Attribution index of residuals and its 95 % interval, as a message carries it."""
     low, high = block_bootstrap_interval(
         pump_m,

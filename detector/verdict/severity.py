@@ -4,11 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.baseline.model import Curve
-
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 SIGMAS_95 = 1.96
 

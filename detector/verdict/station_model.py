@@ -4,17 +4,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.baseline.model import Baseline
 from wetwell.detector.baseline.model import Model as ResidualModel
-from wetwell.detector.curves.datasheet import Nominal, nominal_of
+from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.verdict.severity import SIGMAS_95
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.messages.model import Curve, Model, PumpModel
 from wetwell.protocols.station.station_file import Station
-
-Floats = npt.NDArray[np.float64]
 
 POINTS = 31
 FLOW_SHARE = 0.98
@@ -26,7 +24,7 @@ class StationModel:
 
     def __init__(self, station: Station) -> None:
         self._station = station
-        self._nominal = nominal_of(station)
+        self._datasheet = datasheet_of(station)
         self._known: dict[int, tuple[Baseline | None, Verdict | None, PumpModel]] = {}
 
     def message(self, baselines: Sequence[Baseline | None], told: Mapping[int, Verdict], time_ns: int) -> Model:
@@ -44,11 +42,11 @@ class StationModel:
         return Model(
             time=time_ns,
             station=self._station.name,
-            nominal_frequency_hz=self._nominal.frequencies_hz[0],
+            nominal_frequency_hz=self._datasheet.frequencies_hz[0],
             start_levels_m=self._station.control.start_levels_m,
             stop_levels_m=self._station.control.stop_levels_m,
-            floor_area_m2=self._nominal.area_m2,
-            is_common_header=self._nominal.is_common_header,
+            floor_area_m2=self._datasheet.area_m2,
+            is_common_header=self._datasheet.is_common_header,
             pumps=tuple(self._pump(index, baseline, told.get(index + 1)) for index, baseline in enumerate(baselines)),
         )
 
@@ -56,12 +54,12 @@ class StationModel:
         known = self._known.get(index)
         if known is not None and known[0] is baseline and known[1] is verdict:
             return known[2]
-        model = pump_model(index, self._nominal, baseline, {} if verdict is None else verdict.evidence)
+        model = pump_model(index, self._datasheet, baseline, {} if verdict is None else verdict.evidence)
         self._known[index] = baseline, verdict, model
         return model
 
 
-def pump_model(index: int, nominal: Nominal, baseline: Baseline | None, evidence: Mapping[str, Any]) -> PumpModel:
+def pump_model(index: int, datasheet: Datasheet, baseline: Baseline | None, evidence: Mapping[str, Any]) -> PumpModel:
     r"""Curves of one pump (from 0) and of its main.
 
     Learnt: the configured curve plus the learnt residual at the mean level, with the 95 % band of the mean of a
@@ -76,14 +74,14 @@ def pump_model(index: int, nominal: Nominal, baseline: Baseline | None, evidence
     --------
     >>> from wetwell.protocols.station.station_file import Pump, Station, Sump
     >>> station = Station(name="s", sump=Sump(area_m2=8.0), pump=(Pump(curve=(36.0, 0.0, -2.5e-4)),))
-    >>> model = pump_model(0, nominal_of(station), None, {})
+    >>> model = pump_model(0, datasheet_of(station), None, {})
     >>> model.configured_pump.head_m[0], model.learnt_pump, model.now_pump
     (36.0, None, None)
     """
-    c0, c1, c2 = nominal.curves[index]
-    flow_m3h = np.linspace(0.0, FLOW_SHARE * nominal.runout_flow_m3h(index), POINTS)
+    c0, c1, c2 = datasheet.curves[index]
+    flow_m3h = np.linspace(0.0, FLOW_SHARE * datasheet.runout_flow_m3h(index), POINTS)
     pump_m = c0 + c1 * flow_m3h + c2 * flow_m3h**2
-    system_m = nominal.static_head_m + nominal.friction_h2_m5 * flow_m3h**2
+    system_m = datasheet.static_head_m + datasheet.friction_h2_m5 * flow_m3h**2
     configured = {"configured_pump": _curve(flow_m3h, pump_m), "configured_system": _curve(flow_m3h, system_m)}
     if baseline is None:
         return PumpModel(pump=index + 1, **configured)

@@ -10,7 +10,7 @@ MOST_HELD = 10_000
 """Messages of one publisher that wait for one that is missing."""
 
 
-class Line:
+class SourceStream:
     """One life of one publisher: how far its messages have been passed on, and those that wait for earlier ones."""
 
     __slots__ = ("end", "held", "is_asked", "is_begun", "key", "next", "source", "tries")
@@ -30,7 +30,7 @@ class Line:
         return self.next < self.end
 
 
-class Follower:
+class Sequencer:
     """Puts what comes in order. It knows no clock and no network: who uses it asks for what is `wanted`.
 
     Characteristics: buffered: what waits for a message that is missing, up to `MOST_HELD` of each publisher · when
@@ -53,10 +53,10 @@ class Follower:
 
     def __init__(self, history: int) -> None:
         self.ready: list[tuple[str, bytes]] = []
-        self.wanted: dict[bytes, Line] = {}
+        self.wanted: dict[bytes, SourceStream] = {}
         self.lost = 0
         self._history = history
-        self._lines: dict[bytes, Line] = {}
+        self._lines: dict[bytes, SourceStream] = {}
         self._sources: dict[str, deque[bytes]] = {}
 
     def take(self, key: str, mark: bytes | None, payload: bytes) -> None:
@@ -93,23 +93,23 @@ class Follower:
                 line.held[number] = payload
         self._go_on(line)
 
-    def is_replaced(self, line: Line) -> bool:
+    def is_replaced(self, line: SourceStream) -> bool:
         """Whether a later life of its publisher was heard: then nobody keeps the messages of this one any more."""
         return self._sources[line.key][-1] != line.source
 
-    def give_up(self, line: Line) -> None:
+    def give_up(self, line: SourceStream) -> None:
         """Go on without the messages that are missing now."""
         self._skip(line, min(line.held, default=line.end))
         self._go_on(line)
 
-    def _reaches(self, key: str, source: bytes, end: int) -> Line:
+    def _reaches(self, key: str, source: bytes, end: int) -> SourceStream:
         """The line of a publisher that has sent messages up to a number."""
         line = self._lines.get(source) or self._begin(key, source, max(0, end - self._history))
         line.end = max(line.end, end)
         self._go_on(line)
         return line
 
-    def _begin(self, key: str, source: bytes, begin: int) -> Line:
+    def _begin(self, key: str, source: bytes, begin: int) -> SourceStream:
         sources = self._sources.setdefault(key, deque())
         if len(sources) == LINES:
             oldest = sources.popleft()
@@ -117,10 +117,10 @@ class Follower:
             line = self._lines.pop(oldest)
             self._skip(line, line.end)
         sources.append(source)
-        line = self._lines[source] = Line(key, source, begin)
+        line = self._lines[source] = SourceStream(key, source, begin)
         return line
 
-    def _go_on(self, line: Line) -> None:
+    def _go_on(self, line: SourceStream) -> None:
         """Pass on what is complete; want what is not."""
         held = line.held
         while line.next in held:
@@ -134,7 +134,7 @@ class Follower:
         elif not line.is_asked:
             self.wanted[line.source] = line
 
-    def _skip(self, line: Line, to: int) -> None:
+    def _skip(self, line: SourceStream, to: int) -> None:
         """Pass on what is there before a number, and go on at it."""
         if to <= line.next:
             return

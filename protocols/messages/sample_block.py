@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, Self, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import Message, Number, PumpReading, Quality, Sample, Stamp
 
 T = TypeVar("T")
@@ -102,7 +102,7 @@ class SampleBlock(Message):
             for seq, time, level_m, inflow_m3h, *values in zip(self.seq, self.time, *columns, strict=True)
         ]
 
-    def values(self, pumps: int | None = None) -> npt.NDArray[np.float64]:
+    def values(self, pumps: int | None = None) -> Floats:
         """(n, 2 + 5 pumps) level, inflow, then frequency, flow, head, power and running of each pump; NaN: no value.
 
         Parameters

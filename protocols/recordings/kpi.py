@@ -10,13 +10,10 @@ $$E = \sum_i P_i\, \Delta t_i, \qquad V = \sum_i Q_i\, \Delta t_i, \qquad e = E 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 MIN_GAP_S = 10.0
 GAP_STEPS = 3.0
@@ -218,7 +215,7 @@ def _running(recording: Recording, pump: int) -> Floats:
     return np.where(np.isnan(state), np.nan, state > 0.0)
 
 
-def _starts(running: Floats) -> npt.NDArray[np.int64]:
+def _starts(running: Floats) -> Integers:
     """Rows in which a pump is first seen to run after it was last seen to stand."""
     known = np.flatnonzero(~np.isnan(running))
     return known[1:][np.diff(running[known]) > 0.0]

@@ -22,13 +22,12 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.messages.readings import PumpRow, Row
 from wetwell.protocols.timestamps import from_iso, to_iso_array
-
-Floats = npt.NDArray[np.float64]
 
 STATION_COLUMNS = ("level_m", "inflow_m3h")
 PUMP_QUANTITIES = ("frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
@@ -53,7 +52,7 @@ class Recording:
         Columns of the file that are none of these.
     """
 
-    time_ns: npt.NDArray[np.int64]
+    time_ns: Integers
     columns: Mapping[str, Floats]
     truth: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
     ignored: tuple[str, ...] = ()
@@ -207,13 +206,13 @@ def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
     return values
 
 
-def _stamps(column: pa.ChunkedArray, path: Path) -> npt.NDArray[np.int64]:
+def _stamps(column: pa.ChunkedArray, path: Path) -> Integers:
     if pa.types.is_timestamp(column.type):
         if column.null_count:
             row = int(np.argmax(column.is_null().to_numpy())) + 1
             raise RecordingError(f"{path}: column 'time', row {row}: is empty")
         try:
-            stamps: npt.NDArray[np.int64] = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
+            stamps: Integers = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
         except pa.ArrowInvalid as error:
             raise RecordingError(f"{path}: column 'time': {error}") from error
         return stamps
@@ -260,7 +259,7 @@ def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
     """
     suffix = _suffix(path)
     try:
-        with whole_file(path) as file, contextlib.ExitStack() as stack:
+        with atomic_file(path) as file, contextlib.ExitStack() as stack:
             write = _block_writer(file, suffix, stack)
             yield lambda block: write(_table(block, suffix))
     except pa.ArrowException as error:

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
+
+from wetwell.protocols.arrays import Floats
 
 
 def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
@@ -43,7 +44,7 @@ def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float,
     scale_m3h = float(flow_m3h.max())
     reduced = flow_m3h / scale_m3h
     design = np.column_stack([np.ones_like(reduced), reduced, reduced**2])
-    solution: npt.NDArray[np.float64] = lsq_linear(
+    solution: Floats = lsq_linear(
         design, head_m, bounds=([0.0, -np.inf, -np.inf], [np.inf, 0.0, 0.0]), method="bvls"
     ).x
     return float(solution[0]), float(solution[1]) / scale_m3h, float(solution[2]) / scale_m3h**2

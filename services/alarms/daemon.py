@@ -18,7 +18,7 @@ from wetwell.protocols.bus.keys import (
     verdict_key,
 )
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
@@ -55,14 +55,14 @@ async def serve_alarms(settings: Settings, stations: Sequence[Station]) -> None:
 
 async def _run(settings: Settings, stations: Sequence[Station], stack: contextlib.AsyncExitStack) -> None:
     bus = stack.enter_context(await connect(settings))
-    keeper = AlarmKeeper(bus, settings.alarms, stations, clocks)
+    keeper = AlarmService(bus, settings.alarms, stations, clocks)
     stack.callback(keeper.save)
     if settings.alarms.state_dir is None:
         log.info("alarms.state_dir is not set: acts are only logged, and the state ends with the process")
     await keep(bus, keeper, settings.health.period_s)
 
 
-async def keep(bus: Bus, keeper: AlarmKeeper, health_period_s: float) -> None:
+async def keep(bus: Bus, keeper: AlarmService, health_period_s: float) -> None:
     """Let a keeper work on a bus for ever."""
     samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
     sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
@@ -96,7 +96,7 @@ def clocks() -> Now:
     return Now(now_ns(), asyncio.get_running_loop().time())
 
 
-async def _feed(subscription: Subscription[T], take: Callable[[T], None], keeper: AlarmKeeper) -> None:
+async def _feed(subscription: Subscription[T], take: Callable[[T], None], keeper: AlarmService) -> None:
     while True:
         for message in await subscription.receive():
             take(message)
@@ -104,7 +104,7 @@ async def _feed(subscription: Subscription[T], take: Callable[[T], None], keeper
         await asyncio.sleep(0)  # let acts in between batches
 
 
-async def _look(keeper: AlarmKeeper) -> None:
+async def _look(keeper: AlarmService) -> None:
     saved_s = 0.0
     async for elapsed_s in ticks(LOOK_S, asyncio.Event()):
         keeper.look()

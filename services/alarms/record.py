@@ -6,14 +6,14 @@ from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.delay import Delay
 from wetwell.services.alarms.rules import Rule, RuleName, alarm_id
-from wetwell.services.alarms.status import Standing, with_condition
+from wetwell.services.alarms.status import AlarmStatus, with_condition
 
 CHANGES = 100
 """Changes of the condition within an hour that are remembered at most."""
 HOUR_NS = 3600 * NS_PER_S
 
 
-class Entry(BaseModel):
+class AlarmRecord(BaseModel):
     """An alarm: how it stands, its delays, its words, and when its condition changed within the last hour."""
 
     model_config = ConfigDict(extra="forbid")
@@ -21,7 +21,7 @@ class Entry(BaseModel):
     station: str
     rule: RuleName
     pump: int | None = None
-    standing: Standing = Standing()
+    standing: AlarmStatus = AlarmStatus()
     delay: Delay = Field(default_factory=Delay)
     text: str = ""
     advice: str = ""

@@ -7,9 +7,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
 from wetwell.services.alarms.rates import AlarmRates
-from wetwell.services.alarms.record import Entry
+from wetwell.services.alarms.record import AlarmRecord
 from wetwell.services.alarms.rules import RULES, Rule, RuleName, alarm_id, parse_alarm_id
-from wetwell.services.alarms.status import ActRefusedError, Standing, back, is_shelf_over, with_act
+from wetwell.services.alarms.status import ActRefusedError, AlarmStatus, back, is_shelf_over, with_act
 
 ANSWERS = 200
 """Acts that are remembered with their answers, so that one that is asked again is not carried out twice."""
@@ -23,19 +23,19 @@ class BookState(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    entries: list[Entry] = Field(default_factory=list)
+    entries: list[AlarmRecord] = Field(default_factory=list)
     answers: list[AlarmAnswer] = Field(default_factory=list)
     calls_ns: list[int] = Field(default_factory=list)
     is_flood: bool = False
 
 
-class AlarmBook:
+class AlarmRegistry:
     """Alarms by station and name. Each change is also put into `changed`, which who publishes it empties."""
 
     def __init__(self, rules: Mapping[RuleName, Rule] | None = None) -> None:
         self.rules = RULES if rules is None else rules
         self.changed: list[Alarm] = []
-        self.entries: dict[tuple[str, str], Entry] = {}
+        self.entries: dict[tuple[str, str], AlarmRecord] = {}
         self.rates = AlarmRates()
         self._answers: OrderedDict[str, AlarmAnswer] = OrderedDict()
         self._pending: set[tuple[str, str]] = set()
@@ -73,7 +73,7 @@ class AlarmBook:
         if entry is None:
             if not wanted:
                 return
-            entry = self.entries[name] = Entry(station=station, rule=rule, pump=pump)
+            entry = self.entries[name] = AlarmRecord(station=station, rule=rule, pump=pump)
         if wanted and not entry.delay.is_active:
             entry.text, entry.advice = text, advice
         if entry.observe(wanted, time_ns, table):
@@ -100,7 +100,7 @@ class AlarmBook:
         """The answer that an act with this id got before."""
         return self._answers.get(act.id)
 
-    def after(self, act: AlarmAct, now_ns: int) -> tuple[Entry, Standing]:
+    def after(self, act: AlarmAct, now_ns: int) -> tuple[AlarmRecord, AlarmStatus]:
         """The alarm that an act is for and how it would stand after it; nothing is changed.
 
         Raises
@@ -114,10 +114,12 @@ class AlarmBook:
                 rule, pump = parse_alarm_id(act.alarm)
             except ValueError as error:
                 raise ActRefusedError(str(error)) from error
-            entry = Entry(station=act.station, rule=rule, pump=pump)
+            entry = AlarmRecord(station=act.station, rule=rule, pump=pump)
         return entry, with_act(entry.standing, act, now_ns)
 
-    def carry_out(self, act: AlarmAct, entry: Entry, standing: Standing, time_ns: int, now_ns: int) -> AlarmAnswer:
+    def carry_out(
+        self, act: AlarmAct, entry: AlarmRecord, standing: AlarmStatus, time_ns: int, now_ns: int
+    ) -> AlarmAnswer:
         """Let an alarm stand as `after` has said, and answer the act."""
         is_call = standing.state == "unacknowledged"
         self.entries[entry.station, entry.id] = entry
@@ -133,12 +135,12 @@ class AlarmBook:
             self._answers.popitem(last=False)
         return answer
 
-    def shelves_over(self, now_ns: int) -> list[tuple[Entry, Standing]]:
+    def shelves_over(self, now_ns: int) -> list[tuple[AlarmRecord, AlarmStatus]]:
         """Alarms whose shelf has ended, and how they stand then."""
         over = [entry for entry in self.entries.values() if is_shelf_over(entry.standing, now_ns)]
         return [(entry, back(entry.standing, SHELF)) for entry in over]
 
-    def take_back(self, entry: Entry, standing: Standing, time_ns: int, now_ns: int) -> None:
+    def take_back(self, entry: AlarmRecord, standing: AlarmStatus, time_ns: int, now_ns: int) -> None:
         """Let an alarm come from its shelf."""
         entry.standing = standing
         entry.touch(time_ns)
@@ -148,7 +150,7 @@ class AlarmBook:
         """All alarms that there ever were."""
         return [entry.message(self.rules[entry.rule]) for entry in self.entries.values()]
 
-    def stale(self, time_ns: Mapping[str, int]) -> list[Entry]:
+    def stale(self, time_ns: Mapping[str, int]) -> list[AlarmRecord]:
         """Alarms that stand for more than a day of their station's time."""
         return [
             entry
@@ -158,7 +160,7 @@ class AlarmBook:
             and time_ns.get(entry.station, entry.time_ns) - entry.standing.raised_ns > STALE_NS
         ]
 
-    def chattering(self, time_ns: Mapping[str, int], transitions: int) -> list[tuple[Entry, int]]:
+    def chattering(self, time_ns: Mapping[str, int], transitions: int) -> list[tuple[AlarmRecord, int]]:
         """Alarms whose condition came and went more often than this within the last hour, and how often."""
         counts = (
             (entry, entry.changes_within_hour(time_ns.get(entry.station, entry.time_ns)))
@@ -182,7 +184,7 @@ class AlarmBook:
         self._answers = OrderedDict((answer.id, answer) for answer in state.answers)
         self.rates = AlarmRates(state.calls_ns, is_flood=state.is_flood)
 
-    def _tell(self, entry: Entry, now_ns: int, *, is_call: bool) -> Alarm:
+    def _tell(self, entry: AlarmRecord, now_ns: int, *, is_call: bool) -> Alarm:
         if is_call:
             self.rates.add(now_ns)
         alarm = entry.message(self.rules[entry.rule])

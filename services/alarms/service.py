@@ -14,12 +14,12 @@ from wetwell.protocols.messages.messages import Message, MessageError, Sample, S
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
 from wetwell.services.alarms.audit import Audit
-from wetwell.services.alarms.record import Entry
-from wetwell.services.alarms.registry import SHELF, AlarmBook
+from wetwell.services.alarms.record import AlarmRecord
+from wetwell.services.alarms.registry import SHELF, AlarmRegistry
 from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
 from wetwell.services.alarms.state_file import SiteState, StateFile, StationState
 from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
-from wetwell.services.alarms.status import ActRefusedError, Standing
+from wetwell.services.alarms.status import ActRefusedError, AlarmStatus
 from wetwell.services.runtime.settings import AlarmSettings
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
 
 
-class AlarmKeeper:
+class AlarmService:
     """The alarms of a site on a bus. Synchronous; `now` gives the clocks.
 
     Raises
@@ -52,7 +52,7 @@ class AlarmKeeper:
         self._file = StateFile(settings.state_dir)
         self._limits = {station.name: limits_of(settings, station) for station in stations}
         rules = {name: change.model_dump(exclude_none=True) for name, change in settings.rules.items()}
-        self.book = AlarmBook(changed_rules(rules))
+        self.book = AlarmRegistry(changed_rules(rules))
         self.stations: dict[str, StationWatch] = {}
         self._restore(self._file.load() or SiteState())
         for station in stations:
@@ -230,7 +230,7 @@ class AlarmKeeper:
             self._publishers[name] = self._bus.publisher(alarm_key(*name))
         self._publishers[name].put(alarm.encode())
 
-    def _take_back(self, entry: Entry, standing: Standing, now: Now) -> None:
+    def _take_back(self, entry: AlarmRecord, standing: AlarmStatus, now: Now) -> None:
         act = {"station": entry.station, "alarm": entry.id, "act": "unshelve", "by": SHELF}
         try:
             self._audit.write(now.wall_ns, **act, before=entry.standing.state, after=standing.state)

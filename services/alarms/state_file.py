@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError, first_fault
 from wetwell.services.alarms.registry import BookState
 from wetwell.services.runtime.state_file import put_aside, read_kept
@@ -67,7 +67,7 @@ class StateFile:
         if self._path is None:
             return
         try:
-            with whole_file(self._path) as file:
+            with atomic_file(self._path) as file:
                 file.write(state.model_dump_json().encode())
         except RecordingError as error:
             if not self.errors:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.messages import Sample, Status, Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
-from wetwell.services.alarms.registry import AlarmBook
+from wetwell.services.alarms.registry import AlarmRegistry
 from wetwell.services.alarms.rules import VERDICT_RULES, RuleName, verdict_advice, verdict_text
 
 KNOWN_VERDICTS = 200
@@ -90,7 +90,7 @@ class StationWatch:
             return now.wall_ns
         return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
 
-    def take_sample(self, sample: Sample, now: Now, book: AlarmBook, limits: Limits) -> bool:
+    def take_sample(self, sample: Sample, now: Now, book: AlarmRegistry, limits: Limits) -> bool:
         """Look at a sample; whether it was new."""
         if self.time_ns is not None and sample.time <= self.time_ns and sample.seq <= self.seq:
             self.older += 1
@@ -107,7 +107,7 @@ class StationWatch:
         return True
 
     def _look_at_level(
-        self, rule: RuleName, level_m: float, limit_m: float | None, deadband_m: float, now: Now, book: AlarmBook
+        self, rule: RuleName, level_m: float, limit_m: float | None, deadband_m: float, now: Now, book: AlarmRegistry
     ) -> None:
         if limit_m is None or self.time_ns is None:
             return
@@ -115,7 +115,7 @@ class StationWatch:
         text = f"{book.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m"
         book.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
 
-    def take_verdict(self, verdict: Verdict, now: Now, book: AlarmBook) -> bool:
+    def take_verdict(self, verdict: Verdict, now: Now, book: AlarmRegistry) -> bool:
         """Look at a verdict; whether it was new. "unknown" leaves the alarms of the pump as they are."""
         is_start = now.steady_s - self.start_s < START_S
         if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time, is_start=is_start):
@@ -141,7 +141,7 @@ class StationWatch:
         """Services whose absence is an alarm here, and which."""
         return SITE_SERVICES if self.name == SITE else STATION_SERVICES
 
-    def take_status(self, status: Status, now: Now, book: AlarmBook, heartbeat_after_s: float) -> None:
+    def take_status(self, status: Status, now: Now, book: AlarmRegistry, heartbeat_after_s: float) -> None:
         """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs."""
         time_ns, age_s = self.clock_ns(now), status.figures.get("heartbeat_age_s")
         book.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
@@ -155,7 +155,7 @@ class StationWatch:
             gone_s = self.gone_s.get(service)
             self.gone_s[service] = None if is_alive else now.steady_s if gone_s is None else gone_s
 
-    def look(self, now: Now, book: AlarmBook, stale_after_s: float, silent_after_s: float) -> None:
+    def look(self, now: Now, book: AlarmRegistry, stale_after_s: float, silent_after_s: float) -> None:
         """Look for what does not come any more."""
         time_ns = self.clock_ns(now)
         if self.has_samples:

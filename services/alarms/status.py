@@ -14,7 +14,7 @@ class ActRefusedError(ValueError):
 
 
 @dataclass(frozen=True)
-class Standing:
+class AlarmStatus:
     """State of one alarm. A standing alarm is active; one that has returned may still wait for its acknowledgement.
 
     `raised_ns` and `returned_ns` are those of the last time and in the time of the station, `acknowledged_ns` and
@@ -31,7 +31,7 @@ class Standing:
     reason: str = ""
 
 
-def with_condition(standing: Standing, *, is_active: bool, time_ns: int) -> Standing:
+def with_condition(standing: AlarmStatus, *, is_active: bool, time_ns: int) -> AlarmStatus:
     """Standing after the condition has come or gone; the same if it has not changed."""
     if is_active == standing.is_active:
         return standing
@@ -39,12 +39,12 @@ def with_condition(standing: Standing, *, is_active: bool, time_ns: int) -> Stan
         changed = {"raised_ns": time_ns, "returned_ns": None} if is_active else {"returned_ns": time_ns}
         return replace(standing, is_active=is_active, **changed)
     if is_active:
-        return Standing("unacknowledged", is_active=True, raised_ns=time_ns)
+        return AlarmStatus("unacknowledged", is_active=True, raised_ns=time_ns)
     state: AlarmState = "returned" if standing.state == "unacknowledged" else "normal"
     return replace(standing, state=state, is_active=False, returned_ns=time_ns)
 
 
-def with_act(standing: Standing, act: AlarmAct, now_ns: int) -> Standing:
+def with_act(standing: AlarmStatus, act: AlarmAct, now_ns: int) -> AlarmStatus:
     """Standing after an act of an operator at this time of day.
 
     Raises
@@ -69,12 +69,12 @@ def with_act(standing: Standing, act: AlarmAct, now_ns: int) -> Standing:
     raise ActRefusedError(f"{act.act}: the alarm is {state}")
 
 
-def back(standing: Standing, by: str, reason: str = "") -> Standing:
+def back(standing: AlarmStatus, by: str, reason: str = "") -> AlarmStatus:
     """Standing after a suppression: the operator is called anew if the condition is there."""
     state: AlarmState = "unacknowledged" if standing.is_active else "normal"
     return replace(standing, state=state, acknowledged_ns=None, by=by, until_ns=None, reason=reason)
 
 
-def is_shelf_over(standing: Standing, now_ns: int) -> bool:
+def is_shelf_over(standing: AlarmStatus, now_ns: int) -> bool:
     """Whether the alarm is on a shelf whose end has come."""
     return standing.state == "shelved" and standing.until_ns is not None and now_ns >= standing.until_ns

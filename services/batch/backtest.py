@@ -12,12 +12,12 @@ from typing import Any, Protocol
 
 from pydantic import TypeAdapter
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.backtest import Outcome, outcome, summary
 from wetwell.detector.evaluation.methods import DETECTORS, detector_class
 from wetwell.detector.evaluation.scores import LEARNING_S, in_order_of_time, without_truth
 from wetwell.detector.stream.block import blocks
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.recordings.recording import Recording, read_recording
@@ -238,7 +238,7 @@ def write_backtest(
             ("backtest.json", json.dumps(result, indent=2, allow_nan=False) + "\n"),
             ("backtest.html", backtest_page(result)),
         ):
-            with whole_file(folder / name) as file:
+            with atomic_file(folder / name) as file:
                 file.write(text.encode())
         if not result["failed"]:
             (folder / JOURNAL).unlink()
@@ -291,11 +291,11 @@ def verdicts_on(
     recording: Recording, station: Station, detectors: Sequence[str]
 ) -> dict[str, tuple[list[Verdict], float]]:
     """Verdicts of each detector, and the time that it took; the detectors see no truth column. [s]."""
-    nominal = nominal_of(station)
-    judges = {name: detector_class(name)(station.name, nominal) for name in detectors}
+    datasheet = datasheet_of(station)
+    judges = {name: detector_class(name)(station.name, datasheet) for name in detectors}
     verdicts: dict[str, list[Verdict]] = {name: [] for name in detectors}
     spent_s = dict.fromkeys(detectors, 0.0)
-    for block in blocks(without_truth(recording), nominal.pumps):
+    for block in blocks(without_truth(recording), datasheet.pumps):
         for name, judge_one in judges.items():
             started_s = time.perf_counter()
             verdicts[name].extend(judge_one.take(block))

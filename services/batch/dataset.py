@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import tomli_w
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.station.station_file import Station, Table
 from wetwell.services.batch.journal import Journal, open_journal
@@ -111,7 +111,7 @@ def make_dataset(plan: Plan, folder: Path, workers: int, scheduler: str | None =
         classes = {label: counts[label] for label in labels() if counts[label]}
         if not failures:
             manifest = plan.header | {"count": plan.count, "classes": classes, "items": items}
-            with whole_file(folder / MANIFEST) as file:
+            with atomic_file(folder / MANIFEST) as file:
                 file.write(json.dumps(manifest, indent=1).encode() + b"\n")
             (folder / JOURNAL).unlink()
     return {
@@ -260,7 +260,7 @@ def _is_whole(folder: Path, entry: Entry, known: Entry) -> bool:
 
 
 def _write_toml(path: Path, table: Table) -> None:
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         tomli_w.dump(_plain(table), file)
 
 

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, WetwellError
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.batch.gap import diagnose_file
@@ -115,7 +115,7 @@ def diagnose_all(
             "diagnoses": [told[name] for name in names if name in told],
             "failed": [{"name": name, "error": failures[name].error} for name in names if name in failures],
         }
-        with whole_file(out / RESULT) as file:
+        with atomic_file(out / RESULT) as file:
             file.write(json.dumps(result, indent=1).encode() + b"\n")
         if not failures:
             (out / JOURNAL).unlink()

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import tomli_w
 from pydantic import ValidationError
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.arrays import Floats
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.protocols.station.station_file import Station, load_toml
@@ -102,7 +102,7 @@ def validate_file(
     if out is not None:
         write_recording(simulated, out)
     if html is not None:
-        with whole_file(html) as file:
+        with atomic_file(html) as file:
             file.write(validation_page(station, rows, simulated, result).encode())
     days = [
         {
@@ -125,7 +125,7 @@ def validate_file(
     }
 
 
-def _rounded(values: npt.NDArray[np.float64]) -> list[float | None]:
+def _rounded(values: Floats) -> list[float | None]:
     return [round(value, 5) if np.isfinite(value) else None for value in values.tolist()]
 
 
@@ -137,5 +137,5 @@ def write_station(station: Station, out: Path) -> None:
     RecordingError
         If it cannot be written.
     """
-    with whole_file(out) as file:
+    with atomic_file(out) as file:
         file.write(tomli_w.dumps(station.model_dump(exclude_none=True)).encode())

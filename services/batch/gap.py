@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station
@@ -65,7 +65,7 @@ def diagnose_file(
         ("report.html", page),
         ("report.json", report.model_dump_json(by_alias=True, indent=2) + "\n"),
     ):
-        with whole_file(out / name) as file:
+        with atomic_file(out / name) as file:
             file.write(text.encode())
     return report
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress, track
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import BLOCK_ROWS, blocks
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.recordings.recording import Recording, recording_writer
 from wetwell.protocols.station.station_file import Station
@@ -65,9 +65,9 @@ def detect(station: Station, recording: Recording, out: Path) -> dict[str, objec
     RecordingError
         If the verdicts cannot be written.
     """
-    detector = Detector(station.name, nominal_of(station))
+    detector = Detector(station.name, datasheet_of(station))
     states: Counter[str] = Counter()
-    with whole_file(out) as file:
+    with atomic_file(out) as file:
         for verdict in _verdicts(detector, recording, len(station.pump)):
             states[verdict.state] += 1
             file.write(verdict.encode() + b"\n")

@@ -16,7 +16,7 @@ from starlette.routing import Route
 from wetwell.protocols.bus.interface import Bus
 from wetwell.services.dashboard.assets import Asset, Assets
 from wetwell.services.dashboard.client import RefusalError, act_on_alarm, history, recording_pieces
-from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.login import Login, holder_in
 from wetwell.services.dashboard.reports import find_report, report_names
@@ -27,11 +27,11 @@ GZIP_LEVEL = 5
 
 
 @dataclass
-class Desk:
+class AppState:
     """What the answers are made from; without a bus nothing can be asked."""
 
     view: SiteView
-    hub: Hub
+    hub: EventStreams
     reports: Path | None = None
     bus: Bus | None = None
 
@@ -48,7 +48,7 @@ class Desk:
         return self.bus
 
 
-def dashboard_app(desk: Desk, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
+def dashboard_app(desk: AppState, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
     """Web application over a desk, behind a `Guard`."""
     pages, answers, login = _Pages(), _Answers(desk), Login(tokens_file)
     shells = ("/", "/station/{station}", "/alarms", "/reports", "/health")
@@ -97,7 +97,7 @@ class _Pages:
 class _Answers:
     """What is known and what can be asked."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: AppState) -> None:
         self._desk = desk
 
     async def events(self, request: Request) -> Response:

@@ -7,7 +7,7 @@ from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.dashboard.client import RefusalError, history
-from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.sample_row import past_rows
 from wetwell.services.dashboard.site_view import SiteView
 
@@ -21,7 +21,7 @@ AT_ONCE = 4
 """Most questions that are on the way."""
 
 
-class Past:
+class ChartBackfill:
     """Fills the charts of stations that are looked at with what was before the first sample that was heard.
 
     A question is for one second a row, so that stations at 1 Hz get their samples, quicker ones means.
@@ -30,10 +30,10 @@ class Past:
     ----------
     bus : Bus
     view : SiteView
-    hub : Hub
+    hub : EventStreams
     """
 
-    def __init__(self, bus: Bus, view: SiteView, hub: Hub) -> None:
+    def __init__(self, bus: Bus, view: SiteView, hub: EventStreams) -> None:
         self._bus = bus
         self._view = view
         self._hub = hub

@@ -5,8 +5,8 @@ import logging
 import socket
 
 from wetwell.protocols.bus.keys import SITE
-from wetwell.services.dashboard.app import Desk, dashboard_app
-from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.app import AppState, dashboard_app
+from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
@@ -42,7 +42,7 @@ async def serve_dashboard(settings: Settings) -> None:
 
 async def _run(settings: Settings, listener: socket.socket) -> None:
     tokens_file = settings.security.tokens_file
-    desk = Desk(SiteView(settings.dashboard.stale_s), Hub(), settings.dashboard.reports)
+    desk = AppState(SiteView(settings.dashboard.stale_s), EventStreams(), settings.dashboard.reports)
     is_local = tokens_file is None and is_loopback(settings.dashboard.host)
     app = dashboard_app(desk, tokens_file, is_local=is_local)
     async with web_server(app, listener, desk.hub):

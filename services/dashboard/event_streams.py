@@ -57,7 +57,7 @@ class Client:
             yield data
 
 
-class Hub:
+class EventStreams:
     """Browsers by the topic that they look at: `""` is the overview, else a station."""
 
     def __init__(self) -> None:

@@ -15,8 +15,8 @@ from wetwell.protocols.bus.keys import (
     status_key,
     verdict_key,
 )
-from wetwell.services.dashboard.backfill import Past
-from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.backfill import ChartBackfill
+from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.runtime.lifecycle import ticks
 
@@ -37,14 +37,14 @@ class Feed:
     ----------
     bus : Bus
     view : SiteView
-    hub : Hub
+    hub : EventStreams
     """
 
-    def __init__(self, bus: Bus, view: SiteView, hub: Hub) -> None:
+    def __init__(self, bus: Bus, view: SiteView, hub: EventStreams) -> None:
         self._view = view
         self._hub = hub
         self._bus = bus
-        self._past = Past(bus, view, hub)
+        self._past = ChartBackfill(bus, view, hub)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
             (bus.subscribe(sample_key("*"), capacity=100_000, recover=False), view.take_sample),
             (bus.subscribe(sample_block_key("*"), capacity=100_000, recover=False), view.take_sample_block),

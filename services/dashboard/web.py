@@ -9,7 +9,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from wetwell.protocols.errors import LinkError
-from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.event_streams import EventStreams
 
 SHUTDOWN_S = 2
 
@@ -41,7 +41,7 @@ def open_socket(host: str, port: int) -> socket.socket:
 
 
 @contextlib.asynccontextmanager
-async def web_server(app: ASGIApp, listener: socket.socket, hub: Hub) -> AsyncIterator[None]:
+async def web_server(app: ASGIApp, listener: socket.socket, hub: EventStreams) -> AsyncIterator[None]:
     """Serve until the end of the block."""
     config = uvicorn.Config(
         app, log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=SHUTDOWN_S

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SnapshotError
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.services.runtime.state_file import put_aside, read_kept
@@ -84,7 +84,7 @@ class Checkpoint:
             if self._path is None or number < self._written:
                 return
             try:
-                with whole_file(self._path) as file:
+                with atomic_file(self._path) as file:
                     file.write(content)
                 self._written = number
             except RecordingError as error:

@@ -14,7 +14,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.quarantine import Quarantine
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.lifecycle import report_health, stop_event, ticks, until
@@ -57,13 +57,13 @@ async def judge_all(
     quarantine = Quarantine(kept.state_dir, name, kept.crash_tries, kept.crash_window_s)
     stack.callback(quarantine.close)
     async with asyncio.TaskGroup() as group:
-        judges: list[StationJudge] = []
+        judges: list[StationDetector] = []
         for station in stations:
             if quarantine.holds(station.name):
                 log.error("station '%s': left out after %d crashes", station.name, kept.crash_tries)
                 group.create_task(_show_left_out(bus, station.name, settings.health.period_s))
                 continue
-            judge = StationJudge(bus, station, kept.costs, Checkpoint(kept.state_dir, station.name), quarantine)
+            judge = StationDetector(bus, station, kept.costs, Checkpoint(kept.state_dir, station.name), quarantine)
             stack.callback(judge.keep)
             judges.append(judge)
         intake = Intake(bus, judges)
@@ -91,11 +91,11 @@ async def _show_left_out(bus: Bus, station: str, period_s: float) -> None:
         publisher.put(status.encode())
 
 
-def _figures(judge: StationJudge, intake: Intake) -> dict[str, float]:
+def _figures(judge: StationDetector, intake: Intake) -> dict[str, float]:
     return judge.figures() | {"dropped": float(intake.dropped)}
 
 
-async def _keep(judges: Sequence[StationJudge], period_s: float) -> None:
+async def _keep(judges: Sequence[StationDetector], period_s: float) -> None:
     """Save each detector once a period, one after the other, so that no second bears all of them."""
     while judges:
         for judge in judges:

@@ -11,7 +11,7 @@ from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.protocols.messages.messages import MessageError, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.detector.backfill import missed_samples
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 
 SAMPLE_HISTORY = 600
 CAPACITY = 1_000_000
@@ -55,12 +55,12 @@ class Intake:
     Parameters
     ----------
     bus : Bus
-    judges : sequence of StationJudge
+    judges : sequence of StationDetector
     """
 
-    def __init__(self, bus: Bus, judges: Sequence[StationJudge]) -> None:
+    def __init__(self, bus: Bus, judges: Sequence[StationDetector]) -> None:
         self._bus = bus
-        self._judges: dict[str, tuple[StationJudge, Kind]] = {
+        self._judges: dict[str, tuple[StationDetector, Kind]] = {
             key(judge.station): (judge, kind)
             for judge in judges
             for key, kind in ((sample_key, Sample), (sample_block_key, SampleBlock))
@@ -106,7 +106,7 @@ class Intake:
             for key, payload in await self._orders.receive():
                 self._obeying[key].take_order(payload)
 
-    async def _catch_up(self, judge: StationJudge, turn: asyncio.Semaphore) -> None:
+    async def _catch_up(self, judge: StationDetector, turn: asyncio.Semaphore) -> None:
         """Take what was missed, then what came meanwhile.
 
         The bus keeps samples in the order in which they came, the historian in that of their stamps, which differs
@@ -126,7 +126,7 @@ class Intake:
             self._passed_over += self._behind.pop(judge).dropped
 
 
-async def _take(judge: StationJudge, waiting: Waiting, place: int) -> None:
+async def _take(judge: StationDetector, waiting: Waiting, place: int) -> None:
     """Judge what waits from a place on, and what comes meanwhile, until nothing waits."""
     judged = 0
     while waiting.messages:

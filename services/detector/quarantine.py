@@ -5,7 +5,7 @@ import logging
 import mmap
 from pathlib import Path
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.runtime.clock import now_ns
@@ -91,7 +91,7 @@ class Quarantine:
             time_ns
         ]
         try:
-            with whole_file(self._path(station)) as file:
+            with atomic_file(self._path(station)) as file:
                 file.write(json.dumps({"crashes_ns": crashes_ns}).encode())
         except RecordingError as error:
             log.warning("%s", error)

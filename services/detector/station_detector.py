@@ -9,7 +9,7 @@ from itertools import islice
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import Block
 from wetwell.detector.verdict.maintenance import Costs
@@ -29,7 +29,7 @@ ORDERS = 100
 """Orders that are remembered with their answers, so that one that is sent again is not carried out twice."""
 
 
-class StationJudge:
+class StationDetector:
     """Feeds the detector of one station and publishes what it says.
 
     Parameters
@@ -55,7 +55,7 @@ class StationJudge:
         quarantine: Quarantine | None = None,
     ) -> None:
         self.station = station.name
-        self.detector = Detector(station.name, nominal_of(station), costs)
+        self.detector = Detector(station.name, datasheet_of(station), costs)
         self._checkpoint = checkpoint
         self._quarantine = quarantine or Quarantine(None, "", 1, 0.0)
         told = None if checkpoint is None else checkpoint.restore(self.detector)

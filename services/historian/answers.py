@@ -3,12 +3,13 @@
 import json
 from collections.abc import Mapping
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.history import History, HistoryQuery, Kind
 from wetwell.protocols.messages.messages import MessageError
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.historian.hours import Hours, joined_hours
-from wetwell.services.historian.rows import HOUR_NS, Floats, Integers
+from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store.interface import DAY_NS, StationSpan, Store, StoreError, blocks, day_of
 

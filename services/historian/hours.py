@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.kpi import kpis
-from wetwell.services.historian.rows import HOUR_NS, Floats, Integers
+from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples
 
 STATION_FIGURES = ("known_h",)

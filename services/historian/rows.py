@@ -10,13 +10,11 @@ from typing import NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.messages.messages import Quality
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 HOUR_NS = 3600 * NS_PER_S
 

@@ -8,8 +8,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
-from wetwell.services.historian.rows import Floats, Integers, PackedSamples, SampleRow, pack_arrays, unpack
+from wetwell.services.historian.rows import PackedSamples, SampleRow, pack_arrays, unpack
 
 
 @lru_cache
@@ -84,7 +85,7 @@ class Samples:
         is_new = np.r_[True, _follows(self.time_ns[order], self.seq[order])] if len(self) else order > 0
         return self.take(order[is_new])
 
-    def take(self, rows: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice) -> "Samples":
+    def take(self, rows: npt.NDArray[np.intp] | Flags | slice) -> "Samples":
         """Some of the rows."""
         return Samples(
             time_ns=self.time_ns[rows], seq=self.seq[rows], quality=self.quality[rows], values=self.values[rows]
@@ -130,8 +131,8 @@ def _finite(values: Floats) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _follows(time_ns: Integers, seq: Integers) -> npt.NDArray[np.bool_]:
+def _follows(time_ns: Integers, seq: Integers) -> Flags:
     """(n - 1,) whether each row but the first comes after the one before."""
     is_same = time_ns[1:] == time_ns[:-1]
-    follows: npt.NDArray[np.bool_] = (time_ns[1:] > time_ns[:-1]) | (is_same & (seq[1:] > seq[:-1]))
+    follows: Flags = (time_ns[1:] > time_ns[:-1]) | (is_same & (seq[1:] > seq[:-1]))
     return follows

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.historian.rows import Floats, Integers
 from wetwell.services.historian.samples import Samples, columns_of
 
 MINUTE_NS = 60 * NS_PER_S
@@ -94,7 +94,7 @@ class Summary:
             high=np.fmax.reduceat(self.high, firsts),
         )
 
-    def take(self, rows: npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> "Summary":
+    def take(self, rows: npt.NDArray[np.intp] | Flags) -> "Summary":
         """Some of the spans."""
         return Summary(
             time_ns=self.time_ns[rows],

@@ -1,7 +1,6 @@
 """The page of a diagnosis: map of the gap, traces before and after, the residual, the ranking, the parameters."""
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.reports.charts import (
@@ -21,8 +20,6 @@ from wetwell.sim2real.diagnosis.report import DetectorVerdicts, GapReport
 from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.bins import SIGNALS
 from wetwell.simulator.effects import effects_of
-
-Floats = npt.NDArray[np.float64]
 
 RANKED = 8
 SHOWN_S = 1800

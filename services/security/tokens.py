@@ -14,7 +14,7 @@ from typing import Annotated, Literal, get_args
 import tomli_w
 from pydantic import Field, ValidationError
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.station.station_file import NAME_PATTERN, Table, load_toml
 
@@ -117,7 +117,7 @@ def revoke_token(file: Path, name: str) -> None:
 
 
 def _write(file: Path, holders: tuple[Holder, ...]) -> None:
-    with whole_file(file) as out:
+    with atomic_file(file) as out:
         os.fchmod(out.fileno(), 0o600)
         tomli_w.dump(_File(token=holders).model_dump(), out)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.services.batch.executors import let_interrupts
 from wetwell.services.trial.swmm_plant import swmm_passage_of
@@ -62,7 +62,7 @@ def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[
         "shrinkage": shrinkage(gaps["before"], gaps["after"], gaps["oracle"]),
         "regressor_shrinkage": shrinkage(gaps["before"], gaps["regressor"], gaps["oracle"]),
     }
-    with whole_file(reports / HELD_OUT_FILE) as file:
+    with atomic_file(reports / HELD_OUT_FILE) as file:
         file.write(json.dumps(figures).encode() + b"\n")
 
 

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
 
@@ -107,5 +107,5 @@ def take_folder(plan: TrialPlan, folder: Path) -> None:
     for key, value in plan.header.items():
         if before.get(key) != value:
             raise ConfigError(f"{folder}: holds a trial with another {key.replace('_', ' ')}; take another folder")
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(json.dumps(plan.header, indent=1).encode() + b"\n")

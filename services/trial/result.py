@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.services.batch.parallel import Failure
 from wetwell.services.trial.diagnosis import RECALIBRATED, REPORTS, WHOLE_LIBRARY, answer_in
 from wetwell.services.trial.holdout import held_out_summary
@@ -51,9 +51,9 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         "confusion": {"rows": rows, "columns": columns, "counts": counts.tolist()},
     }
     cases = [asdict(score) for score in scores]
-    with whole_file(folder / "trial.json") as file:
+    with atomic_file(folder / "trial.json") as file:
         file.write(json.dumps(result | {"cases": cases}, indent=1).encode() + b"\n")
-    with whole_file(folder / "trial.html") as file:
+    with atomic_file(folder / "trial.html") as file:
         file.write(trial_page(result, cases).encode())
     return result
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import tomli_w
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recordings.recording import write_recording
 from wetwell.services.trial.acting_case import acting_case
@@ -34,7 +34,7 @@ def publish(case: TrialCase, folder: Path) -> None:
     published, sealed = folder / "published" / case.name, folder / "sealed" / f"{case.name}.json"
     published.mkdir(parents=True, exist_ok=True)
     sealed.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(published / STATION_FILE) as file:
+    with atomic_file(published / STATION_FILE) as file:
         tomli_w.dump(truth.station.model_dump(mode="json", exclude_none=True), file)
     write_recording(recording, published / RECORDING_FILE)
     labels = {
@@ -51,9 +51,9 @@ def publish(case: TrialCase, folder: Path) -> None:
         "sha256": {name: digest((published / name).read_bytes()) for name in (STATION_FILE, RECORDING_FILE)},
     }
     text = labels_text(labels, secrets.token_hex(16))
-    with whole_file(sealed) as file:
+    with atomic_file(sealed) as file:
         file.write(text)
-    with whole_file(published / SEAL_FILE) as file:
+    with atomic_file(published / SEAL_FILE) as file:
         file.write(digest(text).encode() + b"\n")
 
 

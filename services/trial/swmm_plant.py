@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.sim2real.truth import kernel
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.parts import Truth
-from wetwell.sim2real.truth.spec import Floats, Spec
+from wetwell.sim2real.truth.spec import Spec
 from wetwell.sim2real.truth.swmm_input import ROUTING_STEP_S, SWMM_LIBRARY, SWMM_OPEN, swmm_input
 from wetwell.sim2real.truth.truth_plant import Passage, truth_of
 

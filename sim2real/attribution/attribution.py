@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import TRIALS, Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.initial_guess import hints_of
@@ -18,8 +18,6 @@ from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.sim2real.residuals.residuals import Misfit, soft
 from wetwell.sim2real.residuals.structure import phase
 
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Applies a function to items, in order, as `map` does: perhaps side by side."""
 

@@ -7,12 +7,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.simulator.effects import EFFECTS, effect_table
 from wetwell.simulator.effects.effect import Component, Effect
-
-Floats = npt.NDArray[np.float64]
 
 WIDE = 50.0
 """Ratio of a range's ends from which a parameter is varied on a logarithmic scale."""

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.residuals import Misfit, soft
 from wetwell.simulator.effects.effect import Effect
-
-Floats = npt.NDArray[np.float64]
 
 STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
@@ -55,7 +53,7 @@ class Fit:
 class Fitter:
     """Fits candidates to the chosen bins of a recording."""
 
-    def __init__(self, replay: Replay, misfit: Misfit, rows: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, replay: Replay, misfit: Misfit, rows: Flags) -> None:
         self._replay = replay
         self._misfit = misfit
         self.rows = rows

@@ -1,8 +1,8 @@
 """Where the search for some parameters begins: what the recording shows directly."""
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
@@ -10,8 +10,6 @@ from wetwell.sim2real.residuals.bins import POWER, Bins
 from wetwell.sim2real.residuals.residuals import Misfit
 from wetwell.simulator.plant import plant_parameters
 from wetwell.simulator.power import loaded_power_kw
-
-Floats = npt.NDArray[np.float64]
 
 DAY_S = 86_400.0
 LONGEST_S = 14_400.0

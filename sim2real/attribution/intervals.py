@@ -1,14 +1,12 @@
 """Intervals of fitted parameters: noise of every kind, and what a model that is right may still be off."""
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.simulator.effects import EFFECTS
-
-Floats = npt.NDArray[np.float64]
 
 TWO_SIDED = 1.96
 BLOCKS = 24
@@ -67,7 +65,7 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
     return np.asarray(ends, dtype=np.float64)
 
 
-def _sums(values: Floats, group: npt.NDArray[np.int64]) -> Floats:
+def _sums(values: Floats, group: Integers) -> Floats:
     """(groups, parameters) sums of rows."""
     return np.array([np.bincount(group, column) for column in values.T]).T
 

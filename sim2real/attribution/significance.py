@@ -1,9 +1,8 @@
 """Whether a sum over cycles is beyond chance."""
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 SURE = 4.0
 """Standard errors: 3 for one trial, 4 for a library of them."""

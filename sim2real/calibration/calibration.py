@@ -4,16 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.errors import first_fault
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.calibration.steady import SteadyPoints, running_flags, steady_points
-
-Floats = npt.NDArray[np.float64]
 
 RESAMPLES = 200
 CONFIDENCE = 0.95
@@ -84,7 +82,7 @@ def _pump_curve(points: SteadyPoints, station: Station, pump: int, rng: np.rando
         scale = np.mean(flow)
         design = np.column_stack([np.ones_like(flow), flow / scale, (flow / scale) ** 2])
 
-        def curve(rows: npt.NDArray[np.int64]) -> Floats:
+        def curve(rows: Integers) -> Floats:
             fitted: Floats = np.linalg.lstsq(design[rows], head[rows], rcond=None)[0] / scale ** np.arange(3)
             return fitted
 
@@ -116,7 +114,7 @@ def _system_curve(points: SteadyPoints, station: Station, rng: np.random.Generat
         scale = np.mean(squared)
         design = np.column_stack([np.ones_like(squared), squared / scale])
 
-        def curve(rows: npt.NDArray[np.int64]) -> Floats:
+        def curve(rows: Integers) -> Floats:
             fitted: Floats = np.linalg.lstsq(design[rows], points.head_m[rows], rcond=None)[0] / [1.0, scale]
             return fitted
 
@@ -166,7 +164,7 @@ def _area(recording: Recording, station: Station, rng: np.random.Generator) -> E
         return _kept(name, unit, configured, f"{len(slopes)} switches with a calm minute on both sides")
     change_m_h, change_m3h = np.array(slopes), np.array(flows)
 
-    def area(rows: npt.NDArray[np.int64]) -> Floats:
+    def area(rows: Integers) -> Floats:
         """Slopes carry the noise, flows hardly any: regress slopes on flows."""
         return np.array([-np.sum(change_m3h[rows] ** 2) / np.sum(change_m3h[rows] * change_m_h[rows])])
 
@@ -224,7 +222,7 @@ def _ramp(recording: Recording, station: Station, rng: np.random.Generator) -> E
     return Estimate(name="control.ramp_s", unit="s", value=values[0], interval=(low[0], high[0]))
 
 
-def _mean_of(values: Floats) -> Callable[[npt.NDArray[np.int64]], Floats]:
+def _mean_of(values: Floats) -> Callable[[Integers], Floats]:
     return lambda rows: np.array([values[rows].mean()])
 
 
@@ -233,7 +231,7 @@ def _kept(name: str, unit: str, value: float, reason: str) -> Estimate:
 
 
 def _bootstrap(
-    estimate: Callable[[npt.NDArray[np.int64]], Floats], groups: npt.NDArray[np.int64], rng: np.random.Generator
+    estimate: Callable[[Integers], Floats], groups: Integers, rng: np.random.Generator
 ) -> tuple[list[float], list[float], list[float]]:
     """Estimate on all rows, and its percentile interval under resampling of whole groups."""
     members = [np.flatnonzero(groups == group) for group in np.unique(groups)]

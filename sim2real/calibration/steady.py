@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 SEGMENT_S = 25.0
 WARM_UP_S = 30.0
@@ -25,9 +23,9 @@ class SteadyPoints:
     the number of pumps on; `speed_ratio` is frequency over nominal frequency.
     """
 
-    run: npt.NDArray[np.int64]
-    pump: npt.NDArray[np.int64]
-    running: npt.NDArray[np.int64]
+    run: Integers
+    pump: Integers
+    running: Integers
     flow_m3h: Floats
     total_flow_m3h: Floats
     head_m: Floats
@@ -35,11 +33,11 @@ class SteadyPoints:
     level_m: Floats
 
 
-def running_flags(recording: Recording, pumps: int) -> npt.NDArray[np.bool_]:
+def running_flags(recording: Recording, pumps: int) -> Flags:
     """(pumps, n) whether each pump runs: from its flag, or else from its frequency."""
     flags = np.array([recording.column(f"pump{i}_running") for i in range(1, pumps + 1)])
     frequency_hz = np.array([recording.column(f"pump{i}_frequency_hz") for i in range(1, pumps + 1)])
-    running: npt.NDArray[np.bool_] = np.where(np.isnan(flags), frequency_hz, flags) > 0.0
+    running: Flags = np.where(np.isnan(flags), frequency_hz, flags) > 0.0
     return running
 
 

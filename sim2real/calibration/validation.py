@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.kpi import kpis
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
@@ -13,8 +13,6 @@ from wetwell.sim2real.recording.inflow import infer_inflow_m3h
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
-
-Floats = npt.NDArray[np.float64]
 
 MIN_KNOWN_SHARE = 0.5
 
@@ -38,7 +36,7 @@ class Validation:
     inflow: str
     level_nmae: float
     days: tuple[str, ...]
-    starts: npt.NDArray[np.int64]
+    starts: Integers
     run_h: Floats
 
     @property

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.recording.traces import filled
-
-Floats = npt.NDArray[np.float64]
 
 CLASSES = 20
 POINTS = 1500

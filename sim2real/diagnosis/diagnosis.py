@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.sim2real.attribution.attribution import KEPT, MIN_BINS, Attribution, Attributor, Each
@@ -24,8 +24,6 @@ from wetwell.sim2real.residuals.residuals import Misfit
 from wetwell.sim2real.residuals.structure import explained, repeating
 from wetwell.simulator.effects import effects_of
 from wetwell.simulator.effects.effect import Component, Effect
-
-Floats = npt.NDArray[np.float64]
 
 Verdict = Literal["effect", "none", "unknown"]
 KEPT_OF_ONE_FORM = 0.1
@@ -285,7 +283,7 @@ def _is_unclosed(bins: Bins, found: Attribution, told: set[int]) -> bool:
     return False
 
 
-def _is_left(excess: Floats, cycle: npt.NDArray[np.int64]) -> bool:
+def _is_left(excess: Floats, cycle: Integers) -> bool:
     """Whether what is beyond noise is large on average, whichever cycles there are."""
     of_cycle = np.unique(cycle, return_inverse=True)[1]
     sums, counts = np.bincount(of_cycle, excess), np.bincount(of_cycle)
@@ -294,7 +292,7 @@ def _is_left(excess: Floats, cycle: npt.NDArray[np.int64]) -> bool:
     return mean > LEFT and mean - 2.0 * error > 0.5 * LEFT
 
 
-def _slow_square(residuals: Floats, second: npt.NDArray[np.int64], cycle: npt.NDArray[np.int64]) -> float:
+def _slow_square(residuals: Floats, second: Integers, cycle: Integers) -> float:
     """Mean product of the means of cycles that are `SLOW_S` apart: what of the square is slower than that."""
     of_cycle = np.unique(cycle, return_inverse=True)[1]
     counts = np.bincount(of_cycle)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal, nominal_of
+from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.evaluation.scores import FAULTS, without_truth
 from wetwell.protocols.recordings.recording import Recording
@@ -53,19 +53,19 @@ def false_verdicts(recording: Recording, before: Station, after: Station) -> Fal
     return FalseVerdicts(days=days, verdicts=verdicts, before=faults, after=again, has_new_curves=new != old)
 
 
-def _judged(recording: Recording, name: str, nominal: Nominal) -> tuple[int, int]:
+def _judged(recording: Recording, name: str, datasheet: Datasheet) -> tuple[int, int]:
     """Verdicts, and those with a fault."""
-    detector = Detector(name, nominal)
+    detector = Detector(name, datasheet)
     verdicts = [verdict for row in recording.rows() for verdict in detector.update(row)]
     verdicts += detector.finish()
     return len(verdicts), sum(verdict.state in FAULTS for verdict in verdicts)
 
 
-def _nominal(station: Station) -> Nominal:
+def _nominal(station: Station) -> Datasheet:
     """Curves of a station under its effects."""
     plant = effective_parameters(station)
     return replace(
-        nominal_of(station),
+        datasheet_of(station),
         curves=tuple((float(c0), float(c1), float(c2)) for c0, c1, c2 in plant.curves),
         static_head_m=plant.static_head_m,
         friction_h2_m5=plant.friction_h2_m5,

@@ -1,8 +1,8 @@
 """Which component a gap points to when no effect explains it: by its signals and how they move together."""
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP
 from wetwell.sim2real.replay.replay import LEVEL_TIME_S
 from wetwell.sim2real.residuals.bins import (
@@ -18,8 +18,6 @@ from wetwell.sim2real.residuals.bins import (
 )
 from wetwell.simulator.effects.effect import Component
 from wetwell.simulator.plant import PlantParameters
-
-Floats = npt.NDArray[np.float64]
 
 BLOCKS = 12
 STRAIGHT = 0.8
@@ -81,7 +79,7 @@ def _drifts(residuals: Floats, bins: Bins) -> bool:
     return bool(np.corrcoef(means, np.arange(BLOCKS))[0, 1] ** 2 > STRAIGHT)
 
 
-def _wanders(residuals: Floats, bins: Bins, calm: npt.NDArray[np.bool_]) -> bool:
+def _wanders(residuals: Floats, bins: Bins, calm: Flags) -> bool:
     """Whether the level departs and comes back at random: a balance that does not close goes one way for minutes.
 
     What would have to flow in beside the balance, by the observer's equation, against itself a minute and more later.
@@ -123,11 +121,11 @@ def _runs_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
     return False
 
 
-def _mean(values: Floats, rows: npt.NDArray[np.bool_]) -> float:
+def _mean(values: Floats, rows: Flags) -> float:
     return float(values[rows].mean()) if rows.any() else 0.0
 
 
-def _hunts(residuals: Floats, bins: Bins, rows: npt.NDArray[np.int64]) -> bool:
+def _hunts(residuals: Floats, bins: Bins, rows: Integers) -> bool:
     """Whether neighbouring bins of a run differ about as much as bins of that run that are far from one another."""
     order = rows[np.lexsort((bins.second[rows], bins.pump[rows]))]
     near = (np.diff(bins.pump[order]) == 0) & (np.diff(bins.second[order]) <= NEAR_S)

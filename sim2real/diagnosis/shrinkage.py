@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.sim2real.residuals.residuals import SOFT
 
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 Interval = tuple[float, float]
 
 FLOOR = 1.0
@@ -79,12 +77,12 @@ def _gaps(sums: Floats) -> tuple[Floats, Floats]:
     return np.sqrt(FLOOR + mean), np.sqrt(FLOOR + mean.mean(axis=1))
 
 
-def bootstrap(squares: Floats, cycle: npt.NDArray[np.int64], rng: np.random.Generator) -> tuple[float, Interval]:
+def bootstrap(squares: Floats, cycle: Integers, rng: np.random.Generator) -> tuple[float, Interval]:
     """Gap of one cell from what its squares are over noise, with an interval over whole cycles."""
     _, inverse = np.unique(cycle, return_inverse=True)
     sums, counts = np.bincount(inverse, squares), np.bincount(inverse)
 
-    def gap(drawn: npt.NDArray[np.int64]) -> float:
+    def gap(drawn: Integers) -> float:
         return float(np.sqrt(FLOOR + max(sums[drawn].sum() / counts[drawn].sum(), 0.0)))
 
     values = [gap(rng.integers(0, sums.size, sums.size)) for _ in range(DRAWN)]

@@ -3,11 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.recording.traces import Traces
-
-Floats = npt.NDArray[np.float64]
 
 MOST_S = 172_800
 WINDOW_S = 14_400
@@ -44,7 +42,7 @@ def excerpt(traces: Traces, most_s: int = MOST_S) -> Traces:
     return _of_rows(traces, parts)
 
 
-def _near(idle: npt.NDArray[np.int64], second: int) -> int:
+def _near(idle: Integers, second: int) -> int:
     """First idle second from `second` on, or `second` itself where there is none for an hour."""
     place = int(np.searchsorted(idle, second))
     if place < idle.size and idle[place] - second <= SEARCHED_S:
@@ -52,7 +50,7 @@ def _near(idle: npt.NDArray[np.int64], second: int) -> int:
     return second
 
 
-def _of_rows(traces: Traces, parts: list[npt.NDArray[np.int64]]) -> Traces:
+def _of_rows(traces: Traces, parts: list[Integers]) -> Traces:
     blank = np.full(BLANK_S, -1)
     rows = np.concatenate([row for part in parts for row in (part, blank)][:-1])
     is_blank = rows < 0

@@ -1,16 +1,14 @@
 """Inflow of a station that does not measure it, from level and flows."""
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.hydraulics import common_flows, individual_flows
 from wetwell.simulator.plant import plant_parameters
 from wetwell.simulator.wet_well import volume_at_level_m3
-
-Floats = npt.NDArray[np.float64]
 
 CHUNK_ROWS = 3600
 MIN_STEP_S = 0.1
@@ -99,9 +97,7 @@ def _slopes(time_s: Floats, values: Floats, window_s: float) -> Floats:
     return slopes
 
 
-def _chunk_slopes(
-    time_s: Floats, values: Floats, first: npt.NDArray[np.int64], last: npt.NDArray[np.int64]
-) -> Floats:
+def _chunk_slopes(time_s: Floats, values: Floats, first: Integers, last: Integers) -> Floats:
     known = np.isfinite(values)
     centred_s = time_s - time_s.mean()
     centred = np.where(known, values - np.mean(values[known]) if known.any() else 0.0, 0.0)

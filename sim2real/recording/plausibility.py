@@ -1,14 +1,12 @@
 """What is no gap but a mistake: values in other units, rows in no order, the file of another station."""
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, STEADY, Regimes
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
-
-Floats = npt.NDArray[np.float64]
 
 UNITS: dict[str, dict[str, float]] = {
     "flow_m3h": {"L/s": 1 / 3.6, "m³/s": 1 / 3600.0, "L/min": 1000.0 / 60.0, "m³/d": 24.0, "US gal/min": 4.4029},
@@ -119,7 +117,7 @@ def _check_level(traces: Traces, station: Station) -> None:
         )
 
 
-def _ratio(recorded: Floats, expected: Floats, of_pumps: npt.NDArray[np.int64]) -> float:
+def _ratio(recorded: Floats, expected: Floats, of_pumps: Integers) -> float:
     """Median of recorded over expected while one pump runs steadily; NaN without any."""
     calm = (of_pumps == STEADY) & np.isfinite(recorded) & (expected > 0.0)
     return float(np.median(recorded[calm] / expected[calm])) if calm.any() else float("nan")

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.traces import Traces
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 Regime = Literal["idle", "start_ramp", "steady", "multi_pump", "stop_ramp"]
 REGIMES: tuple[Regime, ...] = get_args(Regime)
@@ -76,7 +73,7 @@ def regimes_of(traces: Traces, station: Station) -> Regimes:
     return Regimes(of_station=of_station, of_pumps=of_pumps, cycle=cycle, events=_events(commanded))
 
 
-def _commanded(frequency_hz: Floats, min_frequency_hz: float) -> npt.NDArray[np.bool_]:
+def _commanded(frequency_hz: Floats, min_frequency_hz: float) -> Flags:
     """Whether a drive is commanded: it runs, and is not on its last way down."""
     commanded = frequency_hz > 0.0
     for end in np.flatnonzero(commanded[:-1] & ~commanded[1:]):
@@ -90,11 +87,11 @@ def _commanded(frequency_hz: Floats, min_frequency_hz: float) -> npt.NDArray[np.
     return commanded
 
 
-def _rises(flags: npt.NDArray[np.bool_]) -> Integers:
+def _rises(flags: Flags) -> Integers:
     return np.flatnonzero(flags[1:] & ~flags[:-1]) + 1
 
 
-def _falls(flags: npt.NDArray[np.bool_]) -> Integers:
+def _falls(flags: Flags) -> Integers:
     return np.flatnonzero(~flags[1:] & flags[:-1]) + 1
 
 
@@ -108,7 +105,7 @@ def _mark(regime: Integers, begins: Integers, length_s: int, code: int, ends: In
         regime[begin:end] = code
 
 
-def _events(commanded: npt.NDArray[np.bool_]) -> tuple[Event, ...]:
+def _events(commanded: Flags) -> tuple[Event, ...]:
     """Single commands; two in one second tell nothing of their levels."""
     number = commanded.sum(axis=0)
     change = np.diff(commanded.astype(np.int64), axis=1)

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 HELD_S = 120
 """How long a command is taken to hold on while its value is missing."""
@@ -133,7 +131,7 @@ def filled(values: Floats, longest: int, otherwise: float) -> Floats:
     return np.asarray(held, dtype=np.float64)
 
 
-def repeated(values: Floats) -> npt.NDArray[np.bool_]:
+def repeated(values: Floats) -> Flags:
     """(..., n) whether a value is exactly that of the second before; the zeros of a standing pump are not meant."""
     same = np.zeros(values.shape, dtype=bool)
     same[..., 1:] = (values[..., 1:] == values[..., :-1]) & (values[..., 1:] != 0.0)
@@ -146,7 +144,7 @@ def _moves(values: Floats) -> bool:
     return bool(known.size) and bool(np.ptp(known) > 0.0)
 
 
-def _length_s(second: npt.NDArray[np.int64]) -> int:
+def _length_s(second: Integers) -> int:
     """Length of a recording with rows at these seconds."""
     seconds = int(second[-1]) + 1
     if seconds < MIN_LENGTH_S:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.traces import PUMP_SIGNALS, Traces, repeated
 from wetwell.sim2real.replay.kernel import replay_seconds
@@ -14,8 +14,6 @@ from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.plant import Forcing, PlantParameters, healthy_forcing, pack, plant_parameters
 from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, Quantity, channels_of
 from wetwell.simulator.wet_well import volume_at_level_m3
-
-Floats = npt.NDArray[np.float64]
 
 LEVEL_TIME_S = 150.0
 """Time constant with which the observer follows the recorded level."""

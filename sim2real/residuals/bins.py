@@ -4,10 +4,8 @@ from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from wetwell.protocols.arrays import Flags, Floats, Integers
 
 Signal = Literal["flow", "head", "power", "level", "start_level", "stop_level", "telemetry"]
 SIGNALS: tuple[Signal, ...] = get_args(Signal)
@@ -75,7 +73,7 @@ class Seconds:
         return values[self.second[begins]]
 
 
-def binned(counted: npt.NDArray[np.bool_], key: Integers, length_s: Integers) -> Seconds:
+def binned(counted: Flags, key: Integers, length_s: Integers) -> Seconds:
     """Bins of consecutive seconds with one key, each at most `length_s` long.
 
     Parameters

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
 from wetwell.sim2real.recording.traces import Traces
@@ -15,8 +15,6 @@ from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bi
 from wetwell.sim2real.residuals.signals import QUANTUM_SHARE, level_noise_m
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.telemetry.channels import LEVEL, channels_of
-
-Floats = npt.NDArray[np.float64]
 
 WINDOW_S = 30
 MIN_POINTS = 8
@@ -36,9 +34,9 @@ class Stretches:
     `counted` are the seconds of each, (events, `WINDOW_S`), and `is_counted` which of them count; `level_m` is (n,).
     """
 
-    second: npt.NDArray[np.int64]
-    counted: npt.NDArray[np.int64]
-    is_counted: npt.NDArray[np.bool_]
+    second: Integers
+    counted: Integers
+    is_counted: Flags
     level_m: Floats
 
     def lines(self, shift_s: float = 0.0) -> tuple[Floats, Floats]:
@@ -82,8 +80,8 @@ class EventMisfit:
     """
 
     bins: Bins
-    number: npt.NDArray[np.int64]
-    since_s: npt.NDArray[np.int64]
+    number: Integers
+    since_s: Integers
     stretches: Stretches
     noise_m: float
     pattern: Pattern | None
@@ -121,7 +119,7 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
     noise_m = level_noise_m(traces, station)
     events: list[Event] = []
     waited_s: list[int] = []
-    calm: list[npt.NDArray[np.bool_]] = []
+    calm: list[Flags] = []
     last = -NEVER_S
     ahead = np.arange(1 - WINDOW_S, 1)
     for event in regimes.events:

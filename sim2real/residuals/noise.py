@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 SEGMENT_S = 20
 MIN_SEGMENTS = 8

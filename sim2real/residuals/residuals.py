@@ -3,8 +3,8 @@
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import Regimes
 from wetwell.sim2real.recording.traces import Traces
@@ -13,8 +13,6 @@ from wetwell.sim2real.residuals.bins import Bins, joined
 from wetwell.sim2real.residuals.events import event_misfit
 from wetwell.sim2real.residuals.signals import level_misfit, pump_misfits
 from wetwell.sim2real.residuals.telemetry import telemetry_misfit
-
-Floats = npt.NDArray[np.float64]
 
 SOFT = 5.0
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.traces import Traces, repeated
@@ -16,8 +16,6 @@ from wetwell.sim2real.residuals.noise import Noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.plant import PlantParameters
 from wetwell.simulator.telemetry.channels import Quantity, channels_of
-
-Floats = npt.NDArray[np.float64]
 
 SIGNAL_OF: dict[str, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
 STEADY_BIN_S = 20
@@ -49,7 +47,7 @@ class SignalMisfit:
     pump: int
     seconds: Seconds
     recorded: Floats
-    is_repeated: npt.NDArray[np.bool_]
+    is_repeated: Flags
     pattern: Pattern | None
 
     def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:
@@ -122,14 +120,14 @@ def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list
     return stretches
 
 
-def _steps(traces: Traces, plain: Prediction) -> npt.NDArray[np.bool_]:
+def _steps(traces: Traces, plain: Prediction) -> Flags:
     """(n,) whether a pump is switched faster than a recording of each second shows."""
     nominal_hz = plain.plant.nominal_frequency_hz[:, None]
     moved = np.abs(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1])) / nominal_hz
     return np.asarray(np.any(moved > STEP, axis=0))
 
 
-def _unresolved(expected: Floats, is_step: npt.NDArray[np.bool_]) -> Floats:
+def _unresolved(expected: Floats, is_step: Flags) -> Floats:
     """(n,) how far a right model may be off since nobody knows when within a second a pump was switched."""
     jumps = np.abs(np.diff(expected, prepend=expected[:1])) * is_step
     return np.asarray(np.convolve(jumps, UNRESOLVED)[: expected.size], dtype=np.float64)

@@ -5,11 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.bins import Bins
-
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 MIN_FITTED = 4
 SURE = 3.0
@@ -34,12 +32,12 @@ def repeating(residuals: Floats, bins: Bins, fitted: Flags, pumps: int) -> Float
     return expected + _drift(group, bins.cycle, residuals - expected, fitted, NEIGHBOURS * pumps)
 
 
-def phase(bins: Bins) -> npt.NDArray[np.int64]:
+def phase(bins: Bins) -> Integers:
     """(bins,) number of the span of `PHASES_S` since the regime of a signal and pump began."""
     return np.asarray(np.searchsorted(PHASES_S, _since(bins, _group(bins))))
 
 
-def _group(bins: Bins) -> npt.NDArray[np.int64]:
+def _group(bins: Bins) -> Integers:
     """(bins,) number of signal, regime and pump together."""
     return (bins.signal * len(REGIMES) + bins.regime) * 64 + bins.pump + 1
 
@@ -49,7 +47,7 @@ def explained(residuals: Floats, expected: Floats) -> Floats:
     return np.asarray(residuals**2 - (residuals - expected) ** 2, dtype=np.float64)
 
 
-def _since(bins: Bins, group: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _since(bins: Bins, group: Integers) -> Integers:
     """Seconds since the first bin of the same group and cycle."""
     key = group * (int(bins.cycle.max(initial=0)) + 1) + bins.cycle
     _, inverse = np.unique(key, return_inverse=True)
@@ -58,7 +56,7 @@ def _since(bins: Bins, group: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     return bins.second - first[inverse]
 
 
-def _table(key: npt.NDArray[np.int64], values: Floats, fitted: Flags) -> Floats:
+def _table(key: Integers, values: Floats, fitted: Flags) -> Floats:
     _, inverse = np.unique(key, return_inverse=True)
     count = np.bincount(inverse[fitted], minlength=inverse.max(initial=0) + 1)
     total = np.bincount(inverse[fitted], values[fitted], count.size)
@@ -66,9 +64,7 @@ def _table(key: npt.NDArray[np.int64], values: Floats, fitted: Flags) -> Floats:
     return _certain(total, squares, count)[inverse]
 
 
-def _drift(
-    group: npt.NDArray[np.int64], cycle: npt.NDArray[np.int64], values: Floats, fitted: Flags, width: int
-) -> Floats:
+def _drift(group: Integers, cycle: Integers, values: Floats, fitted: Flags, width: int) -> Floats:
     """Mean of the fitted bins of the same group in the cycles around."""
     _, inverse = np.unique(group, return_inverse=True)
     cycles = int(cycle.max(initial=0)) + 1

@@ -3,17 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
 from wetwell.simulator.telemetry.channels import Quantity, channels_of
-
-Floats = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 MIN_MOVES, FEWEST = 30, 10
 """Moves from which their sizes are looked at, and from which a channel is held and not stuck."""

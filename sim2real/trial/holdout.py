@@ -3,12 +3,10 @@
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
-
-Floats = npt.NDArray[np.float64]
 
 SIGNALS = ("level_m", "flow_m3h", "head_m", "power_kw")
 SOFT = 5.0

@@ -1,11 +1,9 @@
 """Flexible regressor of the residuals: the upper bound of what correcting a prediction can gain without a cause."""
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
-
-Floats = npt.NDArray[np.float64]
 
 _SIGNALS = ("flow_m3h", "head_m", "power_kw")
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Integers
 from wetwell.sim2real.trial.answer import Answer, ToldEffect
 from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind, PlantName
 
@@ -237,7 +237,7 @@ def chance_level(pairs: Sequence[tuple[Label, Answer | None]], rng: np.random.Ge
     return {name: float(np.mean(values)) if values else None for name, values in totals.items()}
 
 
-def confusion(scores: Sequence[CaseScore]) -> tuple[list[str], list[str], npt.NDArray[np.int64]]:
+def confusion(scores: Sequence[CaseScore]) -> tuple[list[str], list[str], Integers]:
     """Rows (what is true), columns (what is told first, or the verdict) and counts; pairs are one row."""
     rows = sorted({_row(score) for score in scores})
     columns = sorted({score.told_names[0] for score in scores if score.told_names})

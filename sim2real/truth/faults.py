@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.truth.case import TruthFault
-from wetwell.sim2real.truth.spec import HOUR_S, Floats, Surroundings
+from wetwell.sim2real.truth.spec import HOUR_S, Surroundings
 
 PUMP_KINDS = {"blockage"}
 SYSTEM_KINDS = {"clogging", "static_rise"}

@@ -1,12 +1,11 @@
 """Inflow of a trial: two humps a day, a slow random part, pulses of rain."""
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.truth.case import TrueInflow
 
-Floats = npt.NDArray[np.float64]
 DAY_S = 86_400.0
 
 

@@ -19,13 +19,12 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.sim2real.truth.spec import CONE, PRISM, Floats, Spec
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.truth.spec import CONE, PRISM, Spec
 
 P = ParamSpec("P")
 R = TypeVar("R")
-Integers = npt.NDArray[np.int64]
 
 STEPS = 20
 STEP_S = 1.0 / STEPS

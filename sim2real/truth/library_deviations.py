@@ -9,10 +9,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.truth.case import Quantity
 from wetwell.sim2real.truth.inflow import slow_noise
 from wetwell.sim2real.truth.parts import Draw, Kind, Parameters, Truth, rounded
-from wetwell.sim2real.truth.spec import BENCH, CONE, HOUR_S, Floats
+from wetwell.sim2real.truth.spec import BENCH, CONE, HOUR_S
 
 DAY_S = 86_400.0
 _UNITS = {"level_m": 0.05, "inflow_m3h": 0.1, "frequency_hz": 2.0, "flow_m3h": 0.06, "head_m": 0.05, "power_kw": 0.05}

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.truth.inflow import slow_noise
 from wetwell.sim2real.truth.parts import Kind, Truth, rounded
-from wetwell.sim2real.truth.spec import Floats
 
 DAY_S = 86_400.0
 

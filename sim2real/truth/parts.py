@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.truth.case import Quantity
-from wetwell.sim2real.truth.spec import Floats, Spec, Surroundings, duty_m3h
+from wetwell.sim2real.truth.spec import Spec, Surroundings, duty_m3h
 from wetwell.sim2real.truth.telemetry import Telemetry
 
 Parameters = dict[str, float | str]

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
-
-Floats = npt.NDArray[np.float64]
 
 HOUR_S = 3600.0
 WATER_N_M3 = 1000.0 * 9.81

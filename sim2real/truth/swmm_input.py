@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.truth.kernel import area_m2
-from wetwell.sim2real.truth.spec import Floats, Spec
+from wetwell.sim2real.truth.spec import Spec
 
 SWMM_LIBRARY = (
     "friction_bias",

@@ -3,11 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.truth.case import Quantity
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -51,7 +49,7 @@ class Telemetry:
         return self.channel.setdefault(quantity, Channel())
 
 
-def sensed(true_values: Floats, is_alive: npt.NDArray[np.bool_], noise: Floats, channel: Channel) -> Floats:
+def sensed(true_values: Floats, is_alive: Flags, noise: Floats, channel: Channel) -> Floats:
     """(n,) readings before transmission; a dead channel reads exactly 0.
 
     Parameters

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
 from wetwell.protocols.timestamps import NS_PER_S
@@ -15,7 +16,7 @@ from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.faults import fault_states, force_faults, spoil
 from wetwell.sim2real.truth.inflow import inflow_m3h, slow_noise
 from wetwell.sim2real.truth.parts import Truth
-from wetwell.sim2real.truth.spec import HOUR_S, Floats, Surroundings, spec_of
+from wetwell.sim2real.truth.spec import HOUR_S, Surroundings, spec_of
 from wetwell.sim2real.truth.telemetry import Telemetry, sensed, transmitted
 
 _QUIET = Sensors(flow_noise=0.0, head_noise=0.0, power_noise=0.0, inflow_noise=0.0, level_noise_m=0.0)
@@ -50,7 +51,7 @@ class Passage:
         return Recording(time_ns=self._stamps_ns, columns=columns)
 
     @property
-    def _stamps_ns(self) -> npt.NDArray[np.int64]:
+    def _stamps_ns(self) -> Integers:
         return self.case.start_ns + NS_PER_S * np.arange(self.case.seconds)
 
     def _columns(self, case: TruthCase, station_record: Floats, rng: np.random.Generator) -> dict[str, Floats]:
@@ -173,7 +174,7 @@ def recorded(
         frequency_hz = transmitted(command * pump.nominal_frequency_hz, telemetry.of("frequency_hz"))
         columns[f"pump{i + 1}_frequency_hz"] = frequency_hz
         flow_m3h = damped * HOUR_S
-        quantities: tuple[tuple[Quantity, Floats, npt.NDArray[np.bool_], float], ...] = (
+        quantities: tuple[tuple[Quantity, Floats, Flags, float], ...] = (
             ("flow_m3h", flow_m3h, turns | (flow_m3h > 1e-3), sensors.flow_noise),
             ("head_m", head, turns, sensors.head_noise),
             ("power_kw", power / 1000.0, turns, sensors.power_noise),

@@ -4,8 +4,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Table
-from wetwell.simulator.plant import Floats, Forcing, PlantParameters
+from wetwell.simulator.plant import Forcing, PlantParameters
 from wetwell.simulator.telemetry.channels import Quantity, channels_of
 
 Component = Literal[

@@ -3,14 +3,12 @@
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.station.station_file import NonNegative, Positive, Table
 from wetwell.simulator.plant import Forcing
 from wetwell.simulator.telemetry.channels import Quantity, channels_of
-
-Floats = npt.NDArray[np.float64]
 
 SensedQuantity = Literal["level_m", "inflow_m3h", "flow_m3h", "head_m", "power_kw"]
 """Quantities that a sensor measures; the frequency is what the drive itself reports."""
@@ -62,9 +60,9 @@ class Profile(Table):
         share = np.clip((time_s - self.start_s) / (self.end_s - self.start_s), 0.0, 1.0)
         return np.where(self.is_active(time_s), share, 0.0)
 
-    def is_active(self, time_s: Floats) -> npt.NDArray[np.bool_]:
+    def is_active(self, time_s: Floats) -> Flags:
         """(n,) flags of the seconds in which the fault acts."""
-        active: npt.NDArray[np.bool_] = time_s >= self.start_s
+        active: Flags = time_s >= self.start_s
         if self.after == "clear":
             active &= time_s <= self.end_s
         if self.shape == "intermittent":

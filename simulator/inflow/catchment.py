@@ -4,12 +4,11 @@ import math
 from typing import Annotated, Literal, Self
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import NonNegative, Positive, Table
-from wetwell.simulator.inflow.stream import Floats
 
 HOURS = (
     *(0.55, 0.42, 0.34, 0.3, 0.34, 0.55, 1.05, 1.65, 1.8, 1.55, 1.25, 1.1),
@@ -118,7 +117,7 @@ class CatchmentStream:
         self._storms = [storm for storm in self._storms if storm[0] + lasts_s >= self._time_s]
         return flow_m3h
 
-    def _dry_m3h(self, time_s: npt.NDArray[np.int64]) -> Floats:
+    def _dry_m3h(self, time_s: Integers) -> Floats:
         hour, second = np.divmod(time_s, SECONDS_PER_HOUR)
         c0, c1, c2, c3 = self._pieces[:, hour % self._pieces.shape[1]]
         u = second / SECONDS_PER_HOUR

@@ -4,8 +4,8 @@ from typing import Literal
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Finite, NonNegative, Positive, Table
-from wetwell.simulator.inflow.stream import Floats
 from wetwell.simulator.inflow.surges import Surges
 
 

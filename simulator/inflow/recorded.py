@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, PlainSerializer, model_validator
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Table
-from wetwell.simulator.inflow.stream import Floats
 
 
 def _floats(values: Any) -> Floats:

@@ -2,10 +2,7 @@
 
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
-Floats = npt.NDArray[np.float64]
+from wetwell.protocols.arrays import Floats
 
 
 class InflowStream(Protocol):

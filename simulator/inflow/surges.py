@@ -5,8 +5,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import NonNegative, Table
-from wetwell.simulator.inflow.stream import Floats
 
 
 class Surges(Table):

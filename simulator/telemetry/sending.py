@@ -3,14 +3,12 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.simulator import layout as at
 from wetwell.simulator.telemetry.channels import FLOW, FREQUENCY, HEAD, POWER, pump_channel
 from wetwell.simulator.telemetry.sensors import sense, transmit
-
-Floats = npt.NDArray[np.float64]
 
 
 @compiled

@@ -4,14 +4,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Sensors
 from wetwell.simulator import layout as at
 from wetwell.simulator.telemetry.channels import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, channels
-
-Floats = npt.NDArray[np.float64]
 
 MAX_DELAY_S = 119
 RESTING = 1e-6

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.keys import SITE, alive_key
 from wetwell.protocols.bus.zenoh.link import connect_client
@@ -106,7 +106,7 @@ def undisturbed(alpha, folder: Path) -> tuple[list[int], set[bytes], list[bytes]
         Sample.model_validate(sample.model_dump() | {"seq": seq})
         for sample, seq in zip(kept.recording().samples("alpha"), kept.seq.tolist(), strict=True)
     ]
-    detector = Detector("alpha", nominal_of(alpha))
+    detector = Detector("alpha", datasheet_of(alpha))
     wanted = {verdict.encode() for sample in samples for verdict in detector.update(sample)}
     return kept.seq.tolist(), wanted, verdicts
 

@@ -15,14 +15,14 @@ from functools import partial
 
 from routers import Router, free_address
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.keys import sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
 from wetwell.protocols.messages.messages import Sample, Verdict
 from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -96,10 +96,10 @@ class Cable:
 
 
 @contextlib.asynccontextmanager
-async def judged(endpoint: str, station) -> AsyncIterator[StationJudge]:
+async def judged(endpoint: str, station) -> AsyncIterator[StationDetector]:
     """A judge behind a router."""
     with await connect_client(f"tcp/{endpoint}") as bus:
-        judge = StationJudge(bus, station)
+        judge = StationDetector(bus, station)
         running = asyncio.create_task(Intake(bus, [judge]).run())
         try:
             yield judge
@@ -108,7 +108,7 @@ async def judged(endpoint: str, station) -> AsyncIterator[StationJudge]:
             await asyncio.gather(running, return_exceptions=True)
 
 
-async def caught_up(judges: list[StationJudge], last_ns: int, limit_s: float = LIMIT_S) -> bool:
+async def caught_up(judges: list[StationDetector], last_ns: int, limit_s: float = LIMIT_S) -> bool:
     """Whether all judges have a sample in time."""
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(limit_s):
@@ -191,7 +191,7 @@ async def through_accidents(stations, samples: dict[str, list[Sample]]) -> tuple
 
 
 def undisturbed(station, samples: list[Sample]) -> set[bytes]:
-    detector = Detector(station.name, nominal_of(station))
+    detector = Detector(station.name, datasheet_of(station))
     return {verdict.encode() for sample in samples for verdict in detector.update(sample)}
 
 

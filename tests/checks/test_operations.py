@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.stream.gate import COUNTS
 from wetwell.services.alarms.rules import RULES
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.alarms.tables import TARGETS
 from wetwell.services.runtime.health.metrics import METRICS
@@ -42,7 +42,7 @@ def test_every_count_of_detector_and_alarms_has_its_meaning():
 
 
 def test_every_figure_of_alarms_has_its_meaning():
-    keeper = AlarmKeeper(None, AlarmSettings(), (), lambda: Now(0, 0.0))
+    keeper = AlarmService(None, AlarmSettings(), (), lambda: Now(0, 0.0))
     assert set(keeper.figures()) | {"dropped"} <= set(METRICS)
     assert set(TARGETS) <= set(METRICS)
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from accidents import CLOCK_STEP_S
 from simulated_site import Site
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.keys import sample_key
 from wetwell.protocols.messages.messages import Sample, Verdict
@@ -31,7 +31,7 @@ def fingerprint(site: Site) -> str:
 def _verdicts(site: Site) -> Iterator[str]:
     """The stream of verdicts is that of a detector that gets each published sample once, in order."""
     for station in site.stations:
-        detector = Detector(station.name, nominal_of(station))
+        detector = Detector(station.name, datasheet_of(station))
         wanted = {verdict.encode() for sample in _samples(site, station) for verdict in detector.update(sample)}
         heard = site.told.get(station.name, {}).keys()
         if missing := wanted - heard:

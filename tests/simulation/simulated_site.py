@@ -27,8 +27,8 @@ from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.alarms import serve as alarms_serve
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms import daemon as alarms_daemon
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.detector.daemon import judge_all
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
@@ -164,8 +164,8 @@ class Site:
             store.close()
 
     async def _alarm(self, bus: SimulatedBus) -> None:
-        keeper = AlarmKeeper(bus, self.settings.alarms, self.stations, alarms_serve.clocks)
-        await alarms_serve.keep(bus, keeper, health_period_s=60.0 * self.period_s)
+        keeper = AlarmService(bus, self.settings.alarms, self.stations, alarms_daemon.clocks)
+        await alarms_daemon.keep(bus, keeper, health_period_s=60.0 * self.period_s)
 
     async def _observe(self, bus: SimulatedBus) -> None:
         samples = bus.collect([sample_key(station.name) for station in self.stations], capacity=1_000_000)
@@ -197,7 +197,7 @@ class Site:
         """Clock, PLC connections and disks of this site in place of the real ones."""
         loop = asyncio.get_running_loop()
         write = FolderStore.write
-        real = atomic_file.whole_file
+        real = atomic_file.atomic_file
 
         def time_ns() -> int:
             return START_NS + round((loop.time() + self.clock_s) * NS_PER_S)
@@ -221,8 +221,8 @@ class Site:
                 ("wetwell.services.gateway.poller.random", self.dice),
                 ("wetwell.services.alarms.daemon.LOOK_S", 1.0 * self.period_s),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
-                ("wetwell.services.detector.checkpoint.whole_file", file),
-                ("wetwell.services.alarms.state_file.whole_file", file),
+                ("wetwell.services.detector.checkpoint.atomic_file", file),
+                ("wetwell.services.alarms.state_file.atomic_file", file),
                 ("wetwell.services.historian.store.folder_store.FolderStore.write", keep),
             ):
                 patches.enter_context(mock.patch(target, replacement))

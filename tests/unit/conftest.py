@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.runs.run import SEGMENT_SAMPLES, Run, Segments
 from wetwell.protocols.recordings.recording import Recording
@@ -85,7 +85,7 @@ def part_of(recording, first_s):
 def learnt(alpha):
     """A detector that has learnt the paper's station; to be copied before it is used."""
     before = Simulation(alpha, Scenario(name="healthy"), SEED).advance(LEARNT_S)
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     told = [verdict for sample in before.samples(alpha.name) for verdict in detector.update(sample)]
     last = {verdict.pump: verdict.state for verdict in told}
     assert last == {1: "normal", 2: "normal", 3: "normal"}

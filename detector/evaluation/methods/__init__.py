@@ -9,7 +9,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Protocol
 
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.stream.block import Block
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.messages import Verdict
@@ -39,7 +39,7 @@ DETECTORS = {
 """Module and class of each detector by name."""
 
 
-def detector_class(name: str) -> Callable[[str, Nominal], StreamDetector]:
+def detector_class(name: str) -> Callable[[str, Datasheet], StreamDetector]:
     """Class of a detector by its name in `DETECTORS`; called with the station's name and its datasheet curves.
 
     Raises
@@ -51,7 +51,7 @@ def detector_class(name: str) -> Callable[[str, Nominal], StreamDetector]:
         raise ConfigError(f"detector '{name}' is none of {', '.join(DETECTORS)}")
     module, _, attribute = DETECTORS[name].partition(":")
     try:
-        found: Callable[[str, Nominal], StreamDetector] = getattr(import_module(module), attribute)
+        found: Callable[[str, Datasheet], StreamDetector] = getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"detector '{name}' needs the package {error.name}: pip install wetwell[baselines]"

@@ -3,9 +3,10 @@
 import numpy as np
 from statsmodels.stats.diagnostic import breaks_cusumolsresid
 
-from wetwell.detector.curves.datasheet import Nominal
-from wetwell.detector.evaluation.methods.run_detector import ALPHA, Floats, RunDetector, state_of
+from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.evaluation.methods.run_detector import ALPHA, RunDetector, state_of
 from wetwell.detector.runs.run import Run
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
 
 
@@ -19,9 +20,9 @@ class CusumStatsmodels(RunDetector):
     .. [1] W. Ploberger, W. Krämer, The CUSUM test with OLS residuals, Econometrica 60, 1992.
     """
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
-        self._learnt_m: list[Floats] = [np.empty((0, 2)) for _ in range(nominal.pumps)]
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
+        self._learnt_m: list[Floats] = [np.empty((0, 2)) for _ in range(datasheet.pumps)]
 
     def _learn(self, pump: int, runs: list[Run]) -> None:
         self._learnt_m[pump] = np.concatenate([run.segments.residual_m for run in runs])

@@ -5,11 +5,12 @@ from collections import deque
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal
-from wetwell.detector.evaluation.methods.run_detector import Floats, RunDetector
+from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.evaluation.methods.run_detector import RunDetector
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.bootstrap import block_bootstrap_interval
 from wetwell.detector.statistics.tangent import attribution_index
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
 
 RUNS = 50
@@ -32,9 +33,9 @@ class IndexMethod(RunDetector):
     block: int
     """Neighbouring residuals that are drawn together."""
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
-        self._healthy: list[deque[float]] = [deque(maxlen=RUNS) for _ in range(nominal.pumps)]
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
+        self._healthy: list[deque[float]] = [deque(maxlen=RUNS) for _ in range(datasheet.pumps)]
         self._rng = np.random.default_rng(0)
 
     @abstractmethod

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal
-from wetwell.detector.evaluation.methods.run_detector import ALPHA, Floats, RunDetector, state_of
+from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.evaluation.methods.run_detector import ALPHA, RunDetector, state_of
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.f_distribution import log_f_survival
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
 
 
@@ -24,9 +25,9 @@ class PaperFShift(RunDetector):
     .. [1] N. R. Draper, H. Smith, Applied Regression Analysis, 3rd edition, Wiley 1998 (extra sum of squares).
     """
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
-        self._means_m: list[Floats] = [np.empty((0, 2)) for _ in range(nominal.pumps)]
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
+        self._means_m: list[Floats] = [np.empty((0, 2)) for _ in range(datasheet.pumps)]
 
     def _learn(self, pump: int, runs: list[Run]) -> None:
         self._means_m[pump] = np.array([run.segments.residual_m.mean(axis=0) for run in runs])

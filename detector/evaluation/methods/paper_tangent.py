@@ -1,9 +1,9 @@
 """The paper's second method as it is written: the tangent index of one-second differences."""
 
 from wetwell.detector.evaluation.methods.index_method import IndexMethod
-from wetwell.detector.evaluation.methods.run_detector import Floats
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.tangent import tangent_residuals
+from wetwell.protocols.arrays import Floats
 
 
 class PaperTangent(IndexMethod):
@@ -22,7 +22,7 @@ class PaperTangent(IndexMethod):
             run.flow_m3h,
             run.head_m,
             run.speed_ratio,
-            curve=self._nominal.curves[run.pump],
-            friction_h2_m5=self._nominal.friction_h2_m5,
+            curve=self._datasheet.curves[run.pump],
+            friction_h2_m5=self._datasheet.friction_h2_m5,
             total_flow_m3h=run.total_flow_m3h,
         )

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.evaluation.methods.index_method import IndexMethod
-from wetwell.detector.evaluation.methods.run_detector import Floats
 from wetwell.detector.runs.run import SEGMENT_SAMPLES, Run
 from wetwell.detector.statistics.tangent import normalise, pump_slope, segment_means, system_slope
+from wetwell.protocols.arrays import Floats
 
 
 class PaperTangentSegments(IndexMethod):
@@ -26,9 +26,9 @@ class PaperTangentSegments(IndexMethod):
 
     block = 2
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
-        self._learnt = np.full((nominal.pumps, 4), np.nan)
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
+        self._learnt = np.full((datasheet.pumps, 4), np.nan)
 
     def _learn(self, pump: int, runs: list[Run]) -> None:
         self._learnt[pump] = np.mean(np.concatenate([_segments(run) for run in runs], axis=1), axis=1)
@@ -37,8 +37,8 @@ class PaperTangentSegments(IndexMethod):
     def _residuals(self, run: Run) -> tuple[Floats, Floats]:
         now, learnt = _segments(run), self._learnt[run.pump][:, np.newaxis]
         step, (middle, _, total, _) = now - learnt, (now + learnt) / 2.0
-        psi_p = step[1] - pump_slope(middle, self._nominal.curves[run.pump]) * step[0]
-        psi_s = step[3] - system_slope(total, self._nominal.friction_h2_m5) * step[2]
+        psi_p = step[1] - pump_slope(middle, self._datasheet.curves[run.pump]) * step[0]
+        psi_s = step[3] - system_slope(total, self._datasheet.friction_h2_m5) * step[2]
         return psi_p, psi_s
 
 

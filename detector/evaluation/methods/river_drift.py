@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 from river.drift import ADWIN, PageHinkley
 
-from wetwell.detector.curves.datasheet import Nominal
-from wetwell.detector.evaluation.methods.run_detector import Floats, RunDetector, state_of
+from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.evaluation.methods.run_detector import RunDetector, state_of
 from wetwell.detector.runs.run import Run
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
 
 AWAY_SIGMAS = 3.0
@@ -21,13 +22,13 @@ class RiverDrift(RunDetector):
     not.
     """
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
-        super().__init__(station, nominal)
-        self._detectors = [[self._new() for _ in range(2)] for _ in range(nominal.pumps)]
-        self._alarms = np.zeros((nominal.pumps, 2), dtype=np.bool_)
-        self._centre_m = np.zeros((nominal.pumps, 2))
-        self._segment_sd_m = np.ones((nominal.pumps, 2))
-        self._run_sd_m = np.ones((nominal.pumps, 2))
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
+        super().__init__(station, datasheet)
+        self._detectors = [[self._new() for _ in range(2)] for _ in range(datasheet.pumps)]
+        self._alarms = np.zeros((datasheet.pumps, 2), dtype=np.bool_)
+        self._centre_m = np.zeros((datasheet.pumps, 2))
+        self._segment_sd_m = np.ones((datasheet.pumps, 2))
+        self._run_sd_m = np.ones((datasheet.pumps, 2))
 
     def _new(self) -> Any:
         raise NotImplementedError

@@ -2,18 +2,13 @@
 
 from abc import ABC, abstractmethod
 
-import numpy as np
-import numpy.typing as npt
-
-from wetwell.detector.curves.datasheet import Nominal
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, Run
 from wetwell.detector.runs.run_tracker import RunTracker
 from wetwell.detector.stream.block import Block
 from wetwell.detector.stream.gate import Gate
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-
-Floats = npt.NDArray[np.float64]
 
 LEARNING_S = 6.0 * 3600.0
 MIN_RUNS = 4
@@ -34,16 +29,16 @@ class RunDetector(ABC):
     ----------
     station : str
         Name for the verdicts.
-    nominal : Nominal
+    datasheet : Datasheet
         Datasheet curves.
     """
 
-    def __init__(self, station: str, nominal: Nominal) -> None:
+    def __init__(self, station: str, datasheet: Datasheet) -> None:
         self._station = station
-        self._nominal = nominal
-        self._gate = Gate(nominal)
-        self._runs = RunTracker(nominal)
-        self._learning: list[list[Run] | None] = [[] for _ in range(nominal.pumps)]
+        self._datasheet = datasheet
+        self._gate = Gate(datasheet)
+        self._runs = RunTracker(datasheet)
+        self._learning: list[list[Run] | None] = [[] for _ in range(datasheet.pumps)]
         self._begin_ns: int | None = None
 
     def take(self, block: Block) -> list[Verdict]:

@@ -16,8 +16,8 @@ from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
 from wetwell.protocols.bus.zenoh.publisher import ZenohPublisher, at_once
 from wetwell.protocols.bus.zenoh.session import open_client_session, open_router_session, refusal
-from wetwell.protocols.bus.zenoh.subscription import Feed
-from wetwell.protocols.bus.zenoh.worker import ZenohPump
+from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
+from wetwell.protocols.bus.zenoh.worker import ZenohWorker
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.messages import JSON_ENCODING
 
@@ -69,7 +69,7 @@ class ZenohBus:
         self._session = session
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
-        self._pump = ZenohPump(session, is_router=is_router)
+        self._pump = ZenohWorker(session, is_router=is_router)
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
         self._exit.callback(self._pump.stop)
@@ -121,7 +121,7 @@ class ZenohBus:
             mailbox.extend([payload for _, payload in messages])
 
         with refusal("subscribe to", key):
-            self._pump.follow(Feed(self._session, [key], history, take, recover=recover))
+            self._pump.follow(ZenohSubscription(self._session, [key], history, take, recover=recover))
         return mailbox
 
     def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
@@ -134,7 +134,7 @@ class ZenohBus:
         """
         mailbox: Mailbox[Keyed] = Mailbox(capacity)
         with refusal("subscribe to", ", ".join(keys[:3])):
-            self._pump.follow(Feed(self._session, keys, history, mailbox.extend, recover=True))
+            self._pump.follow(ZenohSubscription(self._session, keys, history, mailbox.extend, recover=True))
         return mailbox
 
     def answer(self, key: str) -> Mailbox[Request]:

@@ -8,7 +8,7 @@ import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.publisher_cache import Page
-from wetwell.protocols.bus.sequencer import Follower, Line
+from wetwell.protocols.bus.sequencer import Sequencer, SourceStream
 from wetwell.protocols.bus.zenoh.publisher import at_once
 
 logger = logging.getLogger(__name__)
@@ -19,7 +19,7 @@ TURN = 5_000
 """Messages that are fetched from one channel before the others have their turn."""
 
 
-class Feed:
+class ZenohSubscription:
     """A subscription: its channels, the order of what comes from them, and where it goes."""
 
     def __init__(
@@ -33,7 +33,7 @@ class Feed:
     ) -> None:
         self.keys = keys
         self.history = history
-        self.follower = Follower(history)
+        self.follower = Sequencer(history)
         self.recovers = recover or history > 0
         self._take = take
         self._tails: deque[tuple[str, bytes]] = deque()
@@ -80,7 +80,7 @@ class Feed:
         self.follower.take_page(key, page, is_from_next=is_from_next)
         self._tell_lost(key)
 
-    def give_up(self, line: Line) -> None:
+    def give_up(self, line: SourceStream) -> None:
         """Go on without what is missing, and say so."""
         self.follower.give_up(line)
         self.pass_on()

@@ -15,9 +15,9 @@ from typing import Any
 import zenoh
 
 from wetwell.protocols.bus.publisher_cache import KeptQuery, Page
-from wetwell.protocols.bus.sequencer import Line
+from wetwell.protocols.bus.sequencer import SourceStream
 from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher, at_once
-from wetwell.protocols.bus.zenoh.subscription import CHANNEL, Feed
+from wetwell.protocols.bus.zenoh.subscription import CHANNEL, ZenohSubscription
 from wetwell.protocols.messages.messages import JSON_ENCODING
 
 logger = logging.getLogger(__name__)
@@ -42,12 +42,12 @@ LOOK = KeptQuery().encode()
 
 
 @dataclass
-class Question:
+class RecoveryQuery:
     """A question for missing messages of a line, or for the last message of all publishers on a key."""
 
-    feed: Feed
+    feed: ZenohSubscription
     key: str
-    line: Line | None = None
+    line: SourceStream | None = None
     due_s: float = 0.0
     begin: int = 0
     tries: int = 0
@@ -55,7 +55,7 @@ class Question:
     is_refused: bool = False
 
 
-class ZenohPump(threading.Thread):
+class ZenohWorker(threading.Thread):
     """Serves all feeds and publishers of a session until it is stopped.
 
     Parameters
@@ -70,11 +70,11 @@ class ZenohPump(threading.Thread):
         self.questions: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
         self._session = session
         self._is_router = is_router
-        self._feeds: list[Feed] = []
+        self._feeds: list[ZenohSubscription] = []
         self._publishers: list[ZenohPublisher] = []
         self._turn = 0
-        self._due: deque[Question] = deque()
-        self._asked: list[Question] = []
+        self._due: deque[RecoveryQuery] = deque()
+        self._asked: list[RecoveryQuery] = []
         self._stopping = threading.Event()
         self._has_reconnected = threading.Event()
         self._lock = threading.Lock()
@@ -85,10 +85,10 @@ class ZenohPump(threading.Thread):
         self._publishers.append(publisher)
         self._begin()
 
-    def follow(self, feed: Feed) -> None:
+    def follow(self, feed: ZenohSubscription) -> None:
         """Serve a subscription from now on, beginning with what is kept of it."""
         if feed.history:
-            self._due.extend(Question(feed, key) for key in feed.keys)
+            self._due.extend(RecoveryQuery(feed, key) for key in feed.keys)
         self._feeds.append(feed)
         self._begin()
 
@@ -139,7 +139,7 @@ class ZenohPump(threading.Thread):
                 publisher.stir(now_s)
             due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
             self._due.extend(
-                Question(feed, key, due_s=due_s) for feed in self._feeds if feed.recovers for key in feed.keys
+                RecoveryQuery(feed, key, due_s=due_s) for feed in self._feeds if feed.recovers for key in feed.keys
             )
         told = 0
         for _ in range(-(-len(self._publishers) // ROUNDS)):
@@ -150,7 +150,7 @@ class ZenohPump(threading.Thread):
 
     def _hear(self, now_s: float) -> None:
         """Take the answers that have come."""
-        going: list[Question] = []
+        going: list[RecoveryQuery] = []
         for question in self._asked:
             if self._take_replies(question):
                 going.append(question)
@@ -158,7 +158,7 @@ class ZenohPump(threading.Thread):
                 self._finish(question, now_s)
         self._asked = going
 
-    def _take_replies(self, question: Question) -> bool:
+    def _take_replies(self, question: RecoveryQuery) -> bool:
         """Whether more may come."""
         feed = question.feed
         try:
@@ -176,7 +176,7 @@ class ZenohPump(threading.Thread):
             feed.pass_on()
         return True
 
-    def _finish(self, question: Question, now_s: float) -> None:
+    def _finish(self, question: RecoveryQuery, now_s: float) -> None:
         """Ask again, later, where that may help; give up in the end."""
         line = question.line
         if line is None:
@@ -205,7 +205,7 @@ class ZenohPump(threading.Thread):
         for feed in self._feeds:
             for line in feed.follower.wanted.values():
                 line.is_asked = True
-                self._due.append(Question(feed, line.key, line))
+                self._due.append(RecoveryQuery(feed, line.key, line))
             feed.follower.wanted.clear()
         if not self._due or not (self._is_router or self._session.info.routers_zid()):
             return
@@ -219,7 +219,7 @@ class ZenohPump(threading.Thread):
             self._put_question(question)
             self._asked.append(question)
 
-    def _put_question(self, question: Question) -> None:
+    def _put_question(self, question: RecoveryQuery) -> None:
         line, payload, manners = question.line, LOOK, zenoh.CongestionControl.BLOCK
         if line is not None:
             question.begin = line.next

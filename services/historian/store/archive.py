@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from wetwell.protocols.atomic_file import whole_file
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.services.historian.rows import Floats, Integers
 from wetwell.services.historian.samples import Samples, columns_of, pumps_of
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.summary import Summary
@@ -136,7 +136,7 @@ def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: di
     table = pa.table({"time": pa.array(time_ns, _STAMP), **columns, **arrays})
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(path) as file:
+        with atomic_file(path) as file:
             pa.parquet.write_table(
                 table,
                 file,

@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from wetwell.services.historian.rows import Floats, Integers
+from wetwell.protocols.arrays import Floats, Integers
 
 COPY_HEADER = b"PGCOPY\n\xff\r\n\0" + struct.pack(">2i", 0, 0)
 COPY_END = struct.pack(">h", -1)

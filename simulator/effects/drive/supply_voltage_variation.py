@@ -4,8 +4,9 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import Floats, Forcing
+from wetwell.simulator.plant import Forcing
 
 
 class SupplyVoltageVariation(Effect):

@@ -4,7 +4,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from wetwell.simulator.faults.profile import Floats, PumpFault
+from wetwell.protocols.arrays import Floats
+from wetwell.simulator.faults.profile import PumpFault
 from wetwell.simulator.plant import Forcing
 
 

@@ -4,8 +4,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Positive
-from wetwell.simulator.faults.profile import Floats, PumpFault
+from wetwell.simulator.faults.profile import PumpFault
 from wetwell.simulator.plant import Forcing
 
 

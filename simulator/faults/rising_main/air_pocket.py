@@ -2,8 +2,9 @@
 
 from typing import Any, ClassVar, Literal
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import NonNegative
-from wetwell.simulator.faults.profile import Floats, SystemFault
+from wetwell.simulator.faults.profile import SystemFault
 from wetwell.simulator.plant import Forcing
 
 

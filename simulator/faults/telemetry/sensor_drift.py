@@ -2,8 +2,9 @@
 
 from typing import Any, ClassVar, Literal
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Finite
-from wetwell.simulator.faults.profile import ChannelFault, Floats
+from wetwell.simulator.faults.profile import ChannelFault
 from wetwell.simulator.plant import Forcing
 
 SECONDS_PER_HOUR = 3600.0

@@ -4,7 +4,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from wetwell.simulator.faults.profile import ChannelFault, Floats
+from wetwell.protocols.arrays import Floats
+from wetwell.simulator.faults.profile import ChannelFault
 from wetwell.simulator.plant import Forcing
 
 

@@ -9,11 +9,11 @@ from wetwell.protocols.bus.keys import sample_block_key, sample_key, verdict_key
 from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Sample, Verdict
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.detector.intake import Intake, Waiting
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.daemon import keep
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
@@ -126,7 +126,7 @@ async def verdicts_of(alpha, messages: list[tuple[str, bytes]]) -> tuple[list[by
     with MemoryBus() as bus:
         verdicts = bus.subscribe(verdict_key("alpha"), capacity=100_000)
         publishers = {key: bus.publisher(key) for key, _ in messages}
-        judge = StationJudge(bus, alpha)
+        judge = StationDetector(bus, alpha)
         judging = asyncio.create_task(Intake(bus, [judge]).run())
         for number, (key, payload) in enumerate(messages):
             publishers[key].put(payload)
@@ -153,7 +153,7 @@ def test_a_sample_that_cannot_be_judged_takes_none_of_its_block_along(alpha, sam
     for kind, messages in ((Sample, single), (SampleBlock, payloads(samples[:3_000], 600))):
         with MemoryBus() as bus:
             verdicts = bus.subscribe(verdict_key("alpha"))
-            judge = StationJudge(bus, alpha)
+            judge = StationDetector(bus, alpha)
             monkeypatch.setattr(judge.detector, "_stopped", lambda _: 1 / 0)
             judge.take_payloads(messages, kind)
             told.append(asyncio.run(verdicts.receive()))
@@ -167,7 +167,7 @@ def test_a_sample_that_cannot_be_judged_takes_none_of_its_block_along(alpha, sam
 
 def test_foreign_and_malformed_blocks_are_counted_and_left_out(alpha, samples):
     with MemoryBus() as bus:
-        judge = StationJudge(bus, alpha)
+        judge = StationDetector(bus, alpha)
         block = SampleBlock.of(samples[:5])
         judge.take_payloads(
             [b"{}", block.model_copy(update={"station": "beta"}).encode(), block.encode()], SampleBlock
@@ -184,7 +184,7 @@ def test_alarms_and_page_know_from_blocks_what_they_know_from_samples(alpha, sam
     keepers, views = [], []
     for kind in ("take_sample", "take_sample_block"):
         with MemoryBus() as bus:
-            keeper = AlarmKeeper(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
+            keeper = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
             view = SiteView(stale_s=10.0)
             view.advance(0.0)
             size = 10 if kind == "take_sample_block" else 1

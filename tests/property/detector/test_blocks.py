@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import Block, blocks
 from wetwell.protocols.recordings.recording import Recording
@@ -82,7 +82,7 @@ def test_blocks_give_the_verdicts_and_the_state_of_single_samples(recordings, la
     if seed:  # the first is left whole
         recording = spoilt(recording, rng)
     station = stations()[layout]
-    one_by_one, in_blocks = (Detector(station.name, nominal_of(station)) for _ in range(2))
+    one_by_one, in_blocks = (Detector(station.name, datasheet_of(station)) for _ in range(2))
     expected = [verdict.encode() for row in recording.rows() for verdict in one_by_one.update(row)]
     pieces = (piece for block in blocks(recording, len(station.pump)) for piece in cut(block, rng))
     assert [verdict.encode() for piece in pieces for verdict in in_blocks.take(piece)] == expected
@@ -97,7 +97,7 @@ def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
     recording, station = recordings["alpha", "blocked"], stations()["alpha"]
     columns = {name: values[::every] for name, values in recording.columns.items() if name != "pump2_head_m"}
     recording = Recording(time_ns=recording.time_ns[::every], columns=columns)
-    one_by_one, in_blocks = (Detector(station.name, nominal_of(station)) for _ in range(2))
+    one_by_one, in_blocks = (Detector(station.name, datasheet_of(station)) for _ in range(2))
     expected = [verdict for row in recording.rows() for verdict in one_by_one.update(row)]
     pieces = (piece for block in blocks(recording, 3) for piece in cut(block, np.random.default_rng(every)))
     told = [verdict.encode() for piece in pieces for verdict in in_blocks.take(piece)]
@@ -109,7 +109,7 @@ def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
 
 def test_messages_give_the_verdicts_of_the_rows_that_they_were(recordings):
     recording, station = spoilt(recordings["alpha", "blocked"], np.random.default_rng(99)), stations()["alpha"]
-    in_blocks, live = (Detector(station.name, nominal_of(station)) for _ in range(2))
+    in_blocks, live = (Detector(station.name, datasheet_of(station)) for _ in range(2))
     told = [verdict.encode() for block in blocks(recording, 3) for verdict in in_blocks.take(block)]
     assert [v.encode() for sample in recording.samples("alpha") for v in live.update(sample)] == told
     assert live.snapshot() == in_blocks.snapshot()

@@ -18,9 +18,9 @@ from wetwell.protocols.messages.fleet import Plan
 from wetwell.protocols.messages.history import HistoryQuery
 from wetwell.protocols.messages.messages import MessageError, Order, PumpReading, Sample, Verdict
 from wetwell.protocols.messages.sample_block import SampleBlock
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.runtime.settings import AlarmSettings
@@ -93,8 +93,8 @@ def daemons(alpha, tmp_path_factory):
     """Detector, alarms and historian that live through all examples."""
     store = FolderStore(tmp_path_factory.mktemp("history"), keep_live_days=1)
     with MemoryBus() as bus:
-        judge = StationJudge(bus, alpha)
-        keeper = AlarmKeeper(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
+        judge = StationDetector(bus, alpha)
+        keeper = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
         yield judge, keeper, Historian(store)
     store.close()
 

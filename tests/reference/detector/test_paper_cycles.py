@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.methods import detector_class
 from wetwell.services.stations import find_station
 
@@ -33,7 +33,7 @@ def recording(benchmark, station):
 
 
 def told(benchmark, make, station, recording):
-    return benchmark.score([benchmark.judged(make(station.name, nominal_of(station)), recording)])
+    return benchmark.score([benchmark.judged(make(station.name, datasheet_of(station)), recording)])
 
 
 @pytest.mark.parametrize("name", ["paper_f_test", "paper_tangent"])

@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.evaluation.detections import detections, false_alarms
 from wetwell.detector.evaluation.scores import macro_f1, scored_runs
@@ -26,7 +26,7 @@ def judged(name, seed):
         station = station.model_copy(update={"rising_main": main})
         scenario = scenario.model_copy(update={"inflow": DiurnalInflow(surges=Surges(flow_m3h=80.0))})
     recording = Simulation(station, scenario, seed).advance(172_800)
-    detector = Detector(station.name, nominal_of(station))
+    detector = Detector(station.name, datasheet_of(station))
     verdicts = [verdict for sample in recording.samples(station.name) for verdict in detector.update(sample)]
     return recording, [*verdicts, *detector.finish()]
 

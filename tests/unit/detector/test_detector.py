@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wetwell.detector.baseline.learning import LEARNING_S
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULTS
 from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
@@ -30,7 +30,7 @@ def samples(alpha):
 
 
 def judged(station, stream):
-    detector = Detector(station.name, nominal_of(station))
+    detector = Detector(station.name, datasheet_of(station))
     verdicts = [verdict for sample in stream for verdict in detector.update(sample)]
     return [*verdicts, *detector.finish()], detector
 
@@ -41,7 +41,7 @@ def verdicts(alpha, samples):
 
 
 def test_the_first_sample_gives_one_learning_verdict_a_pump(alpha, samples):
-    first = Detector(alpha.name, nominal_of(alpha)).update(samples[0])
+    first = Detector(alpha.name, datasheet_of(alpha)).update(samples[0])
     assert [(verdict.pump, verdict.state, verdict.time) for verdict in first] == [
         (pump, "learning", samples[0].time) for pump in (1, 2, 3)
     ]
@@ -152,7 +152,7 @@ def test_a_clock_that_jumps_a_day_ahead_does_not_shorten_learning(alpha, samples
 
 
 def test_a_run_too_short_to_judge_is_unknown_and_carries_no_onset(alpha, samples):
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     for sample in samples:
         detector.update(sample)
     detector.finish()
@@ -185,7 +185,7 @@ def cheap_days(days, period_s):
 
 
 def test_the_state_does_not_grow_over_ten_days(alpha):
-    detector, sizes, states = Detector(alpha.name, nominal_of(alpha)), [], set()
+    detector, sizes, states = Detector(alpha.name, datasheet_of(alpha)), [], set()
     for n, sample in enumerate(cheap_days(10, 30), start=1):
         states |= {verdict.state for verdict in detector.update(sample)}
         if n % (86_400 // 30) == 0:

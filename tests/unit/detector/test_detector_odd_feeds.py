@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULTS
 from wetwell.protocols.messages.readings import PumpRow, Row
@@ -18,7 +18,7 @@ HOURS = 9
 
 def judged(alpha, reading, *, level_m=1.0, hours=HOURS, pumps=3):
     """Verdicts on cycles of a run and a rest, the pumps in turn; `reading(second, pump)` while one runs."""
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     verdicts = []
     for second in range(hours * 3600):
         turn = second // CYCLE_S % pumps
@@ -78,14 +78,14 @@ def test_a_rest_between_equal_readings_is_no_repeat(alpha):
 
 
 def test_samples_that_all_come_at_once_are_doubled_ones(alpha):
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     for number in range(1000):
         detector.update(Row(number, number, 1.0, math.nan, (OFF,) * 3))
     assert detector.counts["doubled"] == 999
 
 
 def test_a_clock_that_is_set_back_leaves_no_window_after_its_verdict(alpha):
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     on = PumpRow(50.0, 200.0, 26.0, 15.0, True)
     stamps = [*range(5000, 5200), *range(1000, 1200)]
     verdicts = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wetwell.detector.baseline.learning import LEARNING_S
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULTS
 from wetwell.protocols.timestamps import NS_PER_S
@@ -24,7 +24,7 @@ FROM_NOON = {"shape": "step", "start_s": 12 * HOUR_S, "end_s": 13 * HOUR_S}
 
 def judged(station, recording):
     """Detector after a recording, and verdicts by second since its start."""
-    detector, start_ns = Detector(station.name, nominal_of(station)), int(recording.time_ns[0])
+    detector, start_ns = Detector(station.name, datasheet_of(station)), int(recording.time_ns[0])
     verdicts = [verdict for sample in recording.samples(station.name) for verdict in detector.update(sample)]
     return detector, [((verdict.time - start_ns) / NS_PER_S, verdict) for verdict in verdicts]
 

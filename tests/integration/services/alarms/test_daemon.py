@@ -15,7 +15,7 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S, from_iso
 from wetwell.services.alarms.client import list_alarms, new_act, report, send_act
 from wetwell.services.alarms.daemon import keep
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.runtime.settings import AlarmSettings
 
@@ -35,7 +35,7 @@ class Site:
         self.start()
 
     def start(self) -> None:
-        self.keeper = AlarmKeeper(self.bus, self.settings, self.stations, self.now)
+        self.keeper = AlarmService(self.bus, self.settings, self.stations, self.now)
         self._listener = self.bus.subscribe(alarm_key("*"))
 
     def now(self) -> Now:
@@ -420,7 +420,7 @@ def test_over_a_bus_alarms_are_listed_acted_on_and_reported():
     async def day() -> None:
         with MemoryBus() as bus:
             loop = asyncio.get_running_loop()
-            keeper = AlarmKeeper(bus, AlarmSettings(), (), lambda: Now(START_NS, loop.time()))
+            keeper = AlarmService(bus, AlarmSettings(), (), lambda: Now(START_NS, loop.time()))
             running = asyncio.create_task(keep(bus, keeper, 10.0))
             await asyncio.sleep(0)
             verdict = Verdict(
@@ -452,7 +452,7 @@ def test_over_a_bus_samples_come_gathered_too_those_that_were_sent_before_and_th
         with MemoryBus() as bus:
             publisher = bus.publisher(sample_block_key("alpha"), history=10)
             publisher.put(block(0, 1.0))
-            keeper = AlarmKeeper(bus, AlarmSettings(high_level_m=2.0), (), lambda: Now(START_NS, 0.0))
+            keeper = AlarmService(bus, AlarmSettings(high_level_m=2.0), (), lambda: Now(START_NS, 0.0))
             running = asyncio.create_task(keep(bus, keeper, 10.0))
             await asyncio.sleep(0.01)
             assert keeper.figures()["samples"] == 10.0

@@ -16,9 +16,9 @@ from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
-from wetwell.services.dashboard.app import Desk, dashboard_app
+from wetwell.services.dashboard.app import AppState, dashboard_app
 from wetwell.services.dashboard.daemon import serve_dashboard
-from wetwell.services.dashboard.event_streams import Hub
+from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.site_view import ROWS, SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
@@ -33,7 +33,7 @@ def client_of(desk):
 
 
 def desk_with(bus=None, reports=None):
-    return Desk(SiteView(10.0), Hub(), reports, bus)
+    return AppState(SiteView(10.0), EventStreams(), reports, bus)
 
 
 def get(path, desk=None, **headers):

@@ -11,7 +11,7 @@ from wetwell.protocols.messages.messages import Order, Sample, Verdict
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.client import ordered
 from wetwell.services.detector.intake import Intake
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -33,7 +33,7 @@ def order(act: str, number: int, pump: int = 2) -> Order:
 async def answers(alpha, payloads: list[bytes], orders: list[Order]) -> list[Verdict]:
     """Answers to orders that follow on the samples."""
     with MemoryBus() as bus:
-        judge = StationJudge(bus, alpha)
+        judge = StationDetector(bus, alpha)
         running = asyncio.create_task(Intake(bus, [judge]).run())
         publisher = bus.publisher(sample_key("alpha"))
         for number, payload in enumerate(payloads):
@@ -62,18 +62,18 @@ def test_a_rebaseline_is_carried_out_once_answered_and_can_be_taken_back(alpha, 
 def test_a_checkpoint_is_taken_up_and_a_damaged_one_is_put_aside(alpha, tmp_path, caplog):
     with MemoryBus() as bus:
         checkpoint = Checkpoint(tmp_path / "state", "alpha")
-        judge = StationJudge(bus, alpha, checkpoint=checkpoint)
+        judge = StationDetector(bus, alpha, checkpoint=checkpoint)
         assert not judge.is_restored
         judge.keep()
-        other = StationJudge(bus, alpha, checkpoint=checkpoint)
+        other = StationDetector(bus, alpha, checkpoint=checkpoint)
         assert other.is_restored
         assert other.detector.snapshot() == judge.detector.snapshot()
         (file,) = (tmp_path / "state").iterdir()
         whole = file.read_bytes()
         file.write_bytes(whole[:-10])
-        assert not StationJudge(bus, alpha, checkpoint=checkpoint).is_restored
+        assert not StationDetector(bus, alpha, checkpoint=checkpoint).is_restored
         file.write_bytes(whole[5:])
-        assert not StationJudge(bus, alpha, checkpoint=checkpoint).is_restored
+        assert not StationDetector(bus, alpha, checkpoint=checkpoint).is_restored
     assert "damaged, its checksum differs; kept as alpha.detector.refused, learning starts again" in caplog.text
     assert [path.name for path in (tmp_path / "state").iterdir()] == ["alpha.detector.refused"]
 
@@ -81,31 +81,31 @@ def test_a_checkpoint_is_taken_up_and_a_damaged_one_is_put_aside(alpha, tmp_path
 def test_a_late_writer_does_not_put_an_older_state_over_a_newer_one(alpha, payloads, tmp_path):
     with MemoryBus() as bus:
         checkpoint = Checkpoint(tmp_path, "alpha")
-        judge = StationJudge(bus, alpha, checkpoint=checkpoint)
+        judge = StationDetector(bus, alpha, checkpoint=checkpoint)
         older = checkpoint.encode(judge.detector, Told({}))
         judge.take_payloads(payloads)
         judge.keep()
         checkpoint.write(*older)
-        assert StationJudge(bus, alpha, checkpoint=checkpoint).detector.snapshot() == judge.detector.snapshot()
+        assert StationDetector(bus, alpha, checkpoint=checkpoint).detector.snapshot() == judge.detector.snapshot()
 
 
 def test_a_checkpoint_of_version_0_1_which_is_a_bare_snapshot_is_taken_up(alpha, tmp_path):
     with MemoryBus() as bus:
-        judge = StationJudge(bus, alpha)
+        judge = StationDetector(bus, alpha)
         (tmp_path / "alpha.detector.json").write_bytes(judge.detector.snapshot())
-        assert StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha")).is_restored
+        assert StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha")).is_restored
 
 
 def test_an_order_that_was_answered_is_known_after_a_kill(alpha, payloads, tmp_path):
     async def orders_before_and_after_a_kill() -> tuple[Verdict, Verdict, int]:
         with MemoryBus() as bus:
-            first = StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            first = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
             await first.take(Sample.decode(payload) for payload in payloads)
             obeying = asyncio.create_task(Intake(bus, [first]).run())
             answer = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()
         with MemoryBus() as bus:  # nothing of the first one is left but its checkpoint
-            second = StationJudge(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            second = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
             obeying = asyncio.create_task(Intake(bus, [second]).run())
             again = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()

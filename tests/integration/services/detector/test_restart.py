@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Request, Subscription
 from wetwell.protocols.bus.keys import history_key, sample_block_key, sample_key, verdict_key
@@ -17,7 +17,7 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake
-from wetwell.services.detector.station_detector import StationJudge
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.stations import find_scenario
@@ -43,7 +43,7 @@ def at_once(monkeypatch):
 
 
 def judged(alpha, samples: list[Sample]) -> list[Verdict]:
-    detector = Detector("alpha", nominal_of(alpha))
+    detector = Detector("alpha", datasheet_of(alpha))
     return [verdict for sample in samples for verdict in detector.update(sample)]
 
 
@@ -84,7 +84,7 @@ async def verdicts_of_killed(
         send = source(bus, historian, samples, gather)
         position = 0
         for cut in [*cuts, len(samples)]:
-            judge = StationJudge(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
+            judge = StationDetector(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
             running = asyncio.create_task(Intake(bus, [judge]).run())
             checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
             for number in range(position, cut):

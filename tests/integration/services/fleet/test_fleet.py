@@ -14,7 +14,7 @@ pytest.importorskip("distributed")
 
 from distributed import Client, LocalCluster
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Presence, Request, Subscription
 from wetwell.protocols.bus.keys import alive_key, history_key, sample_key, status_key, verdict_key
@@ -155,6 +155,6 @@ async def collect(verdicts, got: Verdicts, quiet_s: float) -> None:
 
 
 def undisturbed(station, samples: list[Sample]) -> dict[tuple[int, int], bytes]:
-    detector = Detector(station.name, nominal_of(station))
+    detector = Detector(station.name, datasheet_of(station))
     told = [verdict for sample in samples for verdict in detector.update(sample)]
     return {(verdict.time, verdict.pump): verdict.encode() for verdict in told}

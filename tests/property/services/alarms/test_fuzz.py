@@ -9,7 +9,7 @@ from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key
 from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
-from wetwell.services.alarms.service import AlarmKeeper
+from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.runtime.settings import AlarmSettings
 
@@ -88,7 +88,7 @@ class Question:
 def test_no_payload_stops_the_keeper(sent):
     bus, now_s = MemoryBus(), [0.0]
     rules = {name: {"on_delay_s": 0.0} for name in ("level_high", "plc_lost")}
-    keeper = AlarmKeeper(
+    keeper = AlarmService(
         bus, AlarmSettings(high_level_m=1.0, rules=rules), (), lambda: Now(round(now_s[0] * 1e9), now_s[0])
     )
     changes = bus.subscribe(alarm_key("*"))

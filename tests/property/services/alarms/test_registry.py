@@ -8,7 +8,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.alarms.registry import AlarmBook, BookState
+from wetwell.services.alarms.registry import AlarmRegistry, BookState
 from wetwell.services.alarms.rules import RULES, changed_rules
 from wetwell.services.alarms.status import ActRefusedError
 
@@ -33,7 +33,7 @@ class Alarms(RuleBasedStateMachine):
     @initialize(on_s=st.sampled_from([0, 3]), off_s=st.sampled_from([0, 2]))
     def begin(self, on_s: int, off_s: int) -> None:
         self.rules = changed_rules({"pump_fault": {"on_delay_s": on_s, "off_delay_s": off_s}})
-        self.book = AlarmBook(self.rules)
+        self.book = AlarmRegistry(self.rules)
 
     @rule(name=st.sampled_from(ALARMS), is_there=st.booleans(), seconds=st.integers(0, 5))
     def see(self, name: tuple[str, int], is_there: bool, seconds: int) -> None:
@@ -71,7 +71,7 @@ class Alarms(RuleBasedStateMachine):
     @rule()
     def restart(self) -> None:
         kept = self.book.state().model_dump_json()
-        self.book = AlarmBook(self.rules)
+        self.book = AlarmRegistry(self.rules)
         self.book.restore(BookState.model_validate_json(kept))
         assert json.loads(self.book.state().model_dump_json()) == json.loads(kept)
         assert self.book.changed == []

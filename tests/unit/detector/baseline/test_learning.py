@@ -5,7 +5,7 @@ import pytest
 
 from wetwell.detector.baseline.learning import DAY_S, LEARNING_S, Learning, objection, sibling_objection
 from wetwell.detector.baseline.model import MIN_RUNS
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.detector import Detector
 from wetwell.protocols.timestamps import NS_PER_S
@@ -177,7 +177,7 @@ def test_only_pumps_of_the_same_curve_that_are_known_are_siblings():
 def test_the_papers_blockage_within_learning_is_never_learnt(alpha):
     recording = Simulation(alpha, find_scenario("blockage"), 0).advance(55_000)
     start_ns = int(recording.time_ns[0])
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     verdicts = [verdict for sample in recording.samples(alpha.name) for verdict in detector.update(sample)]
     first_judged_s = {}
     for verdict in verdicts:

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from wetwell.detector.curves.datasheet import Nominal, duty_flows
+from wetwell.detector.curves.datasheet import Datasheet, duty_flows
 from wetwell.detector.stream.run_state import new_pumps
 
 STATIC_M, FRICTION = 2.0, 6.0e-4
 
 
 def nominal_with(curves, *, is_common_header):
-    return Nominal(
+    return Datasheet(
         curves=curves,
         frequencies_hz=(50.0,) * len(curves),
         static_head_m=STATIC_M,
@@ -21,10 +21,10 @@ def nominal_with(curves, *, is_common_header):
     )
 
 
-def flows_at(nominal, speeds):
-    pumps = new_pumps(nominal)
+def flows_at(datasheet, speeds):
+    pumps = new_pumps(datasheet)
     pumps["duty_speed"] = speeds
-    duty_flows(nominal.table(), pumps)
+    duty_flows(datasheet.table(), pumps)
     return pumps["duty_m3h"]
 
 

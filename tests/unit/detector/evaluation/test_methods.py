@@ -5,7 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.methods import DETECTORS, detector_class
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.errors import ConfigError
@@ -101,6 +101,6 @@ def test_the_six_hours_are_those_of_the_stamps(alpha, recording):
     """Ten times as fast, nine hours are less than one."""
     quick_ns = recording.time_ns[0] + (recording.time_ns - recording.time_ns[0]) // 10
     quick = type(recording)(time_ns=quick_ns, columns=recording.columns)
-    detector = detector_class("always_normal")(alpha.name, nominal_of(alpha))
+    detector = detector_class("always_normal")(alpha.name, datasheet_of(alpha))
     states = {verdict.state for block in blocks(quick, quick.pumps) for verdict in detector.take(block)}
     assert states == {"learning"}

@@ -141,10 +141,10 @@ def test_a_check_is_learnt_from_the_middle_of_healthy_runs():
 
 
 def test_the_power_is_taken_to_nominal_speed(run_of, segments_of):
-    nominal, slow = (
+    datasheet, slow = (
         run_of(segments_of(np.zeros((4, 2)), speed_ratio=speed), power_kw=15.0 * speed**2) for speed in (1.0, 0.8)
     )
-    assert log_power(nominal) == pytest.approx(math.log(15.0))
+    assert log_power(datasheet) == pytest.approx(math.log(15.0))
     assert log_power(slow) == pytest.approx(math.log(15.0))
     assert math.isnan(log_power(run_of(segments_of(np.zeros((4, 2))))))
     mostly = np.where(np.arange(100) < 40, 15.0, NAN)

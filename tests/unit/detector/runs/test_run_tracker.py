@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.runs.run_tracker import RunTracker
 from wetwell.detector.stream.gate import Frame, PumpFrame
 from wetwell.protocols.timestamps import NS_PER_S
@@ -22,13 +22,13 @@ def frame(second, *pumps, gap_s=1.0, level_m=1.0):
 
 @pytest.fixture
 def tracker(alpha):
-    return RunTracker(nominal_of(alpha))
+    return RunTracker(datasheet_of(alpha))
 
 
 @pytest.fixture
 def common_tracker(alpha):
     main = alpha.rising_main.model_copy(update={"layout": "common"})
-    return RunTracker(nominal_of(alpha.model_copy(update={"rising_main": main})))
+    return RunTracker(datasheet_of(alpha.model_copy(update={"rising_main": main})))
 
 
 def feed(tracker, seconds, *pumps, level_m=1.0):

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SCHEMA, SnapshotError
 from wetwell.simulator.faults.pump.blockage import Blockage
@@ -24,7 +24,7 @@ def samples(alpha):
 @pytest.fixture(scope="module")
 def uninterrupted(alpha, samples):
     """Verdicts of a run without a break, by the number of the sample that brought them; and snapshots on the way."""
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     verdicts, snapshots = [], {}
     for number, sample in enumerate(samples):
         if number in {0, 1, 4_321, 21_599, 23_456, 26_123, 28_900}:
@@ -36,7 +36,7 @@ def uninterrupted(alpha, samples):
 def test_a_restored_detector_goes_on_bit_for_bit(alpha, samples, uninterrupted):
     verdicts, snapshots = uninterrupted
     for begin, data in snapshots.items():
-        detector = Detector(alpha.name, nominal_of(alpha))
+        detector = Detector(alpha.name, datasheet_of(alpha))
         detector.restore(data)
         assert detector.snapshot() == data
         told = [(number, verdict) for number in range(begin, SECONDS) for verdict in detector.update(samples[number])]
@@ -61,14 +61,14 @@ def damaged(data: bytes) -> dict[str, bytes]:
 def test_a_damaged_snapshot_is_refused_and_changes_nothing(alpha, uninterrupted):
     data = uninterrupted[1][26_123]
     for said, bad in damaged(data).items():
-        detector = Detector(alpha.name, nominal_of(alpha))
+        detector = Detector(alpha.name, datasheet_of(alpha))
         before = detector.snapshot()
         with pytest.raises(SnapshotError, match=said):
             detector.restore(bad)
         assert detector.snapshot() == before
     steeper = alpha.model_copy(update={"rising_main": alpha.rising_main.model_copy(update={"friction_h2_m5": 7e-4})})
     with pytest.raises(SnapshotError, match="the curves in the station file have changed since"):
-        Detector(alpha.name, nominal_of(steeper)).restore(data)
+        Detector(alpha.name, datasheet_of(steeper)).restore(data)
 
 
 def test_a_snapshot_stays_small(uninterrupted):

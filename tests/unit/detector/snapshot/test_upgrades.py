@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import FORM, SCHEMA
 from wetwell.detector.snapshot.upgrades import UPGRADES
@@ -30,7 +30,7 @@ def data():
 
 @pytest.fixture
 def upgraded(alpha, data):
-    detector = Detector(alpha.name, nominal_of(alpha))
+    detector = Detector(alpha.name, datasheet_of(alpha))
     detector.restore(data)
     return detector
 
@@ -96,7 +96,7 @@ def test_the_baseline_that_was_put_aside_can_be_taken_back(upgraded):
 def test_it_is_kept_in_the_new_form(alpha, upgraded):
     kept = upgraded.snapshot()
     assert json.loads(kept.split(b"\n")[0])["schema"] == SCHEMA
-    again = Detector(alpha.name, nominal_of(alpha))
+    again = Detector(alpha.name, datasheet_of(alpha))
     again.restore(kept)
     assert again.snapshot() == kept
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.detector.curves.datasheet import nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.stream.gate import CONFIRMATIONS, RESENT_SAMPLES, Gate
 from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
@@ -29,7 +29,7 @@ def sample(second, *, seq=None, level_m=1.0, pumps=(GOOD,) * 3, quality="good"):
 
 @pytest.fixture
 def gate(alpha):
-    return Gate(nominal_of(alpha))
+    return Gate(datasheet_of(alpha))
 
 
 def test_a_good_sample_passes_unchanged(gate):
@@ -215,7 +215,7 @@ wild_samples = st.builds(
 
 @given(st.lists(runs_of_stamps, max_size=12), st.lists(wild_samples, min_size=1, max_size=12))
 def test_whatever_arrives_time_rises_but_at_counted_steps_and_the_counts_add_up(alpha, runs, wild):
-    gate = Gate(nominal_of(alpha))
+    gate = Gate(datasheet_of(alpha))
     arriving = [
         wild[n % len(wild)].model_copy(update={"time": stamp})
         for n, stamp in enumerate(s for run in runs for s in run)

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from wetwell.detector.curves.datasheet import duty_flows, nominal_of
+from wetwell.detector.curves.datasheet import datasheet_of, duty_flows
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.run_state import new_pumps
 from wetwell.detector.verdict.station_model import StationModel
@@ -32,10 +32,10 @@ def test_before_learning_only_the_datasheet_is_known(alpha) -> None:
 
 def test_the_learnt_curves_of_a_healthy_station_are_the_datasheets(alpha, learnt) -> None:
     model = StationModel(alpha).message(learnt.baselines, {}, 0)
-    nominal = nominal_of(alpha)
-    duty = new_pumps(nominal)
+    datasheet = datasheet_of(alpha)
+    duty = new_pumps(datasheet)
     duty["duty_speed"] = (1.0, 0.0, 0.0)
-    duty_flows(nominal.table(), duty)
+    duty_flows(datasheet.table(), duty)
     duty_m3h = float(duty["duty_m3h"][0])
     for pump in model.pumps:
         for known, datasheet in (
@@ -73,7 +73,7 @@ def test_the_model_is_published_at_the_beginning_and_when_a_run_was_judged(
     alpha, learnt, judge_after_learning
 ) -> None:
     bus = MemoryBus()
-    publisher = ModelPublisher(bus, alpha, Detector(alpha.name, nominal_of(alpha)))
+    publisher = ModelPublisher(bus, alpha, Detector(alpha.name, datasheet_of(alpha)))
     first = bus.get(model_key("alpha"))
     assert json.loads(first)["pumps"][0]["learnt_pump"] is None
     verdicts = judge_after_learning(seconds=1_500)

@@ -3,18 +3,18 @@ import random
 import pytest
 
 from wetwell.protocols.bus.publisher_cache import PAGE_BYTES, KeptMessages, KeptQuery, Page, read_mark
-from wetwell.protocols.bus.sequencer import LINES, MOST_HELD, Follower
+from wetwell.protocols.bus.sequencer import LINES, MOST_HELD, Sequencer
 
 KEY = "wetwell/alpha/sample"
 
 
-def passed_on(follower: Follower) -> list[bytes]:
+def passed_on(follower: Sequencer) -> list[bytes]:
     payloads = [payload for _, payload in follower.ready]
     follower.ready.clear()
     return payloads
 
 
-def ask_for_all(follower: Follower, kept: dict[str, KeptMessages], *, answers: bool = True) -> None:
+def ask_for_all(follower: Sequencer, kept: dict[str, KeptMessages], *, answers: bool = True) -> None:
     """Ask what is wanted until nothing is; who does not answer is given up."""
     while follower.wanted:
         _, line = follower.wanted.popitem()
@@ -29,7 +29,7 @@ def ask_for_all(follower: Follower, kept: dict[str, KeptMessages], *, answers: b
 def test_lost_doubled_and_reordered_messages_come_once_and_in_order(seed):
     dice = random.Random(seed)
     kept = {f"wetwell/s{number}/sample": KeptMessages(300) for number in range(3)}
-    follower, got = Follower(300), dict.fromkeys(kept, b"")
+    follower, got = Sequencer(300), dict.fromkeys(kept, b"")
     on_the_way: list[tuple[str, bytes, bytes]] = []
     for number in range(300):
         for key, publisher in kept.items():
@@ -53,7 +53,7 @@ def test_lost_doubled_and_reordered_messages_come_once_and_in_order(seed):
 
 
 def test_what_nobody_keeps_is_given_up_counted_and_the_rest_passed_on_in_order():
-    publisher, follower = KeptMessages(5), Follower(0)
+    publisher, follower = KeptMessages(5), Sequencer(0)
     marks = [publisher.add(b"%d" % number) for number in range(20)]
     for number in (3, 6, 4, 19):
         follower.take(KEY, marks[number], b"%d" % number)
@@ -66,7 +66,7 @@ def test_what_nobody_keeps_is_given_up_counted_and_the_rest_passed_on_in_order()
 
 
 def test_without_an_answer_the_messages_that_wait_are_passed_on():
-    publisher, follower = KeptMessages(50), Follower(0)
+    publisher, follower = KeptMessages(50), Sequencer(0)
     marks = [publisher.add(b"%d" % number) for number in range(9)]
     for number in (0, 2, 5):
         follower.take(KEY, marks[number], b"%d" % number)
@@ -77,7 +77,7 @@ def test_without_an_answer_the_messages_that_wait_are_passed_on():
 
 @pytest.mark.parametrize(("history", "first"), [(0, 7), (3, 4), (100, 2)])
 def test_a_late_joiner_begins_with_its_history(history, first):
-    publisher, follower = KeptMessages(6), Follower(history)
+    publisher, follower = KeptMessages(6), Sequencer(history)
     for number in range(7):
         publisher.add(b"%d" % number)
     follower.take(KEY, publisher.add(b"7"), b"7")
@@ -87,7 +87,7 @@ def test_a_late_joiner_begins_with_its_history(history, first):
 
 
 def test_a_tail_alone_shows_what_was_lost():
-    publisher, follower = KeptMessages(6), Follower(0)
+    publisher, follower = KeptMessages(6), Sequencer(0)
     follower.take(KEY, publisher.add(b"0"), b"0")
     publisher.add(b"1")
     follower.take_tail(KEY, publisher.next_mark)
@@ -96,7 +96,7 @@ def test_a_tail_alone_shows_what_was_lost():
 
 
 def test_lives_of_publishers_do_not_pile_up_and_lose_nothing_that_has_come():
-    follower, want = Follower(10), []
+    follower, want = Sequencer(10), []
     for life in range(50 * LINES):
         publisher = KeptMessages(1)
         publisher.add(b"lost")
@@ -108,7 +108,7 @@ def test_lives_of_publishers_do_not_pile_up_and_lose_nothing_that_has_come():
 
 
 def test_messages_that_wait_do_not_pile_up():
-    publisher, follower = KeptMessages(1), Follower(0)
+    publisher, follower = KeptMessages(1), Sequencer(0)
     follower.take(KEY, publisher.add(b"0"), b"0")
     publisher.add(b"lost")
     for _ in range(MOST_HELD + 1):
@@ -118,7 +118,7 @@ def test_messages_that_wait_do_not_pile_up():
 
 
 def test_a_message_without_a_mark_is_passed_on_at_once():
-    follower = Follower(0)
+    follower = Sequencer(0)
     for mark in (None, b"", b"of another program"):
         follower.take(KEY, mark, b"x")
     follower.take_tail(KEY, b"?")

@@ -7,15 +7,15 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.alarms.delay import Delay
 from wetwell.services.alarms.rates import AlarmRates
 from wetwell.services.alarms.rules import RULES, changed_rules, parse_alarm_id
-from wetwell.services.alarms.status import ActRefusedError, Standing, is_shelf_over, with_act, with_condition
+from wetwell.services.alarms.status import ActRefusedError, AlarmStatus, is_shelf_over, with_act, with_condition
 
 STATES = {
-    "normal": Standing(),
-    "unacknowledged": Standing("unacknowledged", is_active=True, raised_ns=1),
-    "acknowledged": Standing("acknowledged", is_active=True, raised_ns=1, acknowledged_ns=2, by="ann"),
-    "returned": Standing("returned", raised_ns=1, returned_ns=2),
-    "shelved": Standing("shelved", is_active=True, raised_ns=1, until_ns=60, by="ann"),
-    "out_of_service": Standing("out_of_service", is_active=True, raised_ns=1, by="ann"),
+    "normal": AlarmStatus(),
+    "unacknowledged": AlarmStatus("unacknowledged", is_active=True, raised_ns=1),
+    "acknowledged": AlarmStatus("acknowledged", is_active=True, raised_ns=1, acknowledged_ns=2, by="ann"),
+    "returned": AlarmStatus("returned", raised_ns=1, returned_ns=2),
+    "shelved": AlarmStatus("shelved", is_active=True, raised_ns=1, until_ns=60, by="ann"),
+    "out_of_service": AlarmStatus("out_of_service", is_active=True, raised_ns=1, by="ann"),
 }
 AFTER = {  # ISA-18.2; what is not there is refused
     ("unacknowledged", "acknowledge"): "acknowledged",

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from wetwell.services.dashboard.event_streams import QUEUE, RESYNC, Hub, event
+from wetwell.services.dashboard.event_streams import QUEUE, RESYNC, EventStreams, event
 
 
 async def taken(stream, count):
@@ -11,7 +11,7 @@ async def taken(stream, count):
 
 def test_everybody_gets_the_same_bytes_after_being_told_to_begin() -> None:
     async def run():
-        hub = Hub()
+        hub = EventStreams()
         streams = [hub.listen("alpha") for _ in range(3)]
         assert [await anext(stream) for stream in streams] == [RESYNC] * 3
         hub.send("alpha", '{"id":1}')
@@ -26,7 +26,7 @@ def test_everybody_gets_the_same_bytes_after_being_told_to_begin() -> None:
 
 def test_who_cannot_keep_up_begins_anew_and_nobody_waits() -> None:
     async def run():
-        hub = Hub()
+        hub = EventStreams()
         slow = hub.listen("alpha")
         assert await anext(slow) == RESYNC
         for number in range(QUEUE + 3):
@@ -39,7 +39,7 @@ def test_who_cannot_keep_up_begins_anew_and_nobody_waits() -> None:
 
 def test_a_browser_that_goes_is_forgotten() -> None:
     async def run():
-        hub = Hub()
+        hub = EventStreams()
         stream = hub.listen("alpha")
         await anext(stream)
         assert hub.clients == 1
@@ -51,7 +51,7 @@ def test_a_browser_that_goes_is_forgotten() -> None:
 
 def test_closing_ends_the_streams_after_what_waits_and_lets_nobody_in() -> None:
     async def run():
-        hub = Hub()
+        hub = EventStreams()
         stream = hub.listen("alpha")
         await anext(stream)
         hub.send("alpha", "1")

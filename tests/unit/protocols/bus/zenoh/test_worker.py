@@ -6,8 +6,8 @@ import pytest
 import zenoh
 
 from wetwell.protocols.bus.publisher_cache import KeptMessages, read_query
-from wetwell.protocols.bus.zenoh.subscription import Feed
-from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohPump
+from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
+from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
 
 KEY = "wetwell/alpha/sample"
 
@@ -61,10 +61,10 @@ class Bench:
     def __init__(self):
         self.session = Session()
         self.got: list[bytes] = []
-        self.feed = Feed(
+        self.feed = ZenohSubscription(
             self.session, [KEY], 0, lambda ready: self.got.extend(each for _, each in ready), recover=True
         )
-        self.pump = ZenohPump(self.session, is_router=False)
+        self.pump = ZenohWorker(self.session, is_router=False)
         self.pump._feeds.append(self.feed)
         self.now_s = 100.0
 
