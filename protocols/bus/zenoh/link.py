@@ -69,10 +69,10 @@ class ZenohBus:
         self._session = session
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
-        self._pump = ZenohWorker(session, is_router=is_router)
+        self._worker = ZenohWorker(session, is_router=is_router)
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
-        self._exit.callback(self._pump.stop)
+        self._exit.callback(self._worker.stop)
         self._lock = threading.Lock()  # zenoh refuses to be asked while another thread closes the session
 
     def __enter__(self) -> Self:
@@ -99,8 +99,8 @@ class ZenohBus:
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
-            publisher = ZenohPublisher(self._session, key, history, self._pump.questions)
-        self._pump.publish(publisher)
+            publisher = ZenohPublisher(self._session, key, history, self._worker.queries)
+        self._worker.add_publisher(publisher)
         return publisher
 
     def subscribe(
@@ -117,11 +117,11 @@ class ZenohBus:
         """
         mailbox: Mailbox[bytes] = Mailbox(capacity)
 
-        def take(messages: list[Keyed]) -> None:
+        def deliver(messages: list[Keyed]) -> None:
             mailbox.extend([payload for _, payload in messages])
 
         with refusal("subscribe to", key):
-            self._pump.follow(ZenohSubscription(self._session, [key], history, take, recover=recover))
+            self._worker.add_subscription(ZenohSubscription(self._session, [key], history, deliver, recover=recover))
         return mailbox
 
     def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
@@ -134,7 +134,9 @@ class ZenohBus:
         """
         mailbox: Mailbox[Keyed] = Mailbox(capacity)
         with refusal("subscribe to", ", ".join(keys[:3])):
-            self._pump.follow(ZenohSubscription(self._session, keys, history, mailbox.extend, recover=True))
+            self._worker.add_subscription(
+                ZenohSubscription(self._session, keys, history, mailbox.extend, recover=True)
+            )
         return mailbox
 
     def answer(self, key: str) -> Mailbox[Request]:
@@ -164,7 +166,7 @@ class ZenohBus:
         """
         loop, ended, answers = asyncio.get_running_loop(), asyncio.Event(), list[bytes]()
 
-        def take(reply: zenoh.Reply) -> None:
+        def handle_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 answers.append(reply.ok.payload.to_bytes())
 
@@ -175,7 +177,7 @@ class ZenohBus:
         with refusal("ask", key):
             self._session.get(
                 key,
-                zenoh.handlers.Callback(take, end, indirect=False),
+                zenoh.handlers.Callback(handle_reply, end, indirect=False),
                 payload=payload,
                 encoding=JSON_ENCODING,
                 target=zenoh.QueryTarget.ALL,
