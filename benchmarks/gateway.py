@@ -10,15 +10,19 @@ import resource
 import socket
 import statistics
 import struct
+import sys
 import time
 from contextlib import ExitStack
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
+from memory_bus import MemoryBus
 from pymodbus.client import AsyncModbusTcpClient
 
 from wetwell.protocols.bus.interface import Bus
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client, open_router
 from wetwell.protocols.messages.messages import Status
 from wetwell.protocols.modbus.device_map import Device, Plc

@@ -16,6 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "simulation"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 
 from rules import broken_rules
 from site_kinds import KINDS

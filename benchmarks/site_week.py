@@ -3,16 +3,19 @@
 import asyncio
 import gc
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
 import numpy as np
+from memory_bus import MemoryBus
 from site_processes import cpu_and_memory
 
 from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import Checkpoint

@@ -8,14 +8,17 @@ import gc
 import json
 import os
 import platform
+import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
+from memory_bus import MemoryBus
 from site_load import Played, messages_of, prepare
 
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import load_station

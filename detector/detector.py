@@ -30,7 +30,7 @@ from wetwell.detector.sensors.sensor_faults import doubtful_meters, in_words, si
 from wetwell.detector.snapshot.codec import decode_snapshot, encode_snapshot
 from wetwell.detector.statistics.robust import median
 from wetwell.detector.statistics.rolling_f_test import RollingFTest
-from wetwell.detector.stream.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES, Block, LiveBlock
+from wetwell.detector.stream.block import Block, LiveBlock
 from wetwell.detector.stream.drawdown import new_phases
 from wetwell.detector.stream.gate import Gate
 from wetwell.detector.stream.loop import BEGIN, DONE, ENDED, FULL, GATHERED, GOES_ON, LOOK, advance
@@ -42,6 +42,7 @@ from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
 from wetwell.detector.verdict.severity import severity
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.messages.readings import Readings
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES
 
 EARLY_PROBABILITY = 0.999
 EARLY_SEGMENTS = 2

@@ -13,11 +13,12 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from wetwell.protocols.quantities import STATION_QUANTITIES
 from wetwell.protocols.station.station_file import Control, EffectTable, Pump, Station
 from wetwell.simulator.duty import check_operable
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.faults import FAULTS
-from wetwell.simulator.faults.profile import STATION_QUANTITIES, Profile, PumpFault, SensorFault, SystemFault
+from wetwell.simulator.faults.profile import Profile, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.hydraulics import common_flows
 from wetwell.simulator.inflow import INFLOWS
 from wetwell.simulator.plant import plant_parameters

@@ -9,12 +9,12 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator import layout as at
 from wetwell.simulator.drive import turned_ratio
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
 from wetwell.simulator.supervision import drive, supervise
-from wetwell.simulator.telemetry.channels import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_pumps, send, silence
 from wetwell.simulator.telemetry.sensors import delayed, sense
 from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_ANALOGUES, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station, check_levels
 from wetwell.protocols.timestamps import NS_PER_S
@@ -16,7 +17,7 @@ from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.plant import Forcing, Plant, Record, healthy_forcing
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
-from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 
 class Simulation:
@@ -162,9 +163,9 @@ class Simulation:
 def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:
     columns = {"level_m": measured[LEVEL], "inflow_m3h": measured[INFLOW]}
     for i in range(pumps):
-        for quantity in PUMP_QUANTITIES:
-            columns[f"pump{i + 1}_{quantity}"] = measured[channels_of(quantity, pumps, i + 1)[0]]
-        columns[f"pump{i + 1}_running"] = (columns[f"pump{i + 1}_frequency_hz"] > 0).astype(np.float64)
+        for quantity in PUMP_ANALOGUES:
+            columns[pump_column(i + 1, quantity)] = measured[channels_of(quantity, pumps, i + 1)[0]]
+        columns[pump_column(i + 1, "running")] = (columns[pump_column(i + 1, "frequency_hz")] > 0).astype(np.float64)
     return columns
 
 

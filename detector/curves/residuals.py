@@ -16,9 +16,7 @@ def _distances(
     flow: Any, head: Any, speed: Any, total: Any, c0: float, c1: float, c2: float, static_m: float, friction: float
 ) -> tuple[Any, Any]:
     reduced = flow / speed
-    return head / (speed * speed) - c0 - (
-        c1 + c2 * reduced
-    ) * reduced, head - static_m - friction * total * total
+    return head / (speed * speed) - c0 - (c1 + c2 * reduced) * reduced, head - static_m - friction * total * total
 
 
 distances = compiled(_distances)

@@ -10,6 +10,7 @@ from wetwell.detector.evaluation.scores import FAULTS, LEARNING_S, learning_end_
 from wetwell.detector.stream.run_state import WARM_UP_S
 from wetwell.protocols.arrays import Flags
 from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -153,8 +154,8 @@ def _detection(
 
 def _first_steady_ns(recording: Recording, pump: int, begin_ns: int) -> int:
     """Time from `begin_ns` on at which a pump has first run for `WARM_UP_S`; of the last sample if it never has."""
-    signal = "running" if f"pump{pump}_running" in recording.columns else "frequency_hz"
-    is_on = recording.column(f"pump{pump}_{signal}") > 0.0
+    signal = "running" if pump_column(pump, "running") in recording.columns else "frequency_hz"
+    is_on = recording.column(pump_column(pump, signal)) > 0.0
     off_ns = np.maximum.accumulate(np.where(is_on, recording.time_ns[0], recording.time_ns))
     steady = is_on & (recording.time_ns - off_ns >= WARM_UP_S * NS_PER_S) & (recording.time_ns >= begin_ns)
     return int(recording.time_ns[np.argmax(steady) if steady.any() else -1])

@@ -7,6 +7,7 @@ from typing import Any
 from wetwell.detector.pump_judge import Knowledge
 from wetwell.detector.runs.run import Run
 from wetwell.detector.stream.stuck_sensors import noisy_meters
+from wetwell.protocols.quantities import pump_column
 
 DEAD_LOG_RATIO = -1.5
 """A flow meter that shows less than a fifth of what leaves the wet well, against health, is dead."""
@@ -34,7 +35,7 @@ def silencing_meters(pump: int, known: Knowledge | None, stuck: list[str], log_r
     if any(name.endswith(("flow_m3h", "head_m")) for name in stuck):
         return {"stuck": stuck}
     if known is not None and log_ratio - known.drawdown.mean < DEAD_LOG_RATIO:
-        return {"dead": [f"pump{pump + 1}_flow_m3h"]}
+        return {"dead": [pump_column(pump + 1, "flow_m3h")]}
     return {}
 
 

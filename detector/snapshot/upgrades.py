@@ -10,7 +10,8 @@ from wetwell.detector.statistics.cusum import Cusum
 from wetwell.detector.stream.gate import COUNTS, STATE
 from wetwell.detector.stream.missing_signals import BlindWatch
 from wetwell.detector.stream.run_state import new_pumps
-from wetwell.detector.stream.stuck_sensors import METERS, new_meters
+from wetwell.detector.stream.stuck_sensors import new_meters
+from wetwell.protocols.quantities import PUMP_METERS, pump_column
 
 SEGMENT_SAMPLES = 25
 """Of all segments of form 1."""
@@ -74,7 +75,7 @@ def _take_gate(gate: Any, fields: Mapping[str, Any], seen_s: float) -> None:
 
 def _take_meters(meters: Any, fields: Mapping[str, Any]) -> None:
     """Keep for how long each reading repeated itself while it was learnt."""
-    pumps = (len(meters) - 1) // len(METERS)
-    names = ["level_m", *(f"pump{pump}_{name}" for pump in range(1, pumps + 1) for name in METERS)]
+    pumps = (len(meters) - 1) // len(PUMP_METERS)
+    names = ["level_m", *(pump_column(pump, name) for pump in range(1, pumps + 1) for name in PUMP_METERS)]
     longest_ns = dict(fields["longest_ns"]["dict"])
     meters["longest_ns"] = [longest_ns.get(name, 0) for name in names]

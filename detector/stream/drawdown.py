@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.stream.block import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.detector.stream.gate import seconds_between
 from wetwell.detector.stream.run_state import is_break
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
 
 SETTLED_S = 15.0

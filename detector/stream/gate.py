@@ -7,22 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wetwell.detector.curves.datasheet import Datasheet
-from wetwell.detector.stream.block import (
-    FIRST_PUMP,
-    FLOW,
-    FREQUENCY,
-    HEAD,
-    INFLOW,
-    LEVEL,
-    POWER,
-    PUMP_VALUES,
-    RUNNING,
-    Block,
-    LiveBlock,
-)
+from wetwell.detector.stream.block import Block, LiveBlock
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.messages.readings import Readings
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, INFLOW, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
 
 MAX_GAP_S = 10.0

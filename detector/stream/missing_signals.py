@@ -10,15 +10,14 @@ import numpy.typing as npt
 
 from wetwell.detector.runs.run import SEGMENT_S, SEGMENT_SAMPLES
 from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median
-from wetwell.detector.stream.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_VALUES
 from wetwell.detector.stream.gate import seconds_between
 from wetwell.detector.stream.run_state import WARM_UP_S
 from wetwell.detector.verdict.maintenance import advice
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_METERS, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
 
-WATCHED = ("flow_m3h", "head_m", "power_kw")
 REFERENCE_SEGMENTS = 12
 """Five minutes of running: nothing is said before."""
 MAX_REFERENCE_SEGMENTS = 144
@@ -32,7 +31,7 @@ ABNORMAL_SHARE = 0.02
 
 BLIND = np.dtype(
     [(name, np.int64) for name in ("running", "settled_ns", "begin_ns", "last_ns", "samples", "is_full", "is_apart")]
-    + [(name, np.float64) for name in WATCHED]
+    + [(name, np.float64) for name in PUMP_METERS]
 )
 """Of one pump: how many pumps run, sums over the segment that is being gathered, whether it is full, and whether it
 is the first since the pump started, others did, or the stream broke."""
@@ -129,7 +128,7 @@ class BlindWatch:
         """Take a full segment of `new_blinds`, which begins anew; True where what is off has changed."""
         if gathered["is_apart"]:
             self.recent.clear()
-        self.recent.append(tuple(float(gathered[name] / gathered["samples"]) for name in WATCHED))
+        self.recent.append(tuple(float(gathered[name] / gathered["samples"]) for name in PUMP_METERS))
         gathered["is_apart"] = gathered["samples"] = 0
         learnt = self.reference.setdefault(int(gathered["running"]), [])
         before = set(self.off)
@@ -147,6 +146,6 @@ class BlindWatch:
         limit = np.maximum(ABNORMAL_SIGMAS * deviation, ABNORMAL_SHARE * np.abs(middle))
         return {
             name: round(float(shift[column] / middle[column]), 4)
-            for column, name in enumerate(WATCHED)
+            for column, name in enumerate(PUMP_METERS)
             if math.isfinite(shift[column]) and abs(shift[column]) > limit[column] > 0.0
         }

@@ -9,9 +9,9 @@ import numpy.typing as npt
 from wetwell.detector.curves.datasheet import Datasheet, Table, duty_flows
 from wetwell.detector.curves.residuals import distances
 from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, SIGNALS
-from wetwell.detector.stream.block import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
 
 WARM_UP_S = 30.0

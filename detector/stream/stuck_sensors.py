@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median
-from wetwell.detector.stream.block import FIRST_PUMP, FLOW, LEVEL, PUMP_VALUES
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, LEVEL, PUMP_METERS, PUMP_VALUES, pump_column
 from wetwell.protocols.timestamps import NS_PER_S
 
 STUCK_NS = 60 * NS_PER_S
@@ -24,7 +24,6 @@ DIFFERENCE_MEDIAN = NORMAL_MEDIAN / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
 
 
-METERS = ("flow_m3h", "head_m", "power_kw")
 """Of a pump, watched beside the level."""
 METER = np.dtype(
     [(name, np.int64) for name in ("is_followed", "is_stuck", "since_ns", "longest_ns")] + [("last", np.float64)]
@@ -35,12 +34,12 @@ did while it was learnt."""
 
 def new_meters(pumps: int) -> npt.NDArray[np.void]:
     """State of the level and of three meters a pump."""
-    return np.zeros(1 + len(METERS) * pumps, dtype=METER)
+    return np.zeros(1 + len(PUMP_METERS) * pumps, dtype=METER)
 
 
 def stuck_names(pump: int, bits: int) -> list[str]:
     """Names of the readings that were stuck in a run of a pump (from 0)."""
-    names = ("level_m", *(f"pump{pump + 1}_{name}" for name in METERS))
+    names = ("level_m", *(pump_column(pump + 1, name) for name in PUMP_METERS))
     return sorted(name for bit, name in enumerate(names) if bits >> bit & 1)
 
 
@@ -83,16 +82,16 @@ def watch_meters(meters: Any, time_ns: int, gap_s: float, frame: Floats, pumps: 
     _note(meters[0], frame[LEVEL], time_ns, gap_s, is_learning)
     for pump in range(pumps.shape[0]):
         state, at = pumps[pump], FIRST_PUMP + PUMP_VALUES * pump + FLOW
-        for number in range(len(METERS)):
-            meter, value = meters[1 + len(METERS) * pump + number], frame[at + number]
+        for number in range(len(PUMP_METERS)):
+            meter, value = meters[1 + len(PUMP_METERS) * pump + number], frame[at + number]
             if value != 0.0 and (state["is_running"] or number == 0):
                 _note(meter, value, time_ns, gap_s, state["is_learning"] != 0)
             else:
                 meter["is_followed"] = 0
         if state["is_running"]:
             bits = meters[0]["is_stuck"]
-            for number in range(len(METERS)):
-                bits |= meters[1 + len(METERS) * pump + number]["is_stuck"] << (1 + number)
+            for number in range(len(PUMP_METERS)):
+                bits |= meters[1 + len(PUMP_METERS) * pump + number]["is_stuck"] << (1 + number)
             state["stuck"] |= bits
 
 

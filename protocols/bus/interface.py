@@ -1,4 +1,4 @@
-"""The bus as the services see it. Links: `memory_link` (one process), `zenoh_link` (a network).
+"""The bus as the services see it; `wetwell.protocols.bus.zenoh` is the one over a network.
 
 A key is a Zenoh key expression; in subscriptions `*` stands for one chunk between slashes.
 """

@@ -4,7 +4,6 @@ import secrets
 import struct
 import threading
 from collections import deque
-from collections.abc import Iterator
 from itertools import accumulate, islice, pairwise
 from typing import Literal, NamedTuple
 
@@ -16,11 +15,11 @@ SOURCE_BYTES = 8
 PAGE_BYTES = 65_536
 """Messages of one answer; one message at least."""
 
-_MARK = struct.Struct(f">{SOURCE_BYTES}sQ")
+_HEADER = struct.Struct(f">{SOURCE_BYTES}sQ")
 _PAGE = struct.Struct(f">{SOURCE_BYTES}sQQ")
 
 
-class KeptQuery(Message):
+class CacheQuery(Message):
     """Question on the key of a publisher for what it keeps; without `source` for its last message."""
 
     schema_name: Literal["wetwell.kept-query/1"] = Field("wetwell.kept-query/1", alias="schema")
@@ -72,63 +71,36 @@ class Page(NamedTuple):
         return cls(source, first, end, payloads)
 
 
-class LastMessages:
-    """The last messages of a publisher, and the last one in any case.
-
-    Parameters
-    ----------
-    history : int
-        Most messages, >= 1; one that holds many things counts as many.
-    before : LastMessages, optional
-        What to begin with.
-    """
-
-    def __init__(self, history: int, before: "LastMessages | None" = None) -> None:
-        self.payloads: deque[bytes] = deque()
-        self._history = history
-        self._weights: deque[int] = deque()
-        self._weight = 0
-        if before is not None:
-            for payload, weight in before.weighed():
-                self.add(payload, weight)
-
-    def weighed(self) -> Iterator[tuple[bytes, int]]:
-        """Messages with what each counts as."""
-        return zip(self.payloads, self._weights, strict=True)
-
-    def add(self, payload: bytes, weight: int) -> None:
-        """Keep a message that counts as so many."""
-        self.payloads.append(payload)
-        self._weights.append(weight)
-        self._weight += weight
-        while self._weight > self._history and len(self.payloads) > 1:
-            self.payloads.popleft()
-            self._weight -= self._weights.popleft()
-
-
-class KeptMessages:
+class PublisherCache:
     """What one publisher keeps. Its `source` is new with each life, its numbers count up from 0.
 
     Parameters
     ----------
     history : int
-        Most messages that are kept, >= 1.
+        Most messages that are kept, >= 1; one that holds many things counts as many. The last one is always kept.
     """
 
     def __init__(self, history: int) -> None:
         self.source = secrets.token_bytes(SOURCE_BYTES)
         self.end = 0
-        self._last = LastMessages(history)
-        self._payloads = self._last.payloads
+        self._history = history
+        self._payloads: deque[bytes] = deque()
+        self._weights: deque[int] = deque()
+        self._weight = 0
         self._lock = threading.Lock()
 
     def add(self, payload: bytes, weight: int = 1) -> bytes:
-        """Keep a message; the mark that goes with it."""
+        """Keep a message that counts as so many; the sequence header that goes with it."""
         with self._lock:
-            mark = _MARK.pack(self.source, self.end)
-            self._last.add(payload, weight)
+            header = self.next_header
+            self._payloads.append(payload)
+            self._weights.append(weight)
+            self._weight += weight
+            while self._weight > self._history and len(self._payloads) > 1:
+                self._payloads.popleft()
+                self._weight -= self._weights.popleft()
             self.end += 1
-        return mark
+        return header
 
     @property
     def last(self) -> bytes | None:
@@ -137,11 +109,11 @@ class KeptMessages:
             return self._payloads[-1] if self._payloads else None
 
     @property
-    def next_mark(self) -> bytes:
-        """Mark of the next message."""
-        return _MARK.pack(self.source, self.end)
+    def next_header(self) -> bytes:
+        """Sequence header of the next message."""
+        return _HEADER.pack(self.source, self.end)
 
-    def page(self, query: KeptQuery) -> Page | None:
+    def page(self, query: CacheQuery) -> Page | None:
         """What a question asks for, as far as it is kept and fits; None if it is for another one, or all is new."""
         if self.end == 0 or query.source not in ("", self.source.hex()):
             return None
@@ -159,24 +131,24 @@ class KeptMessages:
             return Page(self.source, first, self.end, tuple(payloads))
 
 
-def read_mark(mark: bytes) -> tuple[bytes, int] | None:
-    """Source and number in the mark of a message; None if it is none, as of a publisher that is not of this package.
+def read_sequence_header(header: bytes) -> tuple[bytes, int] | None:
+    """Source and number that go with a message; None if there are none, as of a publisher not of this package.
 
     Examples
     --------
-    >>> kept = KeptMessages(history=2)
-    >>> read_mark(kept.add(b"{}")) == (kept.source, 0), read_mark(b"?")
+    >>> cache = PublisherCache(history=2)
+    >>> read_sequence_header(cache.add(b"{}")) == (cache.source, 0), read_sequence_header(b"?")
     (True, None)
     """
-    if len(mark) != _MARK.size:
+    if len(header) != _HEADER.size:
         return None
-    source, number = _MARK.unpack(mark)
+    source, number = _HEADER.unpack(header)
     return source, number
 
 
-def read_query(payload: bytes) -> KeptQuery | None:
+def read_query(payload: bytes) -> CacheQuery | None:
     """Question for what is kept; None if it is none."""
     try:
-        return KeptQuery.model_validate_json(payload)
+        return CacheQuery.model_validate_json(payload)
     except ValidationError:
         return None

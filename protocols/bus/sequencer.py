@@ -2,9 +2,9 @@
 
 from collections import deque
 
-from wetwell.protocols.bus.publisher_cache import Page, read_mark
+from wetwell.protocols.bus.publisher_cache import Page, read_sequence_header
 
-LINES = 8
+MOST_STREAMS = 8
 """Lives of publishers on one key that are remembered."""
 MOST_HELD = 10_000
 """Messages of one publisher that wait for one that is missing."""
@@ -46,7 +46,7 @@ class Sequencer:
     ready : list of (str, bytes)
         Key and payload of what is to be passed on, in order. Whoever takes it empties it.
     wanted : dict
-        Lines of which messages are missing that nobody has asked for, by their sources.
+        Streams of which messages are missing that nobody has asked for, by their sources.
     lost : int
         Messages that were given up.
     """
@@ -56,92 +56,92 @@ class Sequencer:
         self.wanted: dict[bytes, SourceStream] = {}
         self.lost = 0
         self._history = history
-        self._lines: dict[bytes, SourceStream] = {}
+        self._streams: dict[bytes, SourceStream] = {}
         self._sources: dict[str, deque[bytes]] = {}
 
-    def take(self, key: str, mark: bytes | None, payload: bytes) -> None:
-        """Take a message as it comes. One without a mark is passed on at once."""
-        known = None if mark is None else read_mark(mark)
+    def handle_message(self, key: str, header: bytes | None, payload: bytes) -> None:
+        """Take a message as it comes. One without a sequence header is passed on at once."""
+        known = None if header is None else read_sequence_header(header)
         if known is None:
             self.ready.append((key, payload))
             return
         source, number = known
-        line = self._lines.get(source)
-        if line is None:
-            line = self._begin(key, source, max(0, number - self._history))
-        if number == line.next == line.end:
-            line.next = line.end = number + 1
-            line.is_begun = True
+        stream = self._streams.get(source)
+        if stream is None:
+            stream = self._begin(key, source, max(0, number - self._history))
+        if number == stream.next == stream.end:
+            stream.next = stream.end = number + 1
+            stream.is_begun = True
             self.ready.append((key, payload))
-        elif number >= line.next:
-            line.held[number] = payload
-            line.end = max(line.end, number + 1)
-            self._go_on(line)
+        elif number >= stream.next:
+            stream.held[number] = payload
+            stream.end = max(stream.end, number + 1)
+            self._go_on(stream)
 
-    def take_tail(self, key: str, mark: bytes) -> None:
+    def handle_tail(self, key: str, header: bytes) -> None:
         """Take the number that the next message of a publisher will have."""
-        if (known := read_mark(mark)) is not None:
+        if (known := read_sequence_header(header)) is not None:
             self._reaches(key, *known)
 
-    def take_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
-        """Take messages that were asked for: from the next one of a line on, or the last one of a publisher."""
-        line = self._reaches(key, page.source, page.end)
+    def handle_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
+        """Take messages that were asked for: from the next one of a stream on, or the last one of a publisher."""
+        stream = self._reaches(key, page.source, page.end)
         if is_from_next:  # older ones are not kept any more
-            self._skip(line, page.first)
+            self._skip(stream, page.first)
         for number, payload in enumerate(page.payloads, page.first):
-            if number >= line.next:
-                line.held[number] = payload
-        self._go_on(line)
+            if number >= stream.next:
+                stream.held[number] = payload
+        self._go_on(stream)
 
-    def is_replaced(self, line: SourceStream) -> bool:
+    def is_replaced(self, stream: SourceStream) -> bool:
         """Whether a later life of its publisher was heard: then nobody keeps the messages of this one any more."""
-        return self._sources[line.key][-1] != line.source
+        return self._sources[stream.key][-1] != stream.source
 
-    def give_up(self, line: SourceStream) -> None:
+    def give_up(self, stream: SourceStream) -> None:
         """Go on without the messages that are missing now."""
-        self._skip(line, min(line.held, default=line.end))
-        self._go_on(line)
+        self._skip(stream, min(stream.held, default=stream.end))
+        self._go_on(stream)
 
     def _reaches(self, key: str, source: bytes, end: int) -> SourceStream:
-        """The line of a publisher that has sent messages up to a number."""
-        line = self._lines.get(source) or self._begin(key, source, max(0, end - self._history))
-        line.end = max(line.end, end)
-        self._go_on(line)
-        return line
+        """The stream of a publisher that has sent messages up to a number."""
+        stream = self._streams.get(source) or self._begin(key, source, max(0, end - self._history))
+        stream.end = max(stream.end, end)
+        self._go_on(stream)
+        return stream
 
     def _begin(self, key: str, source: bytes, begin: int) -> SourceStream:
         sources = self._sources.setdefault(key, deque())
-        if len(sources) == LINES:
+        if len(sources) == MOST_STREAMS:
             oldest = sources.popleft()
             self.wanted.pop(oldest, None)
-            line = self._lines.pop(oldest)
-            self._skip(line, line.end)
+            stream = self._streams.pop(oldest)
+            self._skip(stream, stream.end)
         sources.append(source)
-        line = self._lines[source] = SourceStream(key, source, begin)
-        return line
+        stream = self._streams[source] = SourceStream(key, source, begin)
+        return stream
 
-    def _go_on(self, line: SourceStream) -> None:
+    def _go_on(self, stream: SourceStream) -> None:
         """Pass on what is complete; want what is not."""
-        held = line.held
-        while line.next in held:
-            self.ready.append((line.key, held.pop(line.next)))
-            line.next += 1
-            line.is_begun = True
+        held = stream.held
+        while stream.next in held:
+            self.ready.append((stream.key, held.pop(stream.next)))
+            stream.next += 1
+            stream.is_begun = True
         if len(held) > MOST_HELD:
-            self.give_up(line)
-        elif not line.is_missing:
-            self.wanted.pop(line.source, None)
-        elif not line.is_asked:
-            self.wanted[line.source] = line
+            self.give_up(stream)
+        elif not stream.is_missing:
+            self.wanted.pop(stream.source, None)
+        elif not stream.is_asked:
+            self.wanted[stream.source] = stream
 
-    def _skip(self, line: SourceStream, to: int) -> None:
+    def _skip(self, stream: SourceStream, to: int) -> None:
         """Pass on what is there before a number, and go on at it."""
-        if to <= line.next:
+        if to <= stream.next:
             return
-        there = sorted(number for number in line.held if number < to)
+        there = sorted(number for number in stream.held if number < to)
         for number in there:
-            self.ready.append((line.key, line.held.pop(number)))
-        if line.is_begun:  # what was before the first one belongs to the history
-            self.lost += to - line.next - len(there)
-        line.next = to
-        line.end = max(line.end, to)
+            self.ready.append((stream.key, stream.held.pop(number)))
+        if stream.is_begun:  # what was before the first one belongs to the history
+            self.lost += to - stream.next - len(there)
+        stream.next = to
+        stream.end = max(stream.end, to)

@@ -2,8 +2,11 @@
 
 # ruff: noqa: D102 - the names are those of the messages
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import Any, NamedTuple, Protocol
+
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES
 
 
 class PumpReadings(Protocol):
@@ -57,3 +60,22 @@ class Row(NamedTuple):
     inflow_m3h: float
     pumps: tuple[PumpRow, ...]
     quality: str = "good"
+
+
+class HasPumps(Protocol):
+    """What has the quantities of a station, and of each of its pumps, in fields of their names."""
+
+    @property
+    def pumps(self) -> Sequence[object]: ...
+
+
+_of_station: Callable[[object], tuple[Any, ...]] = attrgetter(*STATION_QUANTITIES)
+_of_pump: Callable[[object], tuple[Any, ...]] = attrgetter(*PUMP_QUANTITIES)
+
+
+def row_values(readings: HasPumps) -> list[Any]:
+    """What such fields hold, in the order of a row: those of the station, then those of each pump."""
+    values = list(_of_station(readings))
+    for pump in readings.pumps:
+        values.extend(_of_pump(pump))
+    return values

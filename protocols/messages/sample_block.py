@@ -8,6 +8,20 @@ from pydantic import Field, model_validator
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import Message, Number, PumpReading, Quality, Sample, Stamp
+from wetwell.protocols.messages.readings import row_values
+from wetwell.protocols.quantities import (
+    FIRST_PUMP,
+    FLOW,
+    FREQUENCY,
+    HEAD,
+    INFLOW,
+    LEVEL,
+    POWER,
+    PUMP_QUANTITIES,
+    PUMP_VALUES,
+    RUNNING,
+    columns_of,
+)
 
 T = TypeVar("T")
 
@@ -49,37 +63,29 @@ class SampleBlock(Message):
         samples = len(self.seq)
         if len(self.time) != samples:
             raise ValueError(f"time: {len(self.time)} values, must be {samples} as in seq")
-        for place, column in enumerate(_columns(self)):
+        for name, column in zip(columns_of(len(self.pumps)), row_values(self), strict=True):
             if len(column) not in {0, samples}:
-                raise ValueError(f"{_name(place)}: {len(column)} values, must be {samples} as in seq, or none")
+                raise ValueError(f"{name}: {len(column)} values, must be {samples} as in seq, or none")
         return self
 
     @classmethod
     def of(cls, samples: Sequence[Sample]) -> Self:
         """Block of at least one sample of the same station, quality and number of pumps."""
-        pumps = zip(*(sample.pumps for sample in samples), strict=True)
+        columns = [_column(values) for values in zip(*map(row_values, samples), strict=True)]
+        of_pumps = (columns[at : at + PUMP_VALUES] for at in range(FIRST_PUMP, len(columns), PUMP_VALUES))
         return cls(
             station=samples[0].station,
             seq=tuple(sample.seq for sample in samples),
             time=tuple(sample.time for sample in samples),
-            level_m=_column([sample.level_m for sample in samples]),
-            inflow_m3h=_column([sample.inflow_m3h for sample in samples]),
-            pumps=tuple(
-                PumpBlock(
-                    frequency_hz=_column([reading.frequency_hz for reading in readings]),
-                    flow_m3h=_column([reading.flow_m3h for reading in readings]),
-                    head_m=_column([reading.head_m for reading in readings]),
-                    power_kw=_column([reading.power_kw for reading in readings]),
-                    running=_column([reading.running for reading in readings]),
-                )
-                for readings in pumps
-            ),
+            level_m=columns[LEVEL],
+            inflow_m3h=columns[INFLOW],
+            pumps=tuple(PumpBlock(**dict(zip(PUMP_QUANTITIES, pump, strict=True))) for pump in of_pumps),
             quality=samples[0].quality,
         )
 
     def samples(self) -> list[Sample]:
         """The samples one by one."""
-        columns = [column or (None,) * len(self.seq) for column in _columns(self)]
+        columns = [column or (None,) * len(self.seq) for column in row_values(self)]
         return [
             Sample.model_construct(
                 station=self.station,
@@ -89,13 +95,13 @@ class SampleBlock(Message):
                 inflow_m3h=inflow_m3h,
                 pumps=tuple(
                     PumpReading.model_construct(
-                        frequency_hz=values[at],
-                        flow_m3h=values[at + 1],
-                        head_m=values[at + 2],
-                        power_kw=values[at + 3],
-                        running=values[at + 4],
+                        frequency_hz=values[at + FREQUENCY],
+                        flow_m3h=values[at + FLOW],
+                        head_m=values[at + HEAD],
+                        power_kw=values[at + POWER],
+                        running=values[at + RUNNING],
                     )
-                    for at in range(0, len(values), 5)
+                    for at in range(0, len(values), PUMP_VALUES)
                 ),
                 quality=self.quality,
             )
@@ -110,8 +116,8 @@ class SampleBlock(Message):
         pumps : int, optional
             Number of pumps to have columns for; that of the block if not given.
         """
-        columns = _columns(self)
-        width = len(columns) if pumps is None else 2 + 5 * pumps
+        columns = row_values(self)
+        width = len(columns) if pumps is None else len(columns_of(pumps))
         values = np.full((len(self.seq), width), np.nan)
         for place, column in enumerate(columns[:width]):
             if column:
@@ -119,20 +125,5 @@ class SampleBlock(Message):
         return values
 
 
-def _columns(block: SampleBlock) -> list[tuple[float | bool | None, ...]]:
-    columns: list[tuple[float | bool | None, ...]] = [block.level_m, block.inflow_m3h]
-    for pump in block.pumps:
-        columns += (pump.frequency_hz, pump.flow_m3h, pump.head_m, pump.power_kw, pump.running)
-    return columns
-
-
-def _name(place: int) -> str:
-    """Name of a column, as in a recording."""
-    if place < 2:
-        return ("level_m", "inflow_m3h")[place]
-    pump, quantity = divmod(place - 2, 5)
-    return f"pump{pump + 1}_{list(PumpBlock.model_fields)[quantity]}"
-
-
-def _column(values: Sequence[T | None]) -> tuple[T | None, ...]:
-    return () if all(value is None for value in values) else tuple(values)
+def _column(values: tuple[T | None, ...]) -> tuple[T | None, ...]:
+    return () if values[0] is None and all(value is None for value in values) else values

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.modbus.device_signal import Signal, check_signal
 
-_READ = ("table", "address", "type", "unit", "scale", "offset", "word_order", "bit", "no_value")
+_SIGNAL_FIELDS = ("table", "address", "type", "unit", "scale", "offset", "word_order", "bit", "no_value")
 _FOR_PEOPLE = {"name", "count", "access", "description"}
 _SETTING = re.compile(r"(start|stop)_level\d+_m|pump\d+_auto")
 
@@ -41,7 +41,7 @@ def read_map_csv(path: Path, pumps: int | None) -> dict[str, Signal]:
             columns = set(rows.fieldnames or ())
             if missing := {"name", "table", "address", "type"} - columns:
                 raise ConfigError(f"{path}: column '{min(missing)}' is missing")
-            if unknown := columns - {*_READ, *_FOR_PEOPLE}:
+            if unknown := columns - {*_SIGNAL_FIELDS, *_FOR_PEOPLE}:
                 raise ConfigError(f"{path}: column '{min(unknown)}' is not known")
             signals: dict[str, Signal] = {}
             for row in rows:
@@ -56,7 +56,7 @@ def read_map_csv(path: Path, pumps: int | None) -> dict[str, Signal]:
 
 
 def _signal(row: Mapping[str, str | None], place: str, pumps: int | None) -> Signal:
-    cells: dict[str, object] = {key: text for key in _READ if (text := row.get(key))}
+    cells: dict[str, object] = {key: text for key in _SIGNAL_FIELDS if (text := row.get(key))}
     table, numbers = str(cells.get("table")), row.get("no_value")
     if table.isdecimal():
         cells["table"] = int(table)

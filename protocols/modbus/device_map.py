@@ -12,8 +12,9 @@ from pydantic import Field, ValidationError, model_validator
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.messages.messages import Quality
 from wetwell.protocols.modbus.device_csv import read_map_csv
-from wetwell.protocols.modbus.device_signal import ByteOrder, Signal, check_signal, pump_of
+from wetwell.protocols.modbus.device_signal import ByteOrder, Signal, check_signal
 from wetwell.protocols.modbus.registers import MAX_PUMPS
+from wetwell.protocols.quantities import pumps_of
 from wetwell.protocols.station.station_file import NAME_PATTERN, NonNegative, Positive, Table, load_station, load_toml
 
 
@@ -168,7 +169,7 @@ def _completed(device: Device, path: Path) -> Plc:
     except ValueError as error:
         raise ConfigError(f"{path}: station '{name}': {error}") from error
     if pumps is None:
-        pumps = max(1, *map(pump_of, signals))
+        pumps = max(1, pumps_of(signals))
     return Plc(station=str(name), pumps=pumps, device=device, signals=MappingProxyType(signals), tls=tls)
 
 

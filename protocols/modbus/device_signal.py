@@ -1,14 +1,13 @@
 """One signal of a PLC: where it stands, what form it has, and how its words become a value in house units."""
 
 import math
-import re
 import struct
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_of
 from wetwell.protocols.station.station_file import Finite, Table
 from wetwell.protocols.units import factor, house_unit
 
@@ -20,7 +19,6 @@ ByteOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 TABLE_OF_FUNCTION: dict[int, SignalTable] = {1: "coil", 2: "discrete", 3: "holding", 4: "input"}
 BIT_TABLES = frozenset({"coil", "discrete"})
 _FORMATS = {"float32": ">f", "uint32": ">I", "int32": ">i", "uint16": ">H", "int16": ">h"}
-_PUMP_SIGNAL = re.compile(rf"pump([1-9]\d*)_({'|'.join(PUMP_QUANTITIES)})")
 
 
 def _table(value: Any) -> Any:
@@ -136,9 +134,9 @@ def check_signal(name: str, signal: Signal, pumps: int | None) -> None:
         Names signal, value and rule.
     """
     number = pump_of(name)
-    if number == 0 and name not in {*STATION_COLUMNS, "heartbeat", "time_s"}:
+    if number == 0 and name not in {*STATION_QUANTITIES, "heartbeat", "time_s"}:
         raise ValueError(
-            f"signal.{name}: is no signal, must be level_m, inflow_m3h, heartbeat, time_s or "
+            f"signal.{name}: is no signal, must be {', '.join(STATION_QUANTITIES)}, heartbeat, time_s or "
             f"pump1_ and so on with {', '.join(PUMP_QUANTITIES)}"
         )
     if pumps is not None and number > pumps:
@@ -148,15 +146,3 @@ def check_signal(name: str, signal: Signal, pumps: int | None) -> None:
             factor(signal.unit, house_unit(name))
         except ValueError as error:
             raise ValueError(f"signal.{name}.{error}") from error
-
-
-def pump_of(name: str) -> int:
-    """Number of the pump that a signal belongs to, from 1; 0 for the station's own.
-
-    Examples
-    --------
-    >>> pump_of("pump12_head_m"), pump_of("level_m"), pump_of("pump1_colour")
-    (12, 0, 0)
-    """
-    match = _PUMP_SIGNAL.fullmatch(name)
-    return int(match[1]) if match else 0

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Literal
 
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, Quantity, pump_column
+
 Table = Literal["coil", "holding", "input"]
 Type = Literal["float32", "uint16", "uint32", "bit"]
 Access = Literal["r", "rw"]
@@ -100,17 +102,19 @@ def measured_words(pumps: int) -> int:
 
 
 def _measured(pumps: int) -> Iterable[_Row]:
-    yield "level_m", 0, "float32", "m", "Level in the wet well"
-    yield "inflow_m3h", 2, "float32", "m³/h", "Inflow to the wet well"
+    for place, quantity in enumerate(STATION_QUANTITIES.values()):
+        yield quantity.name, 2 * place, _type_of(quantity), quantity.unit, quantity.description
     yield "heartbeat", 4, "uint16", "", "Counts up each scan of the PLC, stands when its program stops"
     yield "time_s", 6, "uint32", "s", "Clock of the PLC, seconds since 1970 UTC"
     for i in range(1, pumps + 1):
         block = PUMP_BLOCK + PUMP_STRIDE * (i - 1)
-        yield f"pump{i}_frequency_hz", block, "float32", "Hz", f"Drive frequency of pump {i}"
-        yield f"pump{i}_flow_m3h", block + 2, "float32", "m³/h", f"Flow of pump {i}"
-        yield f"pump{i}_head_m", block + 4, "float32", "m", f"Head of pump {i}"
-        yield f"pump{i}_power_kw", block + 6, "float32", "kW", f"Electrical power of pump {i}"
-        yield f"pump{i}_running", block + 8, "uint16", "", f"Pump {i}: 1 running, 0 standing"
+        for place, quantity in enumerate(PUMP_QUANTITIES.values()):
+            name, description = pump_column(i, quantity.name), quantity.description.format(pump=i)
+            yield name, block + 2 * place, _type_of(quantity), quantity.unit, description
+
+
+def _type_of(quantity: Quantity) -> Type:
+    return "float32" if quantity.unit else "uint16"
 
 
 def _level_settings(levels: int) -> Iterable[_Row]:

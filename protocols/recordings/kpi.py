@@ -163,21 +163,19 @@ def kpis(recording: Recording, max_gap_s: float | None = None) -> Kpis:
         max_gap_s = max(MIN_GAP_S, GAP_STEPS * usual_s)
     held_ns = np.where(interval_ns <= max_gap_s * NS_PER_S, interval_ns, 0)
     hour_ns, day_ns = _beginnings_ns(stamps_ns, _HOUR_S), _beginnings_ns(stamps_ns, _DAY_S)
-    pumps = range(1, recording.pumps + 1)
-    power_kw = [recording.column(f"pump{pump}_power_kw")[order] for pump in pumps]
-    flow_m3h = [recording.column(f"pump{pump}_flow_m3h")[order] for pump in pumps]
-    running = [_running(recording, pump)[order] for pump in pumps]
+    power_kw, flow_m3h = (recording.of_pumps(name)[:, order] for name in ("power_kw", "flow_m3h"))
+    running = _running(recording)[:, order]
     known = np.ones(stamps_ns.size)
 
-    def sums(rates_per_h: list[Floats], begin_ns: Integers, period_s: int) -> Floats:
+    def sums(rates_per_h: Floats, begin_ns: Integers, period_s: int) -> Floats:
         of_pumps = [_sums(rate_per_h, held_ns, stamps_ns, begin_ns, period_s) for rate_per_h in rates_per_h]
-        return np.reshape(of_pumps, (len(pumps), begin_ns.size))
+        return np.reshape(of_pumps, (recording.pumps, begin_ns.size))
 
     def starts(begin_ns: Integers, period_s: int) -> Integers:
         started_ns = [stamps_ns[_starts(state)] for state in running]
         period_ns = period_s * NS_PER_S
         of_pumps = [np.bincount((at_ns - begin_ns[:1]) // period_ns, minlength=begin_ns.size) for at_ns in started_ns]
-        return np.reshape(np.array(of_pumps, dtype=np.int64), (len(pumps), begin_ns.size))
+        return np.reshape(np.array(of_pumps, dtype=np.int64), (recording.pumps, begin_ns.size))
 
     return Kpis(
         hour_ns=hour_ns,
@@ -208,9 +206,9 @@ def _beginnings_ns(stamps_ns: Integers, period_s: int) -> Integers:
     return np.arange(stamps_ns[0] // period_ns, stamps_ns[-1] // period_ns + 1, dtype=np.int64) * period_ns
 
 
-def _running(recording: Recording, pump: int) -> Floats:
-    """1 running, 0 standing, NaN unknown."""
-    flag, frequency_hz = recording.column(f"pump{pump}_running"), recording.column(f"pump{pump}_frequency_hz")
+def _running(recording: Recording) -> Floats:
+    """(pumps, n) 1 running, 0 standing, NaN unknown."""
+    flag, frequency_hz = recording.of_pumps("running"), recording.of_pumps("frequency_hz")
     state = np.where(np.isnan(flag), frequency_hz, flag)
     return np.where(np.isnan(state), np.nan, state > 0.0)
 

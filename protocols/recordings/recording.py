@@ -12,7 +12,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import count, repeat
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +27,18 @@ from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.messages.readings import PumpRow, Row
+from wetwell.protocols.quantities import (
+    PUMP_ANALOGUES,
+    PUMP_QUANTITIES,
+    STATION_QUANTITIES,
+    pump_column,
+    pump_of,
+    pumps_of,
+)
 from wetwell.protocols.timestamps import from_iso, to_iso_array
 
-STATION_COLUMNS = ("level_m", "inflow_m3h")
-PUMP_QUANTITIES = ("frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
 TRUTH_PREFIX = "truth_"
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
-_PUMP_COLUMN = re.compile(rf"pump([1-9]\d*)_({'|'.join(PUMP_QUANTITIES)})")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +68,7 @@ class Recording:
     @property
     def pumps(self) -> int:
         """Number of pumps that the columns speak of."""
-        return max((int(m[1]) for m in map(_PUMP_COLUMN.fullmatch, self.columns) if m), default=0)
+        return pumps_of(self.columns)
 
     def column(self, name: str) -> Floats:
         """(n,) values of a column, NaN throughout where it is absent."""
@@ -71,36 +76,36 @@ class Recording:
             return self.columns[name]
         return np.full(len(self), np.nan)
 
+    def of_pumps(self, name: str, pumps: int | None = None) -> Floats:
+        """(pumps, n) values of a quantity of each pump, of so many or of all; NaN where its column is absent."""
+        pumps = self.pumps if pumps is None else pumps
+        columns = [self.column(pump_column(i, name)) for i in range(1, pumps + 1)]
+        return np.array(columns).reshape(pumps, len(self))
+
     def samples(self, station: str, first_seq: int = 0) -> Iterator[Sample]:
         """Yield the rows as messages, `seq` counting from `first_seq`."""
-        station_values = [self.column(name).tolist() for name in STATION_COLUMNS]
-        pump_values = [
-            [self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES]
-            for i in range(1, self.pumps + 1)
-        ]
-        for row, stamp_ns in enumerate(self.time_ns.tolist()):
-            level_m, inflow_m3h = (_value(values[row]) for values in station_values)
+        for row in self.rows():
             yield Sample(
                 station=station,
-                seq=first_seq + row,
-                time=stamp_ns,
-                level_m=level_m,
-                inflow_m3h=inflow_m3h,
-                pumps=tuple(_reading(pump, row) for pump in pump_values),
+                seq=first_seq + row.seq,
+                time=row.time,
+                level_m=_value(row.level_m),
+                inflow_m3h=_value(row.inflow_m3h),
+                pumps=tuple(map(_reading, row.pumps)),
             )
 
     def rows(self) -> Iterator[Row]:
         """Yield the rows as they are, without the checks of a message."""
         pumps = [
             zip(
-                *(self.column(f"pump{i}_{quantity}").tolist() for quantity in PUMP_QUANTITIES[:-1]),
-                map(_flag, self.column(f"pump{i}_{PUMP_QUANTITIES[-1]}").tolist()),
+                *(self.column(pump_column(i, name)).tolist() for name in PUMP_ANALOGUES),
+                map(_flag, self.column(pump_column(i, "running")).tolist()),
                 strict=True,
             )
             for i in range(1, self.pumps + 1)
         ]
-        station = (self.column(name).tolist() for name in STATION_COLUMNS)
-        of_pumps = zip(*(map(PumpRow._make, pump) for pump in pumps), strict=True)
+        station = (self.column(name).tolist() for name in STATION_QUANTITIES)
+        of_pumps = zip(*(map(PumpRow._make, pump) for pump in pumps), strict=True) if pumps else repeat(())
         return map(Row, count(), self.time_ns.tolist(), *station, of_pumps)
 
 
@@ -108,19 +113,12 @@ def _flag(number: float) -> bool | None:
     return number > 0 if number == number else None  # noqa: PLR0124 - the quickest test for NaN
 
 
-def _value(number: float) -> float | None:
+def _value(number: float | None) -> float | None:
     return number if number == number else None  # noqa: PLR0124 - the quickest test for NaN
 
 
-def _reading(columns: list[list[float]], row: int) -> PumpReading:
-    frequency_hz, flow_m3h, head_m, power_kw, running = (_value(values[row]) for values in columns)
-    return PumpReading(
-        frequency_hz=frequency_hz,
-        flow_m3h=flow_m3h,
-        head_m=head_m,
-        power_kw=power_kw,
-        running=None if running is None else running > 0,
-    )
+def _reading(pump: PumpRow) -> PumpReading:
+    return PumpReading(**dict(zip(PUMP_QUANTITIES, map(_value, pump), strict=True)))
 
 
 def read_recording(path: Path) -> Recording:
@@ -141,7 +139,7 @@ def read_recording(path: Path) -> Recording:
     for name in table.column_names:
         if name == "time":
             continue
-        if name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name):
+        if name in STATION_QUANTITIES or pump_of(name):
             columns[name] = _numbers(table[name], name, path)
         elif name.startswith(TRUTH_PREFIX):
             truth[name] = table[name].to_numpy()
@@ -167,7 +165,7 @@ def _read_table(path: Path) -> pa.Table:
         if suffix == ".parquet":
             return pa.parquet.read_table(path)
         header = _csv_header(path)
-        types = {name: pa.float64() for name in header if name in STATION_COLUMNS or _PUMP_COLUMN.fullmatch(name)}
+        types = {name: pa.float64() for name in header if name in STATION_QUANTITIES or pump_of(name)}
         return pa.csv.read_csv(
             path,
             read_options=pa.csv.ReadOptions(use_threads=False),

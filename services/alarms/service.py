@@ -3,14 +3,14 @@
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Sequence
 
 from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Request
 from wetwell.protocols.bus.keys import SITE, alarm_act_key, alarm_key
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmFigure, AlarmReport, AlarmState
-from wetwell.protocols.messages.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.decoding import M, SampleMessage, decoded, samples_of
+from wetwell.protocols.messages.messages import MessageError, Sample, Status, Verdict
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
 from wetwell.services.alarms.audit import Audit
@@ -23,8 +23,6 @@ from wetwell.services.alarms.status import ActRefusedError, AlarmStatus
 from wetwell.services.runtime.settings import AlarmSettings
 
 log = logging.getLogger(__name__)
-
-M = TypeVar("M", bound=Message)
 
 MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
@@ -61,22 +59,17 @@ class AlarmService:
 
     def take_sample(self, payload: bytes) -> None:
         """Look at a sample."""
-        sample = self._decoded(Sample, payload)
-        if sample is not None:
-            self._take_samples(sample.station, [sample])
+        self._take_samples(self._decoded(Sample, payload))
 
     def take_sample_block(self, payload: bytes) -> None:
         """Look at many samples of a station."""
-        block = self._decoded(SampleBlock, payload)
-        if block is not None:
-            self._take_samples(block.station, block.samples())
+        self._take_samples(self._decoded(SampleBlock, payload))
 
-    def _take_samples(self, station: str, samples: Iterable[Sample]) -> None:
-        watch = self._named(station)
-        if watch is None:
+    def _take_samples(self, message: SampleMessage | None) -> None:
+        if message is None or (watch := self._named(message.station)) is None:
             return
-        limits = self._limits.get(station) or limits_of(self._settings, None)
-        for sample in samples:
+        limits = self._limits.get(message.station) or limits_of(self._settings, None)
+        for sample in samples_of(message):
             is_new = watch.take_sample(sample, self._now(), self.book, limits)
             self._counts["samples" if is_new else "doubled"] += 1
 
@@ -248,13 +241,8 @@ class AlarmService:
             return False
         return True
 
-    def _decoded(self, message: type[M], payload: bytes) -> M | None:
-        try:
-            return message.decode(payload)
-        except MessageError as error:
-            self._counts["malformed"] += 1
-            log.warning("%s", error)
-            return None
+    def _decoded(self, kind: type[M], payload: bytes) -> M | None:
+        return decoded(kind, payload, self._counts, log)
 
     def _named(self, station: str) -> StationWatch | None:
         """What is known of a station; None if this cannot be one."""

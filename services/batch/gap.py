@@ -9,6 +9,7 @@ import numpy as np
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.quantities import PUMP_METERS, pump_column
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.batch.field_data import prepared, write_station
@@ -18,7 +19,7 @@ from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport, report_of
 from wetwell.sim2real.recording.preparation import PreparationReport
-from wetwell.sim2real.recording.traces import PUMP_SIGNALS, traces_of
+from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.simulator.effects import EFFECTS, effects_of
 
@@ -98,11 +99,11 @@ def _teacher_forced(rows: Recording, station: Station) -> Recording:
     if traces.inflow_m3h is not None:
         columns["inflow_m3h"] = traces.inflow_m3h[second]
     for i in range(traces.pumps):
-        columns[f"pump{i + 1}_frequency_hz"] = traces.frequency_hz[i, second]
-        for name in PUMP_SIGNALS:
+        columns[pump_column(i + 1, "frequency_hz")] = traces.frequency_hz[i, second]
+        for name in PUMP_METERS:
             if name in prediction.signals:
-                columns[f"pump{i + 1}_{name}"] = prediction.signals[name][i, second]
-        columns[f"pump{i + 1}_running"] = (traces.frequency_hz[i, second] > 0.0).astype(np.float64)
+                columns[pump_column(i + 1, name)] = prediction.signals[name][i, second]
+        columns[pump_column(i + 1, "running")] = (traces.frequency_hz[i, second] > 0.0).astype(np.float64)
     return Recording(time_ns=rows.time_ns, columns=columns)
 
 

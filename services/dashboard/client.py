@@ -1,6 +1,7 @@
 """What a browser asks of the other services of the site: history, recordings, acts on alarms."""
 
 from collections.abc import AsyncIterator, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 from pydantic import ValidationError
@@ -10,7 +11,9 @@ from wetwell.protocols.bus.keys import alarm_act_key, history_key
 from wetwell.protocols.errors import WetwellError, first_fault
 from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import MessageError, Number, PumpReading, Sample
+from wetwell.protocols.messages.messages import MessageError, Number, Sample
+from wetwell.protocols.messages.readings import row_values
+from wetwell.protocols.quantities import columns_of
 from wetwell.protocols.timestamps import to_iso
 
 ANSWER_S = 10.0
@@ -106,13 +109,8 @@ def _as_columns(answer: History) -> tuple[Sequence[int], Mapping[str, Sequence[N
     if not answer.messages:
         return answer.time, {name: values for name, values in answer.columns.items() if name not in _NO_COLUMNS}
     samples = [Sample.model_validate(message) for message in answer.messages]
-    columns: dict[str, list[Number]] = {
-        "level_m": [sample.level_m for sample in samples],
-        "inflow_m3h": [sample.inflow_m3h for sample in samples],
+    names = columns_of(max(len(sample.pumps) for sample in samples))
+    columns = zip(names, zip_longest(*map(row_values, samples)), strict=True)
+    return [sample.time for sample in samples], {
+        name: [None if value is None else float(value) for value in values] for name, values in columns
     }
-    for pump in range(max(len(sample.pumps) for sample in samples)):
-        readings = [sample.pumps[pump] if pump < len(sample.pumps) else PumpReading() for sample in samples]
-        for name in PumpReading.model_fields:
-            values = (getattr(reading, name) for reading in readings)
-            columns[f"pump{pump + 1}_{name}"] = [None if value is None else float(value) for value in values]
-    return [sample.time for sample in samples], columns

@@ -4,6 +4,7 @@ import math
 
 from wetwell.protocols.messages.history import History
 from wetwell.protocols.messages.messages import Number, Sample
+from wetwell.protocols.quantities import PUMP_ANALOGUES, STATION_QUANTITIES, pump_column
 
 NS_PER_MS = 1_000_000
 
@@ -45,8 +46,8 @@ def past_rows(history: History) -> list[str]:
     ['[1000,1.2,null,50,201.2,null,null]']
     """
     pumps = sum(name.endswith("_frequency_hz") for name in history.columns)
-    quantities = ("frequency_hz", "flow_m3h", "head_m", "power_kw")
-    names = ["level_m", "inflow_m3h", *(f"pump{pump}_{name}" for pump in range(1, pumps + 1) for name in quantities)]
+    names = [*STATION_QUANTITIES]
+    names += [pump_column(pump, name) for pump in range(1, pumps + 1) for name in PUMP_ANALOGUES]
     columns = [history.columns.get(name, (None,) * len(history.time)) for name in names]
     rows = zip(history.time, *columns, strict=False)  # a foreign answer may be ragged
     return [f"[{time_ns // NS_PER_MS},{','.join(map(number, values))}]" for time_ns, *values in rows]

@@ -3,12 +3,13 @@
 import json
 import logging
 from collections import Counter
-from typing import Any, TypeVar
+from typing import Any
 
 from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import Alarm
-from wetwell.protocols.messages.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.decoding import M, decoded
+from wetwell.protocols.messages.messages import Sample, Status, Verdict
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.dashboard.station_view import StationView
@@ -18,8 +19,6 @@ log = logging.getLogger(__name__)
 ROWS = ((100, 1200), (1000, 200))
 FEWEST_ROWS = 60
 """Samples of each station that are kept for charts: with up to so many stations, and beyond."""
-
-M = TypeVar("M", bound=Message)
 
 
 class SiteView:
@@ -145,12 +144,7 @@ class SiteView:
         return f'{{"id":{self.frame_id},"live":[{",".join(live)}],"stations":{json.dumps(summaries)}}}'
 
     def _decoded(self, kind: type[M], payload: bytes) -> M | None:
-        try:
-            return kind.decode(payload)
-        except MessageError as error:
-            self.counts["malformed"] += 1
-            log.warning("%s", error)
-            return None
+        return decoded(kind, payload, self.counts, log)
 
     def _news(self, name: str) -> StationView:
         station = self._station(name)

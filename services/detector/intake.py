@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import order_key, sample_block_key, sample_key
+from wetwell.protocols.messages.decoding import SampleMessage, samples_of
 from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.protocols.messages.messages import MessageError, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
@@ -25,17 +26,15 @@ CATCH_UPS = 8
 SLICE = 500
 """Samples that are judged before the other tasks have their turn."""
 
-Kind = type[Sample | SampleBlock]
-
 
 class Waiting:
     """Messages of a station that wait while it catches up, as they came, for they are smaller so."""
 
     def __init__(self) -> None:
-        self.messages: deque[tuple[bytes, Kind]] = deque()
+        self.messages: deque[tuple[bytes, type[SampleMessage]]] = deque()
         self.dropped = 0
 
-    def extend(self, payloads: Sequence[bytes], kind: Kind) -> None:
+    def extend(self, payloads: Sequence[bytes], kind: type[SampleMessage]) -> None:
         """Add messages; beyond `BEHIND` the oldest go."""
         self.messages.extend((payload, kind) for payload in payloads)
         while len(self.messages) > BEHIND:
@@ -46,7 +45,7 @@ class Waiting:
         """The samples in them, which go on waiting."""
         for payload, kind in self.messages:
             with contextlib.suppress(MessageError):
-                yield from _samples(kind.decode(payload))
+                yield from samples_of(kind.decode(payload))
 
 
 class Intake:
@@ -60,7 +59,7 @@ class Intake:
 
     def __init__(self, bus: Bus, judges: Sequence[StationDetector]) -> None:
         self._bus = bus
-        self._judges: dict[str, tuple[StationDetector, Kind]] = {
+        self._judges: dict[str, tuple[StationDetector, type[SampleMessage]]] = {
             key(judge.station): (judge, kind)
             for judge in judges
             for key, kind in ((sample_key, Sample), (sample_block_key, SampleBlock))
@@ -131,7 +130,7 @@ async def _take(judge: StationDetector, waiting: Waiting, place: int) -> None:
     judged = 0
     while waiting.messages:
         message = judge.decoded(*waiting.messages.popleft())
-        samples = [] if message is None else _samples(message)
+        samples = [] if message is None else samples_of(message)
         judge.take_samples(samples[place:])
         place = max(place - len(samples), 0)
         judged += len(samples)
@@ -143,8 +142,3 @@ async def _take(judge: StationDetector, waiting: Waiting, place: int) -> None:
 def _place(last: tuple[int, int], samples: Iterable[Sample]) -> int:
     """Place behind the last sample of this time and number; 0 if it is not there."""
     return max((place for place, one in enumerate(samples, 1) if (one.time, one.seq) == last), default=0)
-
-
-def _samples(message: Sample | SampleBlock) -> list[Sample]:
-    """What is in a message, one by one."""
-    return [message] if isinstance(message, Sample) else message.samples()

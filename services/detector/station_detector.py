@@ -15,6 +15,7 @@ from wetwell.detector.stream.block import Block
 from wetwell.detector.verdict.maintenance import Costs
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import verdict_key
+from wetwell.protocols.messages.decoding import SampleMessage, decoded
 from wetwell.protocols.messages.messages import MessageError, Order, Sample, Verdict
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import Station
@@ -55,6 +56,7 @@ class StationDetector:
         quarantine: Quarantine | None = None,
     ) -> None:
         self.station = station.name
+        self._place = f"station '{station.name}': "
         self.detector = Detector(station.name, datasheet_of(station), costs)
         self._checkpoint = checkpoint
         self._quarantine = quarantine or Quarantine(None, "", 1, 0.0)
@@ -75,7 +77,7 @@ class StationDetector:
             for verdict in told.verdicts:
                 self._publish(verdict)
 
-    def take_payloads(self, payloads: Iterable[bytes], kind: type[Sample | SampleBlock] = Sample) -> int:
+    def take_payloads(self, payloads: Iterable[bytes], kind: type[SampleMessage] = Sample) -> int:
         """Judge what has come from the bus; how many samples. What is not of its kind is counted and left out."""
         samples = 0
         self._quarantine.enter(self.station)
@@ -123,13 +125,10 @@ class StationDetector:
         age_s = time.monotonic() - self._heard_s
         return counts | {"sample_age_s": age_s}
 
-    def decoded(self, payload: bytes, kind: type[Sample | SampleBlock]) -> Sample | SampleBlock | None:
+    def decoded(self, payload: bytes, kind: type[SampleMessage]) -> SampleMessage | None:
         """Message of this station in a payload; one that is none is counted, and None."""
-        try:
-            message = kind.decode(payload)
-        except MessageError as error:
-            self._counts["malformed"] += 1
-            log.warning("station '%s': %s", self.station, error)
+        message = decoded(kind, payload, self._counts, log, self._place)
+        if message is None:
             return None
         if message.station != self.station:
             self._counts["foreign"] += 1

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.messages import Sample, Status
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.services.doctor.finding import Finding, Level
 from wetwell.services.doctor.survey import Survey
@@ -134,7 +135,7 @@ def _quality(station: str, samples: Sequence[Sample]) -> Iterator[Finding]:
     for number in range(1, len(samples[-1].pumps) + 1):
         readings = [sample.pumps[number - 1] for sample in samples if len(sample.pumps) >= number]
         missing += [
-            f"pump{number}_{name}"
+            pump_column(number, name)
             for name in ("frequency_hz", "flow_m3h", "head_m")
             if all(getattr(reading, name) is None for reading in readings)
         ]

@@ -18,14 +18,14 @@ from wetwell.protocols.bus.keys import (
     verdict_key,
 )
 from wetwell.protocols.messages.alarm import AlarmReport
+from wetwell.protocols.messages.decoding import M, SampleMessage, samples_of
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import Message, MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.messages import MessageError, Sample, Status, Verdict
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.runtime.clock import now_ns
 
 T = TypeVar("T")
-M = TypeVar("M", bound=Message)
 
 ANSWER_S = 3.0
 HOUR_NS = 3600 * NS_PER_S
@@ -64,11 +64,8 @@ async def listen(bus: Bus, seconds: float) -> Survey:
     """Listen to a site for so long, then ask historian and alarms."""
     survey = Survey(seconds)
 
-    def take_sample(sample: Sample) -> None:
-        survey.samples.setdefault(sample.station, []).append((now_ns(), sample))
-
-    def take_block(block: SampleBlock) -> None:
-        survey.samples.setdefault(block.station, []).extend(_with_time(block, now_ns()))
+    def take_samples(message: SampleMessage) -> None:
+        survey.samples.setdefault(message.station, []).extend(_with_time(message, now_ns()))
 
     def take_gathered(block: SampleBlock) -> None:
         survey.gathered[block.station] = _with_time(block, asked_ns)
@@ -86,8 +83,8 @@ async def listen(bus: Bus, seconds: float) -> Survey:
         (survey.alive.add if presence.is_alive else survey.alive.discard)((station, service))
 
     tasks = [
-        asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, take_sample))),
-        asyncio.create_task(_each(bus.subscribe(sample_block_key("*")), _decoding(SampleBlock, take_block))),
+        asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, take_samples))),
+        asyncio.create_task(_each(bus.subscribe(sample_block_key("*")), _decoding(SampleBlock, take_samples))),
         asyncio.create_task(_each(bus.subscribe(verdict_key("*"), history=1), _decoding(Verdict, take_verdict))),
         asyncio.create_task(_each(bus.subscribe(status_key("*", "*"), history=1), _decoding(Status, take_status))),
         asyncio.create_task(_each(bus.watch(alive_key("*", "*")), take_presence)),
@@ -121,8 +118,8 @@ async def _each(subscription: Subscription[T], take: Callable[[T], None]) -> Non
             take(message)
 
 
-def _with_time(block: SampleBlock, heard_ns: int) -> list[tuple[int, Sample]]:
-    return [(heard_ns, sample) for sample in block.samples()]
+def _with_time(message: SampleMessage, heard_ns: int) -> list[tuple[int, Sample]]:
+    return [(heard_ns, sample) for sample in samples_of(message)]
 
 
 def _decoding(message: type[M], take: Callable[[M], None]) -> Callable[[bytes], None]:

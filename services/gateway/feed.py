@@ -8,6 +8,7 @@ from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.messages import PumpReading, Quality, Sample, ServiceState
 from wetwell.protocols.modbus.client import NoAnswerError, RefusedError, WrongAnswerError
 from wetwell.protocols.modbus.device_map import Plc
+from wetwell.protocols.quantities import PUMP_ANALOGUES, pump_column
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.gateway.poll import Poll
 
@@ -117,18 +118,12 @@ class StationFeed:
         return figures
 
     def _reading(self, values: Mapping[str, float | None], number: int) -> PumpReading:
-        running = values.get(f"pump{number}_running")
-        frequency_hz = values.get(f"pump{number}_frequency_hz")
+        readings = {name: values.get(pump_column(number, name)) for name in PUMP_ANALOGUES}
+        running = values.get(pump_column(number, "running"))
         fixed_hz = self._plc.device.fixed_frequency_hz
-        if fixed_hz is not None and running is not None and f"pump{number}_frequency_hz" not in values:
-            frequency_hz = fixed_hz if running >= 0.5 else 0.0
-        return PumpReading(
-            frequency_hz=frequency_hz,
-            flow_m3h=values.get(f"pump{number}_flow_m3h"),
-            head_m=values.get(f"pump{number}_head_m"),
-            power_kw=values.get(f"pump{number}_power_kw"),
-            running=None if running is None else running >= 0.5,
-        )
+        if fixed_hz is not None and running is not None and pump_column(number, "frequency_hz") not in values:
+            readings["frequency_hz"] = fixed_hz if running >= 0.5 else 0.0
+        return PumpReading(**readings, running=None if running is None else running >= 0.5)
 
     def _watch_heartbeat(self, values: Mapping[str, float | None], now_s: float) -> Quality:
         if "heartbeat" not in values:

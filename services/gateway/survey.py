@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.modbus.block_reads import plan_blocks
 from wetwell.protocols.modbus.device_map import Plc
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.protocols.quantities import FIRST_PUMP, columns_of
 from wetwell.protocols.units import house_unit
 from wetwell.services.gateway.poll import poll_once
 from wetwell.services.gateway.poller import connection_to
@@ -18,8 +18,8 @@ CONNECTIONS = 50
 def described(plc: Plc) -> dict[str, object]:
     """Where a PLC is, with which requests it is polled, what is read of it and what is not."""
     device = plc.device
-    pump_values = [f"pump{number}_{each}" for number in range(1, plc.pumps + 1) for each in PUMP_QUANTITIES]
-    wanted = [*STATION_COLUMNS, "heartbeat", *pump_values]
+    columns = columns_of(plc.pumps)
+    wanted = [*columns[:FIRST_PUMP], "heartbeat", *columns[FIRST_PUMP:]]
     return {
         "endpoint": plc.endpoint,
         "pumps": plc.pumps,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.kpi import kpis
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples
@@ -82,7 +83,7 @@ class Hours:
         for number, name in enumerate(PUMP_FIGURES):
             of_pumps = self.values[:, 1 + number :: len(PUMP_FIGURES)]
             for pump in range(pumps):
-                columns[f"pump{pump + 1}_{name}"] = of_pumps[:, pump]
+                columns[pump_column(pump + 1, name)] = of_pumps[:, pump]
             is_known = ~np.isnan(of_pumps).all(axis=1)
             columns[name] = np.where(is_known, np.nansum(of_pumps, axis=1), np.nan)
         has_volume = columns["volume_m3"] > 0.0

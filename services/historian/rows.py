@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.messages.messages import Quality
-from wetwell.protocols.messages.readings import Readings
+from wetwell.protocols.messages.readings import Readings, row_values
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -68,9 +68,7 @@ class UnpackedSamples(NamedTuple):
 
 def pack(station: str, sample: Readings) -> SampleRow:
     """Row of a sample; what has no value is NaN."""
-    values: list[float | None] = [sample.level_m, sample.inflow_m3h]
-    for pump in sample.pumps:
-        values += (pump.frequency_hz, pump.flow_m3h, pump.head_m, pump.power_kw, pump.running)
+    values = row_values(sample)
     data = _packer(len(values)).pack(*[_NAN if value is None else value for value in values])
     return SampleRow(station, sample.time, sample.seq, 1, sample.time, QUALITIES.index(sample.quality), data)
 

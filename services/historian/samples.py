@@ -1,33 +1,15 @@
 """Samples as the historian gives them back: arrays in the order of time."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS, Recording
+from wetwell.protocols.quantities import columns_of, pumps_of_width
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.services.historian.rows import PackedSamples, SampleRow, pack_arrays, unpack
-
-
-@lru_cache
-def columns_of(pumps: int) -> tuple[str, ...]:
-    """Names of the values of a station with so many pumps, as in a recording.
-
-    Examples
-    --------
-    >>> columns_of(1)[:4]
-    ('level_m', 'inflow_m3h', 'pump1_frequency_hz', 'pump1_flow_m3h')
-    """
-    return (*STATION_COLUMNS, *(f"pump{pump}_{name}" for pump in range(1, pumps + 1) for name in PUMP_QUANTITIES))
-
-
-def pumps_of(columns: Sequence[str]) -> int:
-    """Number of pumps that some column names speak of."""
-    return max((int(match[1]) for match in map(re.compile(r"pump(\d+)_").match, columns) if match), default=0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +34,7 @@ class Samples:
     @property
     def pumps(self) -> int:
         """Number of pumps that the columns have room for."""
-        return (int(self.values.shape[1]) - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+        return pumps_of_width(self.values.shape[1])
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.quantities import columns_of, pumps_of_width
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.historian.samples import Samples, columns_of
+from wetwell.services.historian.samples import Samples
 
 MINUTE_NS = 60 * NS_PER_S
 
@@ -110,7 +111,7 @@ class Summary:
 
     def columns(self) -> dict[str, Floats]:
         """Columns by name: `level_m`, `level_m_min`, `level_m_max`, and so on."""
-        names = columns_of((self.mean.shape[1] - 2) // 5)
+        names = columns_of(pumps_of_width(self.mean.shape[1]))
         columns: dict[str, Floats] = {}
         for number, name in enumerate(names):
             columns[name] = self.mean[:, number]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wetwell.protocols.quantities import AnalogueQuantity, pump_column
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.reports.charts import (
     Section,
@@ -98,7 +99,7 @@ def _traces(diagnosis: Diagnosis) -> str:
     window = slice(begin, begin + SHOWN_S)
     time_ns = traces.start_ns + NS_PER_S * traces.time_s[window].astype(np.int64)
     added = effects_of(diagnosis.station)[len(replay.own) :]
-    lines: dict[str, list[Series]] = {}
+    lines: dict[AnalogueQuantity, list[Series]] = {}
     running = int(np.argmax((traces.frequency_hz[:, window] > 0.0).sum(axis=1)))
     for label, effects in (("before", ()), ("after", added)):
         if label == "after" and not added:
@@ -110,7 +111,7 @@ def _traces(diagnosis: Diagnosis) -> str:
     charts = []
     for name, series in lines.items():
         recorded = traces.level_m if name == "level_m" else traces.signals[name][running]
-        title = name if name == "level_m" else f"pump{running + 1}_{name}"
+        title = name if name == "level_m" else pump_column(running + 1, name)
         every = [Series("measured", time_ns, recorded[window]), *series]
         charts.append(line_chart(title, every, y_label=name, is_time=True))
     return "".join(charts)

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.errors import first_fault
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
@@ -139,7 +140,7 @@ def _area(recording: Recording, station: Station, rng: np.random.Generator) -> E
         return _kept(name, unit, configured, "the file gives a profile")
     pumps = len(station.pump)
     running = running_flags(recording, pumps)
-    flow_m3h = np.array([recording.column(f"pump{i}_flow_m3h") for i in range(1, pumps + 1)])
+    flow_m3h = recording.of_pumps("flow_m3h", pumps)
     total_m3h = np.where(running, flow_m3h, 0.0).sum(axis=0)
     time_s = (recording.time_ns - recording.time_ns[0]) / NS_PER_S
     level_m = recording.column("level_m")
@@ -176,7 +177,7 @@ def _levels(recording: Recording, station: Station, rng: np.random.Generator) ->
     """Levels at which the n-th pump was started and stopped: the reading of the second before the frequency moved."""
     pumps = len(station.pump)
     running = running_flags(recording, pumps)
-    frequency_hz = np.nan_to_num(np.array([recording.column(f"pump{i}_frequency_hz") for i in range(1, pumps + 1)]))
+    frequency_hz = np.nan_to_num(recording.of_pumps("frequency_hz", pumps))
     level_m = recording.column("level_m")
     rising = (frequency_hz[:, 1:] > 0) & (frequency_hz[:, :-1] == 0)
     falling = (frequency_hz[:, 1:] < frequency_hz[:, :-1]) & (
@@ -210,7 +211,7 @@ def _levels(recording: Recording, station: Station, rng: np.random.Generator) ->
 def _ramp(recording: Recording, station: Station, rng: np.random.Generator) -> Estimate:
     times_s = []
     for i, pump in enumerate(station.pump, start=1):
-        frequency_hz = recording.column(f"pump{i}_frequency_hz")
+        frequency_hz = recording.column(pump_column(i, "frequency_hz"))
         step_s = np.diff(recording.time_ns) / NS_PER_S
         rate = np.diff(frequency_hz) / step_s
         inner = (rate > 0) & (frequency_hz[:-1] > 0) & (frequency_hz[1:] < 0.99 * pump.nominal_frequency_hz)

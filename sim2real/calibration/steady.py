@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
@@ -35,8 +36,8 @@ class SteadyPoints:
 
 def running_flags(recording: Recording, pumps: int) -> Flags:
     """(pumps, n) whether each pump runs: from its flag, or else from its frequency."""
-    flags = np.array([recording.column(f"pump{i}_running") for i in range(1, pumps + 1)])
-    frequency_hz = np.array([recording.column(f"pump{i}_frequency_hz") for i in range(1, pumps + 1)])
+    flags = recording.of_pumps("running", pumps)
+    frequency_hz = recording.of_pumps("frequency_hz", pumps)
     running: Flags = np.where(np.isnan(flags), frequency_hz, flags) > 0.0
     return running
 
@@ -50,15 +51,15 @@ def steady_points(recording: Recording, station: Station) -> SteadyPoints:
     period = np.cumsum(switched) - 1
     since_s = time_s - time_s[switched][period]
     segment = ((since_s - WARM_UP_S) // SEGMENT_S).astype(np.int64)
-    flow_m3h = np.array([recording.column(f"pump{i}_flow_m3h") for i in range(1, pumps + 1)])
+    flow_m3h = recording.of_pumps("flow_m3h", pumps)
     total_m3h = np.where(running, flow_m3h, 0.0).sum(axis=0)
     columns: list[list[Floats]] = [[] for _ in range(8)]
     for pump in range(pumps):
         run = np.cumsum(np.diff(running[pump], prepend=False) & running[pump])
-        ratio = recording.column(f"pump{pump + 1}_frequency_hz") / station.pump[pump].nominal_frequency_hz
+        ratio = recording.column(pump_column(pump + 1, "frequency_hz")) / station.pump[pump].nominal_frequency_hz
         steps = np.abs(np.diff(ratio, prepend=ratio[:1], append=ratio[-1:]))
         is_level = np.maximum(steps[1:], steps[:-1]) < RAMP_STEP
-        head_m = recording.column(f"pump{pump + 1}_head_m")
+        head_m = recording.column(pump_column(pump + 1, "head_m"))
         level_m = np.nan_to_num(recording.column("level_m"), nan=0.0)
         usable = running[pump] & is_level & (segment >= 0) & np.isfinite(flow_m3h[pump] + head_m + ratio + total_m3h)
         key = period[usable] * 100_000 + segment[usable]

@@ -61,8 +61,8 @@ def pumped_m3h(recording: Recording, station: Station) -> Floats:
     """(n,) flow of all pumps: the measured one, or where it is missing that of the duty point. [m³/h]."""
     parameters = plant_parameters(station)
     pumps = len(station.pump)
-    frequency_hz = np.array([recording.column(f"pump{i}_frequency_hz") for i in range(1, pumps + 1)])
-    running = np.array([recording.column(f"pump{i}_running") for i in range(1, pumps + 1)])
+    frequency_hz = recording.of_pumps("frequency_hz", pumps)
+    running = recording.of_pumps("running", pumps)
     nominal_hz = parameters.nominal_frequency_hz[:, None]
     frequency_hz = np.where(np.isnan(frequency_hz), running * nominal_hz, frequency_hz)
     ratios = np.nan_to_num(frequency_hz / nominal_hz)
@@ -80,7 +80,7 @@ def pumped_m3h(recording: Recording, station: Station) -> Floats:
             flow_m3h,
         )
         duty_m3h[:, column] = flow_m3h
-    measured_m3h = np.array([recording.column(f"pump{i}_flow_m3h") for i in range(1, pumps + 1)])
+    measured_m3h = recording.of_pumps("flow_m3h", pumps)
     total: Floats = np.where(np.isnan(measured_m3h), duty_m3h[:, where.ravel()], measured_m3h).sum(axis=0)
     return total
 

@@ -1,8 +1,11 @@
 """What is no gap but a mistake: values in other units, rows in no order, the file of another station."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, STEADY, Regimes
 from wetwell.sim2real.recording.traces import Traces
@@ -147,7 +150,7 @@ def _area_ratio(traces: Traces, station: Station, regimes: Regimes) -> float:
 
 
 def _far_off(
-    traces: Traces, station: Station, regimes: Regimes, ratios: dict[str, float], inflow_ratio: float
+    traces: Traces, station: Station, regimes: Regimes, ratios: Mapping[AnalogueQuantity, float], inflow_ratio: float
 ) -> list[str]:
     """Which independent parts are so far off that hardly one effect does it, one line each."""
     area_ratio = _area_ratio(traces, station, regimes)

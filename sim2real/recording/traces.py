@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
@@ -17,7 +18,6 @@ MIN_LENGTH_S = 1800
 MIN_STARTS = 6
 MAX_SPAN = 10
 """Seconds to a row at the most."""
-PUMP_SIGNALS = ("flow_m3h", "head_m", "power_kw")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,7 @@ class Traces:
     inflow_m3h : (n,) array or None
         Without NaN.
     signals : dict of (pumps, n) arrays
-        Of `PUMP_SIGNALS` those that are measured, and move.
+        Of `PUMP_METERS` those that are measured, and move.
     """
 
     start_ns: int
@@ -44,7 +44,7 @@ class Traces:
     frequency_hz: Floats
     level_m: Floats
     inflow_m3h: Floats | None
-    signals: dict[str, Floats]
+    signals: dict[AnalogueQuantity, Floats]
 
     @property
     def seconds(self) -> int:
@@ -88,9 +88,9 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         return values
 
     def of_pumps(quantity: str) -> Floats:
-        return np.array([on_seconds(f"pump{i}_{quantity}") for i in range(1, pumps + 1)])
+        return np.array([on_seconds(pump_column(i, quantity)) for i in range(1, pumps + 1)])
 
-    signals = {name: of_pumps(name) for name in PUMP_SIGNALS}
+    signals: dict[AnalogueQuantity, Floats] = {name: of_pumps(name) for name in PUMP_METERS}
     signals = {name: values for name, values in signals.items() if _moves(values)}
     nominal_hz = np.array([[pump.nominal_frequency_hz] for pump in station.pump])
     frequency_hz = of_pumps("frequency_hz")

@@ -4,9 +4,10 @@ import math
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FLOW, HEAD, LEVEL, POWER
 from wetwell.simulator import layout as at
 from wetwell.simulator.kernel import back_flow_m3h, gather_air, is_moving_now, load_pumps, move_water, turn_pumps
-from wetwell.simulator.telemetry.channels import FLOW, HEAD, LEVEL, POWER, pump_channel
+from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import RESTING
 from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h, volume_at_level_m3
 

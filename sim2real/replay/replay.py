@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.traces import PUMP_SIGNALS, Traces, repeated
+from wetwell.sim2real.recording.traces import Traces, repeated
 from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.simulator import layout as at
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.plant import Forcing, PlantParameters, healthy_forcing, pack, plant_parameters
-from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, Quantity, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 from wetwell.simulator.wet_well import volume_at_level_m3
 
 LEVEL_TIME_S = 150.0
@@ -34,7 +35,7 @@ class Prediction:
     """
 
     level_m: Floats
-    signals: dict[str, Floats]
+    signals: dict[AnalogueQuantity, Floats]
     plant: PlantParameters
 
 
@@ -87,7 +88,7 @@ class Replay:
         level_m, reading = run.level_m, run.reading
         signals = {
             name: later(reading[k], _delay_s(plant, name))
-            for k, name in enumerate(PUMP_SIGNALS)
+            for k, name in enumerate(PUMP_METERS)
             if name in self.traces.signals
         }
         delay_s = float(plant.sensors.delay_s[LEVEL])
@@ -109,7 +110,7 @@ class Replay:
             if run.key == key:
                 return run
         level_m = np.empty(traces.seconds)
-        reading = np.empty((len(PUMP_SIGNALS), pumps, traces.seconds))
+        reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
         station_state = np.zeros(at.STATION_STATES)
         station_state[at.VOLUME] = volume_at_level_m3(max(self._first_level_m, 0.0), plant.profile)
         pump_state = np.zeros((at.PUMP_STATES, pumps))
@@ -126,12 +127,12 @@ class Replay:
             station_state,
             pump_state,
             np.zeros((pumps, 3)),
-            np.zeros((len(PUMP_SIGNALS), pumps)),
+            np.zeros((len(PUMP_METERS), pumps)),
             *self._forced(forces, plant).arrays[:2],
             np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
             self._told_level_m if is_held else traces.level_m,
             *gains,
-            np.zeros((len(PUMP_SIGNALS), pumps, 1)),
+            np.zeros((len(PUMP_METERS), pumps, 1)),
             level_m,
             reading,
         )
@@ -168,8 +169,7 @@ def later(values: Floats, delay_s: float) -> Floats:
     return np.asarray((1.0 - share) * near + share * far, dtype=np.float64)
 
 
-def _delay_s(plant: PlantParameters, name: str) -> float:
-    quantity: Quantity = name  # type: ignore[assignment]
+def _delay_s(plant: PlantParameters, quantity: AnalogueQuantity) -> float:
     return float(plant.sensors.delay_s[channels_of(quantity, plant.nominal_frequency_hz.size)[0]])
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
 from wetwell.sim2real.recording.traces import Traces
@@ -14,7 +15,7 @@ from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.sim2real.residuals.signals import QUANTUM_SHARE, level_noise_m
 from wetwell.sim2real.residuals.telemetry import Pattern
-from wetwell.simulator.telemetry.channels import LEVEL, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 WINDOW_S = 30
 MIN_POINTS = 8

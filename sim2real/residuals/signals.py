@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.traces import Traces, repeated
@@ -15,7 +16,7 @@ from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, B
 from wetwell.sim2real.residuals.noise import Noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.plant import PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 SIGNAL_OF: dict[str, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
 STEADY_BIN_S = 20
@@ -43,7 +44,7 @@ class SignalMisfit:
     """Residuals of one signal of one pump, or of the level."""
 
     bins: Bins
-    name: Quantity
+    name: AnalogueQuantity
     pump: int
     seconds: Seconds
     recorded: Floats
@@ -72,12 +73,16 @@ class SignalMisfit:
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
 
 
-def _channel(plant: PlantParameters, name: Quantity, pump: int) -> int:
+def _channel(plant: PlantParameters, name: AnalogueQuantity, pump: int) -> int:
     return channels_of(name, plant.nominal_frequency_hz.size, None if pump == NO_PUMP else pump + 1)[0]
 
 
 def pump_misfits(
-    traces: Traces, station: Station, regimes: Regimes, plain: Prediction, patterns: Mapping[Quantity, Pattern]
+    traces: Traces,
+    station: Station,
+    regimes: Regimes,
+    plain: Prediction,
+    patterns: Mapping[AnalogueQuantity, Pattern],
 ) -> list[SignalMisfit]:
     """Of every measured signal of every pump.
 
@@ -95,12 +100,11 @@ def pump_misfits(
     misfits = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
-        quantity: Quantity = name  # type: ignore[assignment]
         noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
         for pump in range(traces.pumps):
             open_ = _unresolved(expected[pump], is_step)
             misfit = _pump_misfit(
-                name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(quantity)
+                name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(name)
             )
             if misfit is not None:
                 misfits.append(misfit)
@@ -178,7 +182,11 @@ def _pump_misfit(
 
 
 def level_misfit(
-    traces: Traces, station: Station, regimes: Regimes, plain: Prediction, patterns: Mapping[Quantity, Pattern]
+    traces: Traces,
+    station: Station,
+    regimes: Regimes,
+    plain: Prediction,
+    patterns: Mapping[AnalogueQuantity, Pattern],
 ) -> SignalMisfit:
     """Of the level."""
     counted = np.isfinite(traces.level_m)

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
-from wetwell.simulator.telemetry.channels import Quantity, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 MIN_MOVES, FEWEST = 30, 10
 """Moves from which their sizes are looked at, and from which a channel is held and not stuck."""
@@ -47,7 +48,7 @@ class Pattern:
     `within` are the shares of it between which it may be.
     """
 
-    quantity: Quantity
+    quantity: AnalogueQuantity
     deadband: float = 0.0
     quantum: float = 0.0
     within: tuple[float, float] = (1.0, 1.0)
@@ -101,12 +102,11 @@ def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> Tele
 def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Pattern]:
     running = traces.frequency_hz > 0.0
     found = []
-    series: list[tuple[Quantity, list[Floats]]] = [("level_m", [traces.level_m])]
+    series: list[tuple[AnalogueQuantity, list[Floats]]] = [("level_m", [traces.level_m])]
     if traces.inflow_m3h is not None:
         series.append(("inflow_m3h", [traces.inflow_m3h]))
     for name, values in traces.signals.items():
-        quantity: Quantity = name  # type: ignore[assignment]
-        series.append((quantity, [np.where(running[i], values[i], np.nan) for i in range(traces.pumps)]))
+        series.append((name, [np.where(running[i], values[i], np.nan) for i in range(traces.pumps)]))
     noise = {
         "level_m": sensors.level_noise_m,
         "inflow_m3h": sensors.inflow_noise,
@@ -135,7 +135,7 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
 
 
 def _held(
-    quantity: Quantity, parts: list[Floats], is_ramp: Flags, jumps: Floats, held_share: float
+    quantity: AnalogueQuantity, parts: list[Floats], is_ramp: Flags, jumps: Floats, held_share: float
 ) -> Pattern | None:
     """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon.
 

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import PUMP_METERS, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
 
-SIGNALS = ("level_m", "flow_m3h", "head_m", "power_kw")
 SOFT = 5.0
 SMALLEST_SHARE = 0.05
 """Noise at the least, as that of so large a share of the largest reading: small readings in ramps do not rule."""
@@ -24,10 +24,10 @@ def whitened(predicted: Recording, recorded: Recording, sensors: Sensors) -> dic
     }
     for i in range(1, recorded.pumps + 1):
         for signal, share in noise.items():
-            reading, said = recorded.column(f"pump{i}_{signal}"), predicted.column(f"pump{i}_{signal}")
+            reading, said = recorded.column(pump_column(i, signal)), predicted.column(pump_column(i, signal))
             alive = (reading != 0.0) | (said != 0.0)
             scale = np.maximum(np.abs(reading), SMALLEST_SHARE * np.max(np.abs(reading), initial=1e-9))
-            residuals[f"pump{i}_{signal}"] = ((said - reading) / (max(share, 1e-6) * scale))[alive]
+            residuals[pump_column(i, signal)] = ((said - reading) / (max(share, 1e-6) * scale))[alive]
     return residuals
 
 
@@ -44,7 +44,7 @@ def gap(residuals: Mapping[str, Floats]) -> float:
     0.7
     """
     by_signal: list[float] = []
-    for signal in SIGNALS:
+    for signal in ("level_m", *PUMP_METERS):
         parts = [values for name, values in residuals.items() if name.endswith(signal)]
         joined = np.concatenate(parts) if parts else np.empty(0)
         joined = joined[np.isfinite(joined)]

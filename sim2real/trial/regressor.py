@@ -3,9 +3,9 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import PUMP_METERS, pump_column
 from wetwell.protocols.recordings.recording import Recording
 
-_SIGNALS = ("flow_m3h", "head_m", "power_kw")
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Strengths of the ridge, as shares of the number of rows; the one that serves the second half of the rows best."""
 RUN_SCALES_S = (5.0, 30.0, 200.0, 1000.0)
@@ -31,8 +31,8 @@ def corrected(trained_on: Recording, recorded: Recording, predicted: Recording) 
     """
     columns = dict(predicted.columns)
     for i in range(1, recorded.pumps + 1):
-        for signal in _SIGNALS:
-            name = f"pump{i}_{signal}"
+        for signal in PUMP_METERS:
+            name = pump_column(i, signal)
             if name not in predicted.columns or name not in recorded.columns:
                 continue
             rows = _features(trained_on, i, name)
@@ -69,14 +69,14 @@ def _weights(design: Floats, residual: Floats, ridge: float) -> Floats:
 
 
 def _features(prediction: Recording, pump: int, name: str) -> Floats:
-    on = prediction.column(f"pump{pump}_frequency_hz") > 0.0
+    on = prediction.column(pump_column(pump, "frequency_hz")) > 0.0
     seconds = np.arange(on.size, dtype=np.float64)
     changed = np.concatenate([[True], on[1:] != on[:-1]])
     since_s = seconds - np.maximum.accumulate(np.where(changed, seconds, 0.0))
-    running = sum(prediction.column(f"pump{i}_frequency_hz") > 0.0 for i in range(1, prediction.pumps + 1))
+    running = sum(prediction.column(pump_column(i, "frequency_hz")) > 0.0 for i in range(1, prediction.pumps + 1))
     return np.column_stack(
         [
-            prediction.column(f"pump{pump}_frequency_hz"),
+            prediction.column(pump_column(pump, "frequency_hz")),
             prediction.column("level_m"),
             np.asarray(running, dtype=np.float64),
             np.nan_to_num(prediction.column("inflow_m3h")),

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 
 FaultKind = Literal[
     "blockage", "clogging", "static_rise", "sensor_stuck", "sensor_bias", "sensor_drift", "sensor_gap"
 ]
-Quantity = Literal["level_m", "inflow_m3h", "frequency_hz", "flow_m3h", "head_m", "power_kw"]
 START_NS = 1_736_121_600_000_000_000
 """2025-01-06T00:00:00Z, a Monday."""
 
@@ -40,7 +40,7 @@ class TruthFault:
     end_s: float
     size: float = 0.0
     pump: int = 0
-    channel: Quantity = "flow_m3h"
+    channel: AnalogueQuantity = "flow_m3h"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

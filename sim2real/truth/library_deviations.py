@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.truth.case import Quantity
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.sim2real.truth.inflow import slow_noise
 from wetwell.sim2real.truth.parts import Draw, Kind, Parameters, Truth, rounded
 from wetwell.sim2real.truth.spec import BENCH, CONE, HOUR_S
@@ -188,12 +188,12 @@ def _shift(d: Draw) -> Parameters:
 
 
 def _late_channel(d: Draw) -> Parameters:
-    quantities: tuple[Quantity, ...] = ("level_m", "frequency_hz", "flow_m3h", "head_m", "power_kw")
+    quantities: tuple[AnalogueQuantity, ...] = ("level_m", "frequency_hz", "flow_m3h", "head_m", "power_kw")
     return {"channel": str(d.rng.choice(quantities)), "delay_s": d.over(3.0, 25.0)}
 
 
 def _reported(d: Draw) -> Parameters:
-    quantity = cast("Quantity", str(d.rng.choice(("level_m", "flow_m3h", "head_m", "power_kw"))))
+    quantity = cast("AnalogueQuantity", str(d.rng.choice(("level_m", "flow_m3h", "head_m", "power_kw"))))
     electrical = d.station.electrical
     rated_kw = math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor / 1000.0
     scale = {"flow_m3h": d.flow_m3h, "head_m": d.head_m, "power_kw": rated_kw}.get(quantity, 1.0)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.truth.case import Quantity
 from wetwell.sim2real.truth.spec import Spec, Surroundings, duty_m3h
 from wetwell.sim2real.truth.telemetry import Telemetry
 
@@ -109,7 +109,7 @@ class Kind:
     """
 
     component: str
-    signals: tuple[Quantity, ...]
+    signals: tuple[AnalogueQuantity, ...]
     draw: Callable[[Draw], Parameters]
     act: Callable[[Truth, Mapping[str, Any]], None]
     needs_two_pumps: bool = False

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.truth.case import Deviation, FaultKind, Quantity, TrueInflow, TruthCase, TruthFault
+from wetwell.sim2real.truth.case import Deviation, FaultKind, TrueInflow, TruthCase, TruthFault
 from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.kernel import LEVEL
 from wetwell.sim2real.truth.parts import draw_of, rounded
@@ -165,7 +166,7 @@ RELIEF = 0.85
 _TRIES = 8
 LEARNING_S = 21_600.0
 """No fault begins in the first six hours, in which a detector may learn. [s]"""
-_SENSED: tuple[Quantity, ...] = ("level_m", "flow_m3h", "head_m", "power_kw")
+_SENSED: tuple[AnalogueQuantity, ...] = ("level_m", *PUMP_METERS)
 
 
 def faulty_case_of(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
-from wetwell.sim2real.truth.case import Quantity
+from wetwell.protocols.quantities import AnalogueQuantity
 
 
 @dataclass(slots=True, kw_only=True)
@@ -42,9 +42,9 @@ class Channel:
 class Telemetry:
     """Channels by quantity, the same for all pumps."""
 
-    channel: dict[Quantity, Channel] = field(default_factory=dict)
+    channel: dict[AnalogueQuantity, Channel] = field(default_factory=dict)
 
-    def of(self, quantity: Quantity) -> Channel:
+    def of(self, quantity: AnalogueQuantity) -> Channel:
         """The channel of a quantity, to be changed."""
         return self.channel.setdefault(quantity, Channel())
 

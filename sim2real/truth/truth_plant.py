@@ -7,11 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.quantities import AnalogueQuantity, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.truth import kernel
-from wetwell.sim2real.truth.case import Quantity, TruthCase
+from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.faults import fault_states, force_faults, spoil
 from wetwell.sim2real.truth.inflow import inflow_m3h, slow_noise
@@ -172,9 +173,9 @@ def recorded(
         command, _, head, power, damped = pump_record[:, i]
         turns = command > 0.0
         frequency_hz = transmitted(command * pump.nominal_frequency_hz, telemetry.of("frequency_hz"))
-        columns[f"pump{i + 1}_frequency_hz"] = frequency_hz
+        columns[pump_column(i + 1, "frequency_hz")] = frequency_hz
         flow_m3h = damped * HOUR_S
-        quantities: tuple[tuple[Quantity, Floats, Flags, float], ...] = (
+        quantities: tuple[tuple[AnalogueQuantity, Floats, Flags, float], ...] = (
             ("flow_m3h", flow_m3h, turns | (flow_m3h > 1e-3), sensors.flow_noise),
             ("head_m", head, turns, sensors.head_noise),
             ("power_kw", power / 1000.0, turns, sensors.power_noise),
@@ -182,8 +183,8 @@ def recorded(
         for quantity, values, is_alive, noise in quantities:
             channel = telemetry.of(quantity)
             reading = sensed(values, is_alive, noise * _noise(case, rng), channel)
-            columns[f"pump{i + 1}_{quantity}"] = transmitted(reading, channel)
-        columns[f"pump{i + 1}_running"] = (frequency_hz > 0.0).astype(np.float64)
+            columns[pump_column(i + 1, quantity)] = transmitted(reading, channel)
+        columns[pump_column(i + 1, "running")] = (frequency_hz > 0.0).astype(np.float64)
     spoil(case.faults, columns)
     return columns
 

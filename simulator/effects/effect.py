@@ -5,9 +5,10 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Table
 from wetwell.simulator.plant import Forcing, PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 Component = Literal[
     "sump",
@@ -76,7 +77,7 @@ def of_pumps(values: Floats, pump: int, value: float) -> Floats:
     return replaced
 
 
-def of_channels(parameters: PlantParameters, row: str, quantity: Quantity, value: float) -> PlantParameters:
+def of_channels(parameters: PlantParameters, row: str, quantity: AnalogueQuantity, value: float) -> PlantParameters:
     """Parameters with one property of the sensors of a quantity replaced, on all pumps."""
     values = getattr(parameters.sensors, row).copy()
     values[channels_of(quantity, parameters.nominal_frequency_hz.size)] = value

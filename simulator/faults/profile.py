@@ -6,14 +6,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.quantities import STATION_QUANTITIES, SensedQuantity
 from wetwell.protocols.station.station_file import NonNegative, Positive, Table
 from wetwell.simulator.plant import Forcing
-from wetwell.simulator.telemetry.channels import Quantity, channels_of
-
-SensedQuantity = Literal["level_m", "inflow_m3h", "flow_m3h", "head_m", "power_kw"]
-"""Quantities that a sensor measures; the frequency is what the drive itself reports."""
-
-STATION_QUANTITIES = ("level_m", "inflow_m3h")
+from wetwell.simulator.telemetry.channels import channels_of
 
 
 class Profile(Table):
@@ -98,5 +94,4 @@ class ChannelFault(SensorFault):
 
     def rows(self, forcing: Forcing) -> list[int]:
         """Rows of the faulty channels in the sensor arrays of a forcing."""
-        quantity: Quantity = self.channel
-        return channels_of(quantity, forcing.speed_factor.shape[0], self.pump or None)
+        return channels_of(self.channel, forcing.speed_factor.shape[0], self.pump or None)

@@ -6,8 +6,9 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FLOW, FREQUENCY, HEAD, POWER
 from wetwell.simulator import layout as at
-from wetwell.simulator.telemetry.channels import FLOW, FREQUENCY, HEAD, POWER, pump_channel
+from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import sense, transmit
 
 

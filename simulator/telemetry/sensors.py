@@ -7,9 +7,10 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER
 from wetwell.protocols.station.station_file import Sensors
 from wetwell.simulator import layout as at
-from wetwell.simulator.telemetry.channels import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, channels
+from wetwell.simulator.telemetry.channels import channels
 
 MAX_DELAY_S = 119
 RESTING = 1e-6

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import sample_key, status_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Sample, Status
 from wetwell.protocols.modbus.device_map import Device, Plc
 from wetwell.protocols.modbus.device_signal import Signal

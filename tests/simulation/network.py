@@ -11,9 +11,10 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from memory_bus import matches as any_matches
+
 from wetwell.protocols.bus.interface import Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
-from wetwell.protocols.bus.memory_link import matches as any_matches
 
 matches = functools.cache(any_matches)
 SHORT_S, LONG_S = 0.002, 1.0

@@ -23,7 +23,7 @@ from wetwell.protocols.messages.messages import JSON_ENCODING
 
 logger = logging.getLogger(__name__)
 
-REQUESTS = 1_000
+MOST_REQUESTS = 1_000
 """Most questions, or changes of presence, that wait for one reader."""
 
 
@@ -63,16 +63,21 @@ class ZenohBus:
         Open session; the bus closes it.
     is_router : bool
         Whether others connect to this session.
+
+    Raises
+    ------
+    LinkError
+        By every method that has a key, if that is not a key expression or the bus is closed.
     """
 
     def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
         self._session = session
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
-        self._pump = ZenohWorker(session, is_router=is_router)
+        self._worker = ZenohWorker(session, is_router=is_router)
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
-        self._exit.callback(self._pump.stop)
+        self._exit.callback(self._worker.stop)
         self._lock = threading.Lock()  # zenoh refuses to be asked while another thread closes the session
 
     def __enter__(self) -> Self:
@@ -93,14 +98,12 @@ class ZenohBus:
         ------
         ValueError
             If `history` is below one.
-        LinkError
-            If the key is not a key expression or the bus is closed.
         """
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
-            publisher = ZenohPublisher(self._session, key, history, self._pump.questions)
-        self._pump.publish(publisher)
+            publisher = ZenohPublisher(self._session, key, history, self._worker.queries)
+        self._worker.add_publisher(publisher)
         return publisher
 
     def subscribe(
@@ -109,43 +112,28 @@ class ZenohBus:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
         Without `recover`, and without `history`, what is lost on the way stays lost.
-
-        Raises
-        ------
-        LinkError
-            If the key is not a key expression or the bus is closed.
         """
         mailbox: Mailbox[bytes] = Mailbox(capacity)
 
-        def take(messages: list[Keyed]) -> None:
+        def deliver(messages: list[Keyed]) -> None:
             mailbox.extend([payload for _, payload in messages])
 
         with refusal("subscribe to", key):
-            self._pump.follow(ZenohSubscription(self._session, [key], history, take, recover=recover))
+            self._worker.add_subscription(ZenohSubscription(self._session, [key], history, deliver, recover=recover))
         return mailbox
 
     def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
-        """One subscription to many keys, whose messages come with their keys.
-
-        Raises
-        ------
-        LinkError
-            If a key is not a key expression or the bus is closed.
-        """
+        """One subscription to many keys, whose messages come with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity)
         with refusal("subscribe to", ", ".join(keys[:3])):
-            self._pump.follow(ZenohSubscription(self._session, keys, history, mailbox.extend, recover=True))
+            self._worker.add_subscription(
+                ZenohSubscription(self._session, keys, history, mailbox.extend, recover=True)
+            )
         return mailbox
 
     def answer(self, key: str) -> Mailbox[Request]:
-        """Questions that are asked on a key from now on; each is to be answered.
-
-        Raises
-        ------
-        LinkError
-            If the key is not a key expression or the bus is closed.
-        """
-        mailbox: Mailbox[Request] = Mailbox(REQUESTS)
+        """Questions that are asked on a key from now on; each is to be answered."""
+        mailbox: Mailbox[Request] = Mailbox(MOST_REQUESTS)
 
         def deliver(query: zenoh.Query) -> None:
             mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
@@ -155,16 +143,10 @@ class ZenohBus:
         return mailbox
 
     async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
-        """Answers to a question; of a key with a publisher also its last message. None in time: an empty list.
-
-        Raises
-        ------
-        LinkError
-            If the key is not a key expression or the bus is closed.
-        """
+        """Answers to a question; of a key with a publisher also its last message. None in time: an empty list."""
         loop, ended, answers = asyncio.get_running_loop(), asyncio.Event(), list[bytes]()
 
-        def take(reply: zenoh.Reply) -> None:
+        def handle_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 answers.append(reply.ok.payload.to_bytes())
 
@@ -175,7 +157,7 @@ class ZenohBus:
         with refusal("ask", key):
             self._session.get(
                 key,
-                zenoh.handlers.Callback(take, end, indirect=False),
+                zenoh.handlers.Callback(handle_reply, end, indirect=False),
                 payload=payload,
                 encoding=JSON_ENCODING,
                 target=zenoh.QueryTarget.ALL,
@@ -185,14 +167,8 @@ class ZenohBus:
         return answers
 
     def watch(self, key: str) -> Mailbox[Presence]:
-        """Services that are announced under a key expression: those that live now, then each change.
-
-        Raises
-        ------
-        LinkError
-            If the key is not a key expression or the bus is closed.
-        """
-        mailbox: Mailbox[Presence] = Mailbox(REQUESTS)
+        """Services that are announced under a key expression: those that live now, then each change."""
+        mailbox: Mailbox[Presence] = Mailbox(MOST_REQUESTS)
 
         def deliver(sample: zenoh.Sample) -> None:
             mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
@@ -202,13 +178,7 @@ class ZenohBus:
         return mailbox
 
     def announce(self, key: str) -> None:
-        """Show under a key that this service lives, by a liveliness token that goes with the connection.
-
-        Raises
-        ------
-        LinkError
-            If the key is not a key expression or the bus is closed.
-        """
+        """Show under a key that this service lives, by a liveliness token that goes with the connection."""
         with refusal("announce", key):
             self._declared.append(self._session.liveliness().declare_token(key))
 

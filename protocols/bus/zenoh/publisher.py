@@ -9,7 +9,7 @@ from typing import Any
 import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
-from wetwell.protocols.bus.publisher_cache import KeptMessages, read_query
+from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
 from wetwell.protocols.bus.zenoh.session import reason
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.messages import JSON_ENCODING
@@ -60,16 +60,16 @@ class ZenohPublisher:
     """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
 
     def __init__(
-        self, session: zenoh.Session, key: str, history: int, questions: "deque[tuple[ZenohPublisher, zenoh.Query]]"
+        self, session: zenoh.Session, key: str, history: int, queries: "deque[tuple[ZenohPublisher, zenoh.Query]]"
     ) -> None:
         self.key = key
-        self.kept = KeptMessages(history)
+        self.cache = PublisherCache(history)
         self._silent_s = 0.0
         self._told_s = 0.0
         self._pause_s = 0.0
         self._rhythm_s = 0.0
         self._session = session
-        self._questions = questions
+        self._queries = queries
         self._lock = threading.Lock()
         self._publisher = session.declare_publisher(
             key, encoding=JSON_ENCODING, congestion_control=zenoh.CongestionControl.DROP
@@ -85,9 +85,9 @@ class ZenohPublisher:
             If the bus is closed.
         """
         with self._lock:  # what is numbered first is sent first
-            mark = self.kept.add(payload, weight)
+            header = self.cache.add(payload, weight)
             try:  # not `refusal`: this is once a message
-                self._publisher.put(payload, attachment=mark)
+                self._publisher.put(payload, attachment=header)
             except zenoh.ZError as error:
                 raise LinkError(f"cannot publish on '{self.key}': {reason(error)}") from error
         now_s = time.monotonic()
@@ -96,16 +96,16 @@ class ZenohPublisher:
         self._pause_s, self._silent_s = pause_s, now_s
 
     def _ask(self, query: zenoh.Query) -> None:
-        self._questions.append((self, query))
+        self._queries.append((self, query))
 
     def answer(self, query: zenoh.Query) -> None:
         """Answer what is kept, or the last message to those who only ask for that."""
         asked = None if query.payload is None else read_query(query.payload.to_bytes())
         with query:
             if asked is None:
-                if (last := self.kept.last) is not None:
+                if (last := self.cache.last) is not None:
                     query.reply(self.key, last, encoding=JSON_ENCODING)
-            elif (page := self.kept.page(asked)) is not None:
+            elif (page := self.cache.page(asked)) is not None:
                 body, head = page.encode()
                 query.reply(self.key, body, attachment=head)
 
@@ -115,14 +115,14 @@ class ZenohPublisher:
 
     def settle(self, now_s: float) -> bool:
         """Tell those who follow which message was the last, if it is time to; whether it was."""
-        if not self.kept.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
+        if not self.cache.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
             return False
         self._told_s = now_s
         drop = zenoh.CongestionControl.DROP
-        self._session.put(tail_key(self.key), b"", attachment=self.kept.next_mark, congestion_control=drop)
+        self._session.put(tail_key(self.key), b"", attachment=self.cache.next_header, congestion_control=drop)
         return True
 
 
-def at_once(take: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":
+def at_once(handle: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":
     """A callback in the thread of the session, for what is rare and takes no time. By default each has a thread."""
-    return zenoh.handlers.Callback(take, indirect=False)
+    return zenoh.handlers.Callback(handle, indirect=False)

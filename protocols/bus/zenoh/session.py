@@ -21,7 +21,7 @@ def open_router_session(endpoint: str, access: ZenohAccess, upstream: Sequence[s
     Raises
     ------
     ConfigError, LinkError
-        As `zenoh_link.open_router`.
+        As `link.open_router`.
     """
     config = _config("router", endpoint, access)
     config.insert_json5("scouting/delay", "0")  # nobody is scouted: do not wait for answers
@@ -40,7 +40,7 @@ def open_client_session(endpoint: str, access: ZenohAccess, timeout_s: float) ->
     Raises
     ------
     ConfigError, LinkError
-        As `zenoh_link.open_client`.
+        As `link.open_client`.
     """
     config = _config("client", endpoint, access)
     config.insert_json5("connect/timeout_ms", str(max(1, round(timeout_s * 1000))))

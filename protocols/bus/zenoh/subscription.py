@@ -27,15 +27,15 @@ class ZenohSubscription:
         session: zenoh.Session,
         keys: Sequence[str],
         history: int,
-        take: Callable[[list[tuple[str, bytes]]], None],
+        deliver: Callable[[list[tuple[str, bytes]]], None],
         *,
         recover: bool,
     ) -> None:
         self.keys = keys
         self.history = history
-        self.follower = Sequencer(history)
+        self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
-        self._take = take
+        self._deliver = deliver
         self._tails: deque[tuple[str, bytes]] = deque()
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         self._channels: list[Callable[[], zenoh.Sample | None]] = []
@@ -45,15 +45,15 @@ class ZenohSubscription:
             self._declared.append(subscriber)
             self._channels.append(subscriber.handler.try_recv)
             if self.recovers:
-                self._declared.append(session.declare_subscriber(tail_key(key), at_once(self._hear_tail)))
+                self._declared.append(session.declare_subscriber(tail_key(key), at_once(self._handle_tail)))
 
-    def _hear_tail(self, sample: zenoh.Sample) -> None:
+    def _handle_tail(self, sample: zenoh.Sample) -> None:
         if sample.attachment is not None:
             self._tails.append((str(sample.key_expr).rpartition("/")[0], sample.attachment.to_bytes()))
 
     def fetch(self) -> None:
         """Take what has come, in order, and pass it on."""
-        follower, put = self.follower, zenoh.SampleKind.PUT
+        sequencer, put = self.sequencer, zenoh.SampleKind.PUT
         for try_recv in self._channels:
             for _ in range(TURN):
                 sample = try_recv()
@@ -61,32 +61,32 @@ class ZenohSubscription:
                     break
                 if sample.kind != put:
                     continue
-                mark = sample.attachment if self.recovers else None
-                follower.take(
-                    str(sample.key_expr), None if mark is None else mark.to_bytes(), sample.payload.to_bytes()
+                header = sample.attachment if self.recovers else None
+                sequencer.handle_message(
+                    str(sample.key_expr), None if header is None else header.to_bytes(), sample.payload.to_bytes()
                 )
         while self._tails:
-            follower.take_tail(*self._tails.popleft())
+            sequencer.handle_tail(*self._tails.popleft())
         self.pass_on()
 
     def pass_on(self) -> None:
         """Hand over what is in order."""
-        if self.follower.ready:
-            ready, self.follower.ready = self.follower.ready, []
-            self._take(ready)
+        if self.sequencer.ready:
+            ready, self.sequencer.ready = self.sequencer.ready, []
+            self._deliver(ready)
 
-    def take_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
+    def handle_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
         """Take an answer; what its publisher does not keep any more is told."""
-        self.follower.take_page(key, page, is_from_next=is_from_next)
+        self.sequencer.handle_page(key, page, is_from_next=is_from_next)
         self._tell_lost(key)
 
-    def give_up(self, line: SourceStream) -> None:
+    def give_up(self, stream: SourceStream) -> None:
         """Go on without what is missing, and say so."""
-        self.follower.give_up(line)
+        self.sequencer.give_up(stream)
         self.pass_on()
-        self._tell_lost(line.key)
+        self._tell_lost(stream.key)
 
     def _tell_lost(self, key: str) -> None:
-        if self.follower.lost > self._told:
-            logger.warning("%s: %d messages are lost, nobody has them", key, self.follower.lost - self._told)
-            self._told = self.follower.lost
+        if self.sequencer.lost > self._told:
+            logger.warning("%s: %d messages are lost, nobody has them", key, self.sequencer.lost - self._told)
+            self._told = self.sequencer.lost

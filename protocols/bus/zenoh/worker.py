@@ -14,7 +14,7 @@ from typing import Any
 
 import zenoh
 
-from wetwell.protocols.bus.publisher_cache import KeptQuery, Page
+from wetwell.protocols.bus.publisher_cache import CacheQuery, Page
 from wetwell.protocols.bus.sequencer import SourceStream
 from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher, at_once
 from wetwell.protocols.bus.zenoh.subscription import CHANNEL, ZenohSubscription
@@ -38,16 +38,16 @@ FIRST_WAIT_S = 0.1
 """Longest wait before the second try; it doubles with each, and is drawn at random."""
 LONGEST_WAIT_S = 5.0
 
-LOOK = KeptQuery().encode()
+LAST_MESSAGE_QUERY = CacheQuery().encode()
 
 
 @dataclass
 class RecoveryQuery:
-    """A question for missing messages of a line, or for the last message of all publishers on a key."""
+    """A question for missing messages of a stream, or for the last message of all publishers on a key."""
 
-    feed: ZenohSubscription
+    subscription: ZenohSubscription
     key: str
-    line: SourceStream | None = None
+    stream: SourceStream | None = None
     due_s: float = 0.0
     begin: int = 0
     tries: int = 0
@@ -56,7 +56,7 @@ class RecoveryQuery:
 
 
 class ZenohWorker(threading.Thread):
-    """Serves all feeds and publishers of a session until it is stopped.
+    """Serves all subscriptions and publishers of a session until it is stopped.
 
     Parameters
     ----------
@@ -66,11 +66,11 @@ class ZenohWorker(threading.Thread):
     """
 
     def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
-        super().__init__(name="zenoh-pump")
-        self.questions: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
+        super().__init__(name="zenoh-worker")
+        self.queries: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
         self._session = session
         self._is_router = is_router
-        self._feeds: list[ZenohSubscription] = []
+        self._subscriptions: list[ZenohSubscription] = []
         self._publishers: list[ZenohPublisher] = []
         self._turn = 0
         self._due: deque[RecoveryQuery] = deque()
@@ -80,16 +80,16 @@ class ZenohWorker(threading.Thread):
         self._lock = threading.Lock()
         self._listener: object = None
 
-    def publish(self, publisher: ZenohPublisher) -> None:
+    def add_publisher(self, publisher: ZenohPublisher) -> None:
         """Serve a publisher from now on."""
         self._publishers.append(publisher)
         self._begin()
 
-    def follow(self, feed: ZenohSubscription) -> None:
+    def add_subscription(self, subscription: ZenohSubscription) -> None:
         """Serve a subscription from now on, beginning with what is kept of it."""
-        if feed.history:
-            self._due.extend(RecoveryQuery(feed, key) for key in feed.keys)
-        self._feeds.append(feed)
+        if subscription.history:
+            self._due.extend(RecoveryQuery(subscription, key) for key in subscription.keys)
+        self._subscriptions.append(subscription)
         self._begin()
 
     def stop(self) -> None:
@@ -102,11 +102,11 @@ class ZenohWorker(threading.Thread):
         with self._lock:
             if self.ident is None:
                 self._listener = self._session.info.declare_transport_events_listener(
-                    at_once(self._hear_transport), history=False
+                    at_once(self._handle_transport), history=False
                 )
                 self.start()
 
-    def _hear_transport(self, event: zenoh.TransportEvent) -> None:
+    def _handle_transport(self, event: zenoh.TransportEvent) -> None:
         if event.kind == zenoh.SampleKind.PUT:
             self._has_reconnected.set()
 
@@ -114,12 +114,12 @@ class ZenohWorker(threading.Thread):
         """Serve until stopped."""
         while not self._stopping.wait(PERIOD_S):
             try:
-                for feed in self._feeds:
-                    feed.fetch()
+                for subscription in self._subscriptions:
+                    subscription.fetch()
                 self._answer()
                 now_s = time.monotonic()
                 self._settle(now_s)
-                self._hear(now_s)
+                self._handle_answers(now_s)
                 self._ask(now_s)
             except Exception:  # one odd message must not make the process deaf
                 if self._session.is_closed():
@@ -127,8 +127,8 @@ class ZenohWorker(threading.Thread):
                 logger.exception("bus")
 
     def _answer(self) -> None:
-        while self.questions:
-            publisher, query = self.questions.popleft()
+        while self.queries:
+            publisher, query = self.queries.popleft()
             publisher.answer(query)
 
     def _settle(self, now_s: float) -> None:
@@ -139,7 +139,10 @@ class ZenohWorker(threading.Thread):
                 publisher.stir(now_s)
             due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
             self._due.extend(
-                RecoveryQuery(feed, key, due_s=due_s) for feed in self._feeds if feed.recovers for key in feed.keys
+                RecoveryQuery(subscription, key, due_s=due_s)
+                for subscription in self._subscriptions
+                if subscription.recovers
+                for key in subscription.keys
             )
         told = 0
         for _ in range(-(-len(self._publishers) // ROUNDS)):
@@ -148,86 +151,86 @@ class ZenohWorker(threading.Thread):
             if told == TOLD_AT_ONCE:
                 break
 
-    def _hear(self, now_s: float) -> None:
+    def _handle_answers(self, now_s: float) -> None:
         """Take the answers that have come."""
         going: list[RecoveryQuery] = []
-        for question in self._asked:
-            if self._take_replies(question):
-                going.append(question)
+        for query in self._asked:
+            if self._handle_replies(query):
+                going.append(query)
             else:
-                self._finish(question, now_s)
+                self._finish(query, now_s)
         self._asked = going
 
-    def _take_replies(self, question: RecoveryQuery) -> bool:
+    def _handle_replies(self, query: RecoveryQuery) -> bool:
         """Whether more may come."""
-        feed = question.feed
+        subscription = query.subscription
         try:
-            while (reply := question.replies.try_recv()) is not None:
+            while (reply := query.replies.try_recv()) is not None:
                 if reply.ok is None:
-                    question.is_refused = True
+                    query.is_refused = True
                     continue
                 head = reply.ok.attachment
                 page = head and Page.decode(reply.ok.payload.to_bytes(), head.to_bytes())
                 if page:
-                    feed.take_page(str(reply.ok.key_expr), page, is_from_next=question.line is not None)
+                    subscription.handle_page(str(reply.ok.key_expr), page, is_from_next=query.stream is not None)
         except zenoh.ZError:  # all that were asked have answered
             return False
         finally:
-            feed.pass_on()
+            subscription.pass_on()
         return True
 
-    def _finish(self, question: RecoveryQuery, now_s: float) -> None:
+    def _finish(self, query: RecoveryQuery, now_s: float) -> None:
         """Ask again, later, where that may help; give up in the end."""
-        line = question.line
-        if line is None:
-            is_done = not (question.is_refused and question.feed.history)
+        stream = query.stream
+        if stream is None:
+            is_done = not (query.is_refused and query.subscription.history)
         else:
-            if line.next > question.begin:  # there was more than fits into one answer
-                question.tries = 0
-            is_done = not line.is_missing
-            line.is_asked = not is_done
+            if stream.next > query.begin:  # there was more than fits into one answer
+                query.tries = 0
+            is_done = not stream.is_missing
+            stream.is_asked = not is_done
         if is_done:
             return
-        question.tries += 1
-        is_patient = line is not None and not question.feed.follower.is_replaced(line)
-        if question.tries > (PATIENT_TRIES if is_patient else TRIES):
-            if line is not None:
-                line.is_asked = False
-                question.feed.give_up(line)
+        query.tries += 1
+        is_patient = stream is not None and not query.subscription.sequencer.is_replaced(stream)
+        if query.tries > (PATIENT_TRIES if is_patient else TRIES):
+            if stream is not None:
+                stream.is_asked = False
+                query.subscription.give_up(stream)
             return
-        if question.tries > 1:
-            longest_s = min(FIRST_WAIT_S * 2.0 ** (question.tries - 1), LONGEST_WAIT_S)
-            question.due_s = now_s + random.uniform(longest_s / 2.0, longest_s)
-        self._due.append(question)
+        if query.tries > 1:
+            longest_s = min(FIRST_WAIT_S * 2.0 ** (query.tries - 1), LONGEST_WAIT_S)
+            query.due_s = now_s + random.uniform(longest_s / 2.0, longest_s)
+        self._due.append(query)
 
     def _ask(self, now_s: float) -> None:
         """Ask for what is missing, as far as not too many questions are on the way."""
-        for feed in self._feeds:
-            for line in feed.follower.wanted.values():
-                line.is_asked = True
-                self._due.append(RecoveryQuery(feed, line.key, line))
-            feed.follower.wanted.clear()
+        for subscription in self._subscriptions:
+            for stream in subscription.sequencer.wanted.values():
+                stream.is_asked = True
+                self._due.append(RecoveryQuery(subscription, stream.key, stream))
+            subscription.sequencer.wanted.clear()
         if not self._due or not (self._is_router or self._session.info.routers_zid()):
             return
         for _ in range(len(self._due)):
             if len(self._asked) >= ASKED:
                 return
-            question = self._due.popleft()
-            if question.due_s > now_s:
-                self._due.append(question)
+            query = self._due.popleft()
+            if query.due_s > now_s:
+                self._due.append(query)
                 continue
-            self._put_question(question)
-            self._asked.append(question)
+            self._send(query)
+            self._asked.append(query)
 
-    def _put_question(self, question: RecoveryQuery) -> None:
-        line, payload, manners = question.line, LOOK, zenoh.CongestionControl.BLOCK
-        if line is not None:
-            question.begin = line.next
-            payload = KeptQuery(source=line.source.hex(), begin=line.next).encode()
+    def _send(self, query: RecoveryQuery) -> None:
+        stream, payload, manners = query.stream, LAST_MESSAGE_QUERY, zenoh.CongestionControl.BLOCK
+        if stream is not None:
+            query.begin = stream.next
+            payload = CacheQuery(source=stream.source.hex(), begin=stream.next).encode()
             manners = zenoh.CongestionControl.DROP  # the answer is large: rather ask again than block a router
-        question.is_refused = False
-        question.replies = self._session.get(
-            question.key,
+        query.is_refused = False
+        query.replies = self._session.get(
+            query.key,
             zenoh.handlers.FifoChannel(CHANNEL),
             payload=payload,
             encoding=JSON_ENCODING,

@@ -14,7 +14,8 @@ import pyarrow.parquet
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.services.historian.samples import Samples, columns_of, pumps_of
+from wetwell.protocols.quantities import columns_of, pumps_of, pumps_of_width
+from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.summary import Summary
 
@@ -103,7 +104,7 @@ class Archive:
 
     def write_minutes(self, station: str, day_ns: int, minutes: Summary) -> None:
         """Write the minutes of a day, and see that they can be read back."""
-        names = columns_of((minutes.mean.shape[1] - 2) // 5)
+        names = columns_of(pumps_of_width(minutes.mean.shape[1]))
         counts = {f"{name}_count": column for name, column in zip(names, minutes.count.T, strict=True)}
         path = self.path("minutes", station, day_ns)
         _write(path, minutes.time_ns, minutes.columns() | counts, {})

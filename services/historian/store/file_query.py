@@ -7,7 +7,7 @@ from typing import Any
 import duckdb
 import numpy as np
 
-from wetwell.services.historian.samples import columns_of, pumps_of
+from wetwell.protocols.quantities import columns_of, pumps_of
 from wetwell.services.historian.store.archive import Form
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.summary import Summary
@@ -35,7 +35,7 @@ def summary_of_files(
             known = database.execute(
                 "DESCRIBE SELECT * FROM read_parquet(?, union_by_name = true)", [files]
             ).fetchall()
-            names = columns_of(pumps_of([column[0] for column in known]))
+            names = columns_of(pumps_of(column[0] for column in known))
             figures = ", ".join(_FIGURES[form].format(name) for name in names)
             columns = database.execute(
                 f"SELECT (epoch_ns(time) - $origin) // $span AS span, {figures} "  # noqa: S608 - names of columns_of

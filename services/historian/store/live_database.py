@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.protocols.quantities import pumps_of_width
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.rows import HOUR_NS, SampleRow, unpack
 from wetwell.services.historian.samples import Samples
@@ -153,7 +153,7 @@ class LiveDatabase:
                 f"SELECT max(length(data) / size / 8 - CASE size WHEN 1 THEN 0 ELSE 2 END) {_TOUCHING}",
                 _span(station, start_ns, end_ns),
             ).fetchone()
-        return None if width is None else (int(width) - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+        return None if width is None else pumps_of_width(int(width))
 
     def next_time_ns(self, station: str, start_ns: int) -> int | None:
         """Time of the first sample from `start_ns` on."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.protocols.quantities import pumps_of_width
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.rows import HOUR_NS, unpack
 from wetwell.services.historian.samples import Samples
@@ -124,7 +124,7 @@ class PostgresStore:
             "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) AND time_ns >= %s AND time_ns < %s",
             (station, start_ns, end_ns),
         )
-        return None if width is None else (width - len(STATION_COLUMNS)) // len(PUMP_QUANTITIES)
+        return None if width is None else pumps_of_width(width)
 
     def is_few(self, station: str, start_ns: int, end_ns: int, points: int) -> bool:
         """Whether a span has at most so many samples, and none that have become minutes."""

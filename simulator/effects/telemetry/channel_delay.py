@@ -2,9 +2,9 @@
 
 from typing import Annotated, ClassVar, Literal
 
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits, of_channels
 from wetwell.simulator.plant import PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity
 
 
 class ChannelDelay(Effect):
@@ -29,7 +29,7 @@ class ChannelDelay(Effect):
     neutral: ClassVar[dict[str, float]] = {"delay_s": 0.0}
 
     name: Literal["channel_delay"] = "channel_delay"
-    channel: Quantity
+    channel: AnalogueQuantity
     delay_s: Annotated[float, limits(0.0, 100.0, "s")]
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:

@@ -2,9 +2,9 @@
 
 from typing import Annotated, ClassVar, Literal
 
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
 from wetwell.simulator.plant import PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity
 
 
 class ReportByException(Effect):
@@ -28,7 +28,7 @@ class ReportByException(Effect):
     neutral: ClassVar[dict[str, float]] = {"deadband": 0.0}
 
     name: Literal["report_by_exception"] = "report_by_exception"
-    channel: Quantity
+    channel: AnalogueQuantity
     deadband: Annotated[float, limits(0.0, 1000.0, "unit of the channel")]
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:

@@ -8,9 +8,9 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Subscription
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.bus.zenoh.link import open_client, open_router
 
 Pair = tuple[Bus, Bus]

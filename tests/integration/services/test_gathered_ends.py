@@ -5,9 +5,9 @@ import contextlib
 import signal
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import sample_block_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.modbus.device_map import load_plcs
 from wetwell.protocols.modbus.registers import register_csv, register_table

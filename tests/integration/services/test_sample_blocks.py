@@ -4,9 +4,9 @@ import asyncio
 import json
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import sample_block_key, sample_key, verdict_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Sample, Verdict
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
 from wetwell.services.alarms.service import AlarmService

@@ -10,9 +10,9 @@ import os
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import alarm_act_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.alarm import AlarmAct
 from wetwell.protocols.messages.fleet import Plan
 from wetwell.protocols.messages.history import HistoryQuery

@@ -5,10 +5,10 @@ import json
 from dataclasses import dataclass
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alive_key, sample_block_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.messages import PumpReading, Sample, Status, Verdict
 from wetwell.protocols.messages.sample_block import SampleBlock

@@ -6,9 +6,9 @@ import json
 
 import httpx
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import alarm_act_key, history_key, sample_block_key, sample_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery

@@ -3,10 +3,10 @@
 import asyncio
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.protocols.bus.keys import order_key, sample_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Order, Sample, Verdict
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.client import ordered

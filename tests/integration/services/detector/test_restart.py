@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Request, Subscription
 from wetwell.protocols.bus.keys import history_key, sample_block_key, sample_key, verdict_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Sample, Verdict
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 import trustme
+from memory_bus import MemoryBus
 from pyModbusTCP.server import DataBank
 from pyModbusTCP.server import ModbusServer as ForeignServer
 from pyModbusTCP.utils import encode_ieee, long_list_to_word
 
 from wetwell.protocols.bus.keys import sample_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.messages import Sample
 from wetwell.protocols.modbus.device_map import load_plcs
 from wetwell.protocols.modbus.registers import register_csv, register_table

@@ -16,9 +16,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from memory_bus import MemoryBus
 from prometheus_client.parser import text_string_to_metric_families
 
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.messages import Status
 from wetwell.services.runtime.health.board import HealthBoard

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES
 from wetwell.protocols.recordings.recording import (
-    PUMP_QUANTITIES,
-    STATION_COLUMNS,
     SUFFIXES,
     Recording,
     read_recording,
@@ -18,7 +17,7 @@ from wetwell.protocols.recordings.recording import (
 )
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 
-NAMES = [*STATION_COLUMNS, *(f"pump{i}_{quantity}" for i in (1, 2, 12) for quantity in PUMP_QUANTITIES)]
+NAMES = [*STATION_QUANTITIES, *(f"pump{i}_{quantity}" for i in (1, 2, 12) for quantity in PUMP_QUANTITIES)]
 # In CSV a text that reads as a number is a number.
 TEXTS = st.sampled_from(["normal", "pump_fault", "system_fault", "x", "-"])
 

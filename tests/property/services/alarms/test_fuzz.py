@@ -4,10 +4,10 @@ import json
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from wetwell.protocols.messages.history import LONGEST_NS, History
 from wetwell.protocols.messages.messages import PumpReading, Sample
-from wetwell.services.historian.samples import columns_of
+from wetwell.protocols.quantities import columns_of
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, blocks

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.detector.curves.datasheet import datasheet_of, duty_flows
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.run_state import new_pumps
 from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.keys import model_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.services.detector.model_publisher import ModelPublisher
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging

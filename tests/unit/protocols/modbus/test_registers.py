@@ -15,7 +15,7 @@ from wetwell.protocols.modbus.registers import (
     register_csv,
     register_table,
 )
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
+from wetwell.protocols.quantities import columns_of
 
 TABLES = ("coil", "holding", "input")
 
@@ -58,9 +58,8 @@ def test_measured_values_have_the_same_addresses_in_both_tables():
 
 
 def test_names_are_the_recording_columns_and_the_settings():
-    columns = {*STATION_COLUMNS, *(f"pump{i}_{quantity}" for i in (1, 2) for quantity in PUMP_QUANTITIES)}
     rows = register_table(2, 1)
-    assert {row.name for row in rows if row.table == "input"} == columns | {"heartbeat", "time_s"}
+    assert {row.name for row in rows if row.table == "input"} == {*columns_of(2)} | {"heartbeat", "time_s"}
     writable = {(row.name, row.table) for row in rows if row.access == "rw"}
     assert writable == {
         ("start_level1_m", "holding"),

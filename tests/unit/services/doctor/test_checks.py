@@ -3,9 +3,9 @@
 import asyncio
 
 import pytest
+from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import sample_block_key
-from wetwell.protocols.bus.memory_link import MemoryBus
 from wetwell.protocols.messages.alarm import AlarmFigure, AlarmReport
 from wetwell.protocols.messages.history import History
 from wetwell.protocols.messages.messages import PumpReading, Sample, Status, Verdict

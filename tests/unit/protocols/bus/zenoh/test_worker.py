@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 import zenoh
 
-from wetwell.protocols.bus.publisher_cache import KeptMessages, read_query
+from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
 
@@ -30,7 +30,7 @@ class Session:
     info = SimpleNamespace(routers_zid=lambda: ["a router"])
 
     def __init__(self):
-        self.reached: list[KeptMessages] = []
+        self.reached: list[PublisherCache] = []
 
     def declare_subscriber(self, *_):
         return SimpleNamespace(handler=SimpleNamespace(try_recv=lambda: None))
@@ -56,27 +56,27 @@ class Bytes:
 
 
 class Bench:
-    """A pump with one subscription, and a clock that is set."""
+    """A worker with one subscription, and a clock that is set."""
 
     def __init__(self):
         self.session = Session()
         self.got: list[bytes] = []
-        self.feed = ZenohSubscription(
+        self.subscription = ZenohSubscription(
             self.session, [KEY], 0, lambda ready: self.got.extend(each for _, each in ready), recover=True
         )
-        self.pump = ZenohWorker(self.session, is_router=False)
-        self.pump._feeds.append(self.feed)
+        self.worker = ZenohWorker(self.session, is_router=False)
+        self.worker._subscriptions.append(self.subscription)
         self.now_s = 100.0
 
-    def hear(self, mark: bytes, payload: bytes) -> None:
-        self.feed.follower.take(KEY, mark, payload)
-        self.feed.pass_on()
+    def hear(self, header: bytes, payload: bytes) -> None:
+        self.subscription.sequencer.handle_message(KEY, header, payload)
+        self.subscription.pass_on()
 
     def go_on(self, seconds: float) -> None:
         for _ in range(round(seconds / PERIOD_S)):
             self.now_s += PERIOD_S
-            self.pump._hear(self.now_s)
-            self.pump._ask(self.now_s)
+            self.worker._handle_answers(self.now_s)
+            self.worker._ask(self.now_s)
 
 
 @pytest.fixture
@@ -85,26 +85,26 @@ def bench() -> Bench:
 
 
 @pytest.fixture
-def marks(bench) -> list[bytes]:
+def headers(bench) -> list[bytes]:
     """Marks of ten messages, of which 0, 1 and 9 have been heard."""
-    bench.publisher = KeptMessages(600)
-    marks = [bench.publisher.add(b"%d" % number) for number in range(10)]
+    bench.publisher = PublisherCache(600)
+    headers = [bench.publisher.add(b"%d" % number) for number in range(10)]
     for number in (0, 1, 9):
-        bench.hear(marks[number], b"%d" % number)
-    return marks
+        bench.hear(headers[number], b"%d" % number)
+    return headers
 
 
-@pytest.mark.usefixtures("marks")
+@pytest.mark.usefixtures("headers")
 def test_what_is_kept_behind_a_link_that_is_away_for_a_while_is_not_given_up(bench):
     bench.go_on(30.0)
     assert bench.got == [b"0", b"1"]
     bench.session.reached.append(bench.publisher)
     bench.go_on(6.0)
     assert bench.got == [b"%d" % number for number in range(10)]
-    assert bench.feed.follower.lost == 0
+    assert bench.subscription.sequencer.lost == 0
 
 
-@pytest.mark.usefixtures("marks")
+@pytest.mark.usefixtures("headers")
 def test_what_nobody_has_is_given_up_after_a_minute_or_so(bench, caplog):
     bench.go_on(30.0)
     assert bench.got == [b"0", b"1"]
@@ -113,10 +113,10 @@ def test_what_nobody_has_is_given_up_after_a_minute_or_so(bench, caplog):
     assert "7 messages are lost" in caplog.text
 
 
-@pytest.mark.usefixtures("marks")
+@pytest.mark.usefixtures("headers")
 def test_the_messages_of_a_life_that_has_ended_do_not_wait_so_long(bench):
     bench.go_on(2.0)
-    later = KeptMessages(600)
+    later = PublisherCache(600)
     bench.session.reached.append(later)
     bench.hear(later.add(b"new"), b"new")
     assert bench.got == [b"0", b"1", b"new"]
@@ -125,11 +125,11 @@ def test_the_messages_of_a_life_that_has_ended_do_not_wait_so_long(bench):
 
 
 def test_a_publisher_that_keeps_less_than_is_missing_is_not_asked_for_ever(bench, caplog):
-    publisher = KeptMessages(5)
-    marks = [publisher.add(b"%d" % number) for number in range(20)]
+    publisher = PublisherCache(5)
+    headers = [publisher.add(b"%d" % number) for number in range(20)]
     bench.session.reached.append(publisher)
     for number in (0, 19):
-        bench.hear(marks[number], b"%d" % number)
+        bench.hear(headers[number], b"%d" % number)
     bench.go_on(0.1)
     assert bench.got == [b"0", *(b"%d" % number for number in range(15, 20))]
     assert "14 messages are lost" in caplog.text
@@ -142,9 +142,9 @@ def test_no_period_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forg
     def publisher(number):
         return SimpleNamespace(settle=lambda _: told.append(number) or True)
 
-    bench.pump._publishers = [publisher(number) for number in range(1_000)]
+    bench.worker._publishers = [publisher(number) for number in range(1_000)]
     rounds = 1_000 // TOLD_AT_ONCE
     for number in range(rounds):
-        bench.pump._settle(0.0)
+        bench.worker._settle(0.0)
         assert len(told) == (number + 1) * TOLD_AT_ONCE
     assert sorted(told) == list(range(1_000))

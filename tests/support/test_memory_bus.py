@@ -1,8 +1,7 @@
 import asyncio
 
 import pytest
-
-from wetwell.protocols.bus.memory_link import MemoryBus, matches
+from memory_bus import MemoryBus, matches
 
 
 @pytest.mark.parametrize(

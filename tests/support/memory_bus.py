@@ -1,18 +1,40 @@
-"""Bus within one process: for `wetwell up` without a network, for replays and for tests."""
+"""Bus within one process, for tests and benchmarks of what meets on a bus."""
 
 import asyncio
 import contextlib
 import functools
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Self
 
 from wetwell.protocols.bus.interface import Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
-from wetwell.protocols.bus.publisher_cache import LastMessages
 
 REQUESTS = 1_000
 """Most questions, or changes of presence, that wait for one reader."""
+
+
+class KeptMessages:
+    """The last messages on a key, one at least; one that holds many things counts as many."""
+
+    def __init__(self) -> None:
+        self.payloads: deque[bytes] = deque()
+        self._weights: deque[int] = deque()
+        self._history = 1
+
+    def keep(self, history: int) -> None:
+        """Keep so many from now on."""
+        self._history = history
+        while sum(self._weights) > history and len(self.payloads) > 1:
+            self.payloads.popleft()
+            self._weights.popleft()
+
+    def add(self, payload: bytes, weight: int) -> None:
+        """Keep a message that counts as so many."""
+        self.payloads.append(payload)
+        self._weights.append(weight)
+        self.keep(self._history)
 
 
 class MemoryBus:
@@ -34,7 +56,7 @@ class MemoryBus:
 
     def __init__(self) -> None:
         self.alive: set[str] = set()
-        self._kept: dict[str, LastMessages] = {}
+        self._kept: dict[str, KeptMessages] = {}
         self._subscriptions: list[tuple[str, Callable[[str, bytes], None]]] = []
         self._answerers: list[tuple[str, Mailbox[Request]]] = []
         self._watchers: list[tuple[str, Mailbox[Presence]]] = []
@@ -63,7 +85,7 @@ class MemoryBus:
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with self._lock:
-            self._kept[key] = LastMessages(history, self._kept.get(key))
+            self._kept.setdefault(key, KeptMessages()).keep(history)
         return MemoryPublisher(self, key)
 
     def put(self, key: str, payload: bytes, weight: int = 1) -> None:
