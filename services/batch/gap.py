@@ -17,7 +17,7 @@ from wetwell.services.reports.gap_page import gap_page
 from wetwell.sim2real.calibration.validation import Validation, validate
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
-from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport, report_of
+from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
 from wetwell.sim2real.recording.preparation import PreparationReport
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -55,7 +55,7 @@ def diagnose_file(
         closed_loop = _closed_loop(rows, station, diagnosis.station)
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error
-    report = report_of(diagnosis, closed_loop, _detector(rows, station, diagnosis.station), _notes(preparation))
+    report = diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), _notes(preparation))
     page = gap_page(report, diagnosis)
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wetwell.protocols.quantities import AnalogueQuantity, pump_column
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.reports.charts import (
     Section,
@@ -19,6 +19,8 @@ from wetwell.sim2real.diagnosis.covariates import best_covariate
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.diagnosis.report import DetectorVerdicts, GapReport
 from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import SIGNALS
 from wetwell.simulator.effects import effects_of
 
@@ -94,26 +96,19 @@ def _traces(diagnosis: Diagnosis) -> str:
     """Half an hour around the worst held-out cycle of the gap."""
     traces, replay = diagnosis.traces, diagnosis.replay
     found, bins = diagnosis.attribution, diagnosis.bins
-    by_cycle = np.bincount(bins.cycle[found.held], found.plain[found.held] ** 2)
+    by_cycle = np.bincount(bins.cycle[found.validation], found.plain[found.validation] ** 2)
     begin = max(int(np.argmax(diagnosis.regimes.cycle == int(np.argmax(by_cycle)))) - SHOWN_S // 6, 0)
     window = slice(begin, begin + SHOWN_S)
     time_ns = traces.start_ns + NS_PER_S * traces.time_s[window].astype(np.int64)
     added = effects_of(diagnosis.station)[len(replay.own) :]
-    lines: dict[AnalogueQuantity, list[Series]] = {}
     running = int(np.argmax((traces.frequency_hz[:, window] > 0.0).sum(axis=1)))
-    for label, effects in (("before", ()), ("after", added)):
-        if label == "after" and not added:
-            continue
-        predicted = replay.run(effects)
-        lines.setdefault("level_m", []).append(Series(label, time_ns, predicted.level_m[window].copy()))
-        for name, values in predicted.signals.items():
-            lines.setdefault(name, []).append(Series(label, time_ns, values[running, window].copy()))
-    charts = []
-    for name, series in lines.items():
-        recorded = traces.level_m if name == "level_m" else traces.signals[name][running]
-        title = name if name == "level_m" else pump_column(running + 1, name)
-        every = [Series("measured", time_ns, recorded[window]), *series]
-        charts.append(line_chart(title, every, y_label=name, is_time=True))
+    shown: list[tuple[str, Traces | Prediction]] = [("measured", traces), ("before", replay.run())]
+    shown += [("after", replay.run(added))] if added else []
+    levels = [Series(label, time_ns, values.level_m[window]) for label, values in shown]
+    charts = [line_chart("level_m", levels, y_label="level_m", is_time=True)]
+    for name in traces.signals:
+        series = [Series(label, time_ns, values.signals[name][running, window]) for label, values in shown]
+        charts.append(line_chart(pump_column(running + 1, name), series, y_label=name, is_time=True))
     return "".join(charts)
 
 

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.services.batch.executors import let_interrupts
 from wetwell.services.trial.plan import TrialPlan
-from wetwell.services.trial.sealed_case import RECORDING_FILE, STATION_FILE
+from wetwell.services.trial.sealed_case import RECORDING_FILE, STATION_FILE, published_in
 from wetwell.sim2real.trial.answer import Answer, answer_of
 from wetwell.sim2real.trial.cases import TrialCase
 
@@ -35,7 +35,7 @@ def diagnose(plan: TrialPlan, folder: Path, job: Job) -> None:
     """Diagnose a case in a process that is given copies of its two published files and nothing else."""
     case, which = job
     reports = folder / which / case.name
-    published = folder / "published" / case.name
+    published = published_in(folder, case.name)
     options = [part for name in case.without for part in ("--without", name) if which == REPORTS]
     if which == RECALIBRATED:
         options += [part for name in RECALIBRATION for part in ("--only", name)]

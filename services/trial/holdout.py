@@ -13,17 +13,18 @@ import numpy as np
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.services.batch.executors import let_interrupts
+from wetwell.services.trial.sealed_case import RECORDING_FILE, STATION_FILE
 from wetwell.services.trial.swmm_plant import swmm_passage_of
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.holdout import gap, shrinkage, whitened
 from wetwell.sim2real.trial.regressor import corrected
 from wetwell.sim2real.truth.truth_plant import passage_of
 
-HELD_OUT_FILE = "held_out.json"
+HOLDOUT_FILE = "held_out.json"
 _TIMEOUT_S = 600.0
 
 
-def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[str]) -> None:
+def measure_holdout(case: TrialCase, published: Path, reports: Path, command: Sequence[str]) -> None:
     """Write `held_out.json` beside a report: gap before and after on other weather and noise, and what bounds it.
 
     Nothing is written where there is no diagnosed station, or the replay fails.
@@ -37,21 +38,21 @@ def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[
     command : sequence of str
         The replay; it gets `--station FILE --recording FILE --out FILE`.
     """
-    if (reports / HELD_OUT_FILE).is_file() or not (reports / "station.toml").is_file():
+    if (reports / HOLDOUT_FILE).is_file() or not (reports / STATION_FILE).is_file():
         return
     truth = case.truth()
-    unseen_truth = replace(truth, seed=truth.seed + 1)
-    passage = (passage_of if case.plant == "fine" else swmm_passage_of)(unseen_truth)
+    holdout_truth = replace(truth, seed=truth.seed + 1)
+    passage = (passage_of if case.plant == "fine" else swmm_passage_of)(holdout_truth)
     recorded, oracle = passage.recording(truth=False), passage.oracle()
     with tempfile.TemporaryDirectory(prefix="held-out-") as room:
-        unseen = Path(room) / "unseen.parquet"
-        write_recording(recorded, unseen)
-        before = _replayed(command, published / "station.toml", unseen)
-        after = _replayed(command, reports / "station.toml", unseen)
-        first = _replayed(command, published / "station.toml", published / "recording.parquet", Path(room))
+        holdout = Path(room) / "unseen.parquet"
+        write_recording(recorded, holdout)
+        before = _replayed(command, published / STATION_FILE, holdout)
+        after = _replayed(command, reports / STATION_FILE, holdout)
+        first = _replayed(command, published / STATION_FILE, published / RECORDING_FILE, Path(room))
     if before is None or after is None or first is None:
         return
-    bound = corrected(first, read_recording(published / "recording.parquet"), before)
+    bound = corrected(first, read_recording(published / RECORDING_FILE), before)
     sensors = truth.station.sensors
     gaps = {
         name: gap(whitened(predicted, recorded, sensors))
@@ -62,7 +63,7 @@ def hold_out(case: TrialCase, published: Path, reports: Path, command: Sequence[
         "shrinkage": shrinkage(gaps["before"], gaps["after"], gaps["oracle"]),
         "regressor_shrinkage": shrinkage(gaps["before"], gaps["regressor"], gaps["oracle"]),
     }
-    with atomic_file(reports / HELD_OUT_FILE) as file:
+    with atomic_file(reports / HOLDOUT_FILE) as file:
         file.write(json.dumps(figures).encode() + b"\n")
 
 
@@ -83,12 +84,12 @@ def _replayed(command: Sequence[str], station: Path, recording: Path, room: Path
     return read_recording(out) if done.returncode == 0 and out.is_file() else None
 
 
-def held_out_summary(folders: Sequence[Path]) -> dict[str, Any] | None:
+def holdout_summary(folders: Sequence[Path]) -> dict[str, Any] | None:
     """Medians over the cases that have `held_out.json`; None without any.
 
     Shrinkages of cases without a gap in these signals (controller, thresholds) are left out and counted.
     """
-    rows = [json.loads(path.read_bytes()) for folder in folders if (path := folder / HELD_OUT_FILE).is_file()]
+    rows = [json.loads(path.read_bytes()) for folder in folders if (path := folder / HOLDOUT_FILE).is_file()]
     if not rows:
         return None
     told: dict[str, Any] = {"cases": len(rows)}

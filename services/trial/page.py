@@ -44,7 +44,7 @@ def trial_page(result: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) ->
             ),
             Section("Single effects", _share_table("effect", result["effects_scored"])),
             Section("Controls", _controls(result["controls"])),
-            *([Section("Unseen recordings", _unseen(result["unseen"]))] if result["unseen"] else []),
+            *([Section("Unseen recordings", _holdout(result["unseen"]))] if result["unseen"] else []),
             Section("Cases", _cases(cases)),
         ],
     )
@@ -84,7 +84,7 @@ def _controls(controls: Mapping[str, Any]) -> str:
     return table(["control", *(name.replace("_", " ") for name in chance), "median shrinkage"], rows)
 
 
-def _unseen(figures: Mapping[str, Any]) -> str:
+def _holdout(figures: Mapping[str, Any]) -> str:
     rows = [
         ["station file as it was", figures["before"], None],
         ["diagnosed station", figures["after"], (figures["shrinkage"] or {}).get("median")],

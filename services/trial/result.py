@@ -12,7 +12,7 @@ import numpy as np
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.services.batch.parallel import Failure
 from wetwell.services.trial.diagnosis import RECALIBRATED, REPORTS, WHOLE_LIBRARY, answer_in
-from wetwell.services.trial.holdout import held_out_summary
+from wetwell.services.trial.holdout import holdout_summary
 from wetwell.services.trial.page import trial_page
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.sealed_case import open_case
@@ -46,7 +46,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         "effects_scored": _grouped(
             [score for score in scores if score.label.kind == "single"], lambda score: score.label.names[0]
         ),
-        "unseen": held_out_summary([folder / REPORTS / name for name in names]),
+        "unseen": holdout_summary([folder / REPORTS / name for name in names]),
         "controls": controls,
         "confusion": {"rows": rows, "columns": columns, "counts": counts.tolist()},
     }

@@ -16,10 +16,10 @@ from wetwell.services.trial.diagnosis import (
     diagnose,
     is_diagnosed,
 )
-from wetwell.services.trial.holdout import hold_out
+from wetwell.services.trial.holdout import measure_holdout
 from wetwell.services.trial.plan import TrialPlan, take_folder
 from wetwell.services.trial.result import score_trial
-from wetwell.services.trial.sealed_case import is_published, open_case, publish
+from wetwell.services.trial.sealed_case import is_published, open_case, publish, published_in
 from wetwell.sim2real.trial.cases import TrialCase
 
 
@@ -65,7 +65,7 @@ def run_trial(plan: TrialPlan, folder: Path, workers: int, scheduler: str | None
     each("equivalents", diagnosis, named, has_report)
     if plan.replay:
         published = [(_as_published(case, folder), REPORTS) for case in deviating if case.name not in failed]
-        each("unseen recordings", partial(_hold_out, plan, folder), published, lambda _: False)
+        each("unseen recordings", partial(_measure_holdout, plan, folder), published, lambda _: False)
     return score_trial(plan, folder, failed)
 
 
@@ -78,9 +78,9 @@ def _publish(folder: Path, job: Job) -> None:
     publish(job[0], folder)
 
 
-def _hold_out(plan: TrialPlan, folder: Path, job: Job) -> None:
+def _measure_holdout(plan: TrialPlan, folder: Path, job: Job) -> None:
     case, which = job
-    hold_out(case, folder / "published" / case.name, folder / which / case.name, plan.replay)
+    measure_holdout(case, published_in(folder, case.name), folder / which / case.name, plan.replay)
 
 
 def _told_effect(reports: Path) -> bool:

@@ -16,10 +16,18 @@ from wetwell.sim2real.trial.seal import digest, labels_text, opened
 STATION_FILE, RECORDING_FILE, SEAL_FILE = "station.toml", "recording.parquet", "seal.sha256"
 
 
+def published_in(folder: Path, name: str) -> Path:
+    """Where the folder of a trial holds what is published of a case."""
+    return folder / "published" / name
+
+
+def _sealed_in(folder: Path, name: str) -> Path:
+    return folder / "sealed" / f"{name}.json"
+
+
 def is_published(case: TrialCase, folder: Path) -> bool:
     """Whether the folder of a trial holds a case with its seal."""
-    sealed = folder / "sealed" / f"{case.name}.json"
-    return (folder / "published" / case.name / SEAL_FILE).is_file() and sealed.is_file()
+    return (published_in(folder, case.name) / SEAL_FILE).is_file() and _sealed_in(folder, case.name).is_file()
 
 
 def publish(case: TrialCase, folder: Path) -> None:
@@ -31,7 +39,7 @@ def publish(case: TrialCase, folder: Path) -> None:
         If one of its deviations never acts (`acting_case`), or its plant is not installed.
     """
     case, truth, recording = acting_case(case)
-    published, sealed = folder / "published" / case.name, folder / "sealed" / f"{case.name}.json"
+    published, sealed = published_in(folder, case.name), _sealed_in(folder, case.name)
     published.mkdir(parents=True, exist_ok=True)
     sealed.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(published / STATION_FILE) as file:
@@ -65,7 +73,7 @@ def open_case(name: str, folder: Path) -> Label:
     RecordingError
         If one has been changed or is missing.
     """
-    published, sealed = folder / "published" / name, folder / "sealed" / f"{name}.json"
+    published, sealed = published_in(folder, name), _sealed_in(folder, name)
     try:
         labels = opened(sealed.read_bytes(), (published / SEAL_FILE).read_text(encoding="ascii"))
         changed = [part for part, was in labels["sha256"].items() if digest((published / part).read_bytes()) != was]

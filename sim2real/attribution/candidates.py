@@ -14,12 +14,12 @@ from wetwell.simulator.effects.effect import Component, Effect
 
 WIDE = 50.0
 """Ratio of a range's ends from which a parameter is varied on a logarithmic scale."""
-TRIALS = (0.002, 0.01, 0.04, 0.12, 0.3)
+STRENGTHS = (0.002, 0.01, 0.04, 0.12, 0.3)
 """Strengths that are tried first, as shares of the way from neutral to either end of the range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Freedom:
+class FreeParameter:
     """A free parameter of an effect: its range, unit, start, and its neutral value if it is a strength."""
 
     name: str
@@ -34,18 +34,18 @@ class Freedom:
         """Whether it is varied on a logarithmic scale."""
         return self.low > 0.0 and self.high / self.low >= WIDE
 
-    def share(self, value: float) -> float:
-        """Place of a value in the range, 0 to 1."""
+    def normalised(self, value: float) -> float:
+        """Where a value lies in the range, 0 to 1."""
         if self.is_logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
-    def value(self, share: float) -> float:
-        """Value at a place in the range."""
-        share = min(max(share, 0.0), 1.0)
+    def value(self, normalised: float) -> float:
+        """Value at a normalised one."""
+        normalised = min(max(normalised, 0.0), 1.0)
         if self.is_logarithmic:
-            return float(self.low * (self.high / self.low) ** share)
-        return self.low + (self.high - self.low) * share
+            return float(self.low * (self.high / self.low) ** normalised)
+        return self.low + (self.high - self.low) * normalised
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,40 +54,40 @@ class Candidate:
 
     name: str
     fixed: tuple[tuple[str, Any], ...]
-    free: tuple[Freedom, ...]
+    free: tuple[FreeParameter, ...]
 
     @property
     def component(self) -> Component:
         """Component that the effect belongs to."""
         return EFFECTS[self.name].component
 
-    def effect(self, shares: Floats) -> Effect:
-        """Effect with its free parameters at places in their ranges."""
-        values = {free.name: free.value(float(share)) for free, share in zip(self.free, shares, strict=True)}
+    def effect(self, point: Floats) -> Effect:
+        """Effect with its free parameters at a point, each normalised to its range."""
+        values = {free.name: free.value(float(one)) for free, one in zip(self.free, point, strict=True)}
         return EFFECTS[self.name].model_validate(dict(self.fixed) | values)
 
-    def ladders(self, hints: Mapping[str, float], trials: Sequence[float] = TRIALS) -> list[list[Floats]]:
-        """Places to begin at: the hints, and ladders of rising strength, each strength on both sides of neutral.
+    def start_grids(self, guess: Mapping[str, float], strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
+        """Points to begin at: the guess, and grids of rising strength, each strength on both sides of neutral.
 
-        A strength that is neutral by the hints has no ladder.
+        A strength that is neutral by the guess has no grid.
         """
         base = np.array(
-            [free.share(min(max(hints.get(free.name, free.start), free.low), free.high)) for free in self.free]
+            [free.normalised(min(max(guess.get(free.name, free.start), free.low), free.high)) for free in self.free]
         )
         if not any(free.neutral is not None for free in self.free):
             return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
-        ladders = [[base]] if any(free.name in hints for free in self.free) else []
+        grids = [[base]] if any(free.name in guess for free in self.free) else []
         for k, free in enumerate(self.free):
-            if free.neutral is None or hints.get(free.name) == free.neutral:
+            if free.neutral is None or guess.get(free.name) == free.neutral:
                 continue
-            neutral = free.share(free.neutral)
+            neutral = free.normalised(free.neutral)
             for end in (0.0, 1.0):
                 if abs(end - neutral) > 1e-9:
-                    ladder = [base.copy() for _ in trials]
-                    for place, trial in zip(ladder, trials, strict=True):
-                        place[k] = neutral + trial * (end - neutral)
-                    ladders.append(ladder)
-        return ladders
+                    grid = [base.copy() for _ in strengths]
+                    for point, strength in zip(grid, strengths, strict=True):
+                        point[k] = neutral + strength * (end - neutral)
+                    grids.append(grid)
+        return grids
 
 
 def candidates_of(
@@ -122,7 +122,7 @@ def candidates_of(
             for parameter in row["parameters"]
             if "unit" not in parameter
         }
-        free = tuple(_freedom(parameter) for parameter in row["parameters"] if "unit" in parameter)
+        free = tuple(_free_parameter(parameter) for parameter in row["parameters"] if "unit" in parameter)
         found += [
             Candidate(name=row["name"], fixed=tuple(zip(choices, picked, strict=True)), free=free)
             for picked in product(*choices.values())
@@ -134,10 +134,10 @@ def _pump_numbers(pumps: int) -> list[int]:
     return [0, *(range(1, pumps + 1) if pumps > 1 else ())]
 
 
-def _freedom(parameter: Mapping[str, Any]) -> Freedom:
+def _free_parameter(parameter: Mapping[str, Any]) -> FreeParameter:
     neutral = parameter.get("neutral")
     start = parameter.get("default", neutral)
-    return Freedom(
+    return FreeParameter(
         name=parameter["name"],
         unit=parameter["unit"],
         low=parameter["low"],

@@ -1,4 +1,4 @@
-"""Bounded least squares with soft residuals, for any set of effects at once."""
+"""Bounded least squares under the asinh loss, for any set of effects at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,32 +8,38 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.sim2real.residuals.residuals import Misfit, soft
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss
+from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects.effect import Effect
 
-STEP = 1e-3
+SLOPE_STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
 ROUNDS = 12
+DAMPINGS = 5
+"""Steps of a round, each damped more, of which one has to lead down."""
+LONGEST_STEP = 0.3
 SETTLED = 1e-3
 MOST_AWAY = 2
-"""Steps up a ladder, each worse than the best before, after which it is left."""
+"""Points of a grid, each worse than the best before, after which it is left."""
 STAYED = 0.01
 """Share of its range by which a strength may move and still count as neutral."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
+EXCUSED_S = 2
+"""Transients in ramps that a right model may be late or early by, and more, when it comes to what is left."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """Candidates at their best places; residuals of all bins, soft, in units of noise."""
+    """Candidates at their best points; residuals of all bins, in units of noise, as `asinh_loss` makes them."""
 
     candidates: tuple[Candidate, ...]
-    places: tuple[Floats, ...]
+    points: tuple[Floats, ...]
     residuals: Floats
 
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects themselves."""
-        return tuple(c.effect(place) for c, place in zip(self.candidates, self.places, strict=True))
+        return tuple(c.effect(point) for c, point in zip(self.candidates, self.points, strict=True))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,126 +50,149 @@ class Fit:
     def free(self) -> int:
         """Number of free parameters, but for strengths that have stayed neutral."""
         return sum(
-            free.neutral is None or abs(float(share) - free.share(free.neutral)) > STAYED
-            for candidate, place in zip(self.candidates, self.places, strict=True)
-            for free, share in zip(candidate.free, place, strict=True)
+            free.neutral is None or abs(float(one) - free.normalised(free.neutral)) > STAYED
+            for candidate, point in zip(self.candidates, self.points, strict=True)
+            for free, one in zip(candidate.free, point, strict=True)
         )
+
+    @property
+    def position(self) -> Floats:
+        """(parameters,) points of all candidates, one after the other."""
+        return np.concatenate(self.points) if self.points else np.zeros(0)
+
+    def split(self, position: Floats) -> tuple[Floats, ...]:
+        """Points of the candidates in a position."""
+        return tuple(np.split(position, np.cumsum([point.size for point in self.points])[:-1]))
 
 
 class Fitter:
-    """Fits candidates to the chosen bins of a recording."""
+    """Fits candidates to the chosen bins of a recording.
 
-    def __init__(self, replay: Replay, misfit: Misfit, rows: Flags) -> None:
+    Attributes
+    ----------
+    rows : (bins,) array
+        Those that are fitted.
+    plant : PlantParameters
+        The station as it is.
+    plain : Fit
+        Without any effect.
+    """
+
+    def __init__(self, replay: Replay, residuals: StationResiduals, rows: Flags) -> None:
         self._replay = replay
-        self._misfit = misfit
+        self._residuals = residuals
         self.rows = rows
+        prediction = replay.run()
+        self.plant = prediction.plant
+        self.plain = Fit(candidates=(), points=(), residuals=asinh_loss(residuals.of(prediction)))
 
-    def residuals(self, candidates: Sequence[Candidate], places: Sequence[Floats]) -> Floats | None:
-        """(bins,) soft residuals, None where the effects cannot work together on this station."""
+    def at(self, candidates: Sequence[Candidate], points: Sequence[Floats]) -> Fit | None:
+        """Candidates at their points, None where the effects cannot work together on this station."""
         try:
-            prediction = self._replay.run([c.effect(place) for c, place in zip(candidates, places, strict=True)])
+            prediction = self._replay.run([c.effect(point) for c, point in zip(candidates, points, strict=True)])
         except ValueError:
             return None
-        return soft(self._misfit.residuals(prediction))
+        residuals = asinh_loss(self._residuals.of(prediction))
+        return Fit(candidates=tuple(candidates), points=tuple(points), residuals=residuals)
 
-    def left(self, effects: Sequence[Effect], excused_s: int) -> Floats:
-        """(bins,) soft residuals under effects, with short transients in ramps excused."""
-        return soft(self._misfit.residuals(self._replay.run(effects), excused_s))
+    def without(self, fit: Fit, member: int) -> Fit | None:
+        """A fit without one of its effects, the others where they stand."""
+        kept = [k for k in range(len(fit.candidates)) if k != member]
+        return self.at([fit.candidates[k] for k in kept], [fit.points[k] for k in kept])
 
-    def cost(self, residuals: Floats | None) -> float:
+    def left(self, fit: Fit | None) -> Floats:
+        """(bins,) residuals under a fit; with short transients in ramps excused unless all of it can be seen."""
+        effects = () if fit is None else fit.effects
+        is_seen = bool(effects) and all(effect.is_seen(self.plant) for effect in effects)
+        return asinh_loss(self._residuals.of(self._replay.run(effects), 0 if is_seen else EXCUSED_S))
+
+    def cost(self, fit: Fit | None) -> float:
         """Sum of squares over the bins that are fitted."""
-        return float("inf") if residuals is None else float(np.sum(residuals[self.rows] ** 2))
+        return float("inf") if fit is None else float(np.sum(fit.residuals[self.rows] ** 2))
 
     def first(
-        self, candidate: Candidate, ladders: Sequence[Sequence[Floats]], others: Fit | None = None
+        self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]], others: Fit | None = None
     ) -> Fit | None:
-        """Best of several starts, without refinement; a ladder is left when it has led away from the recording."""
+        """Best of several starts, without refinement; a grid is left when it has led away from the recording."""
         best: Fit | None = None
-        before = () if others is None else others.candidates
-        places = () if others is None else others.places
-        for ladder in ladders:
+        before = self.plain if others is None else others
+        for grid in start_grids:
             lowest, away = float("inf"), 0
-            for start in ladder:
-                residuals = self.residuals((*before, candidate), (*places, start))
-                cost = self.cost(residuals)
+            for start in grid:
+                tried = self.at((*before.candidates, candidate), (*before.points, start))
+                cost = self.cost(tried)
                 away = away + 1 if cost > lowest else 0
                 lowest = min(lowest, cost)
-                if residuals is not None and (best is None or cost < self.cost(best.residuals)):
-                    best = Fit(candidates=(*before, candidate), places=(*places, start), residuals=residuals)
+                if tried is not None and (best is None or cost < self.cost(best)):
+                    best = tried
                 if away == MOST_AWAY:
                     break
         return best
 
-    def refine(self, fit: Fit, rounds: int = ROUNDS) -> Fit:
+    def refine(self, fit: Fit) -> Fit:
         """Levenberg and Marquardt's method from where a fit stands, within the ranges."""
-        sizes = [place.size for place in fit.places]
-        x = np.concatenate([*fit.places]) if fit.places else np.zeros(0)
-        if x.size == 0:
+        if fit.position.size == 0:
             return fit
-        residuals, damping = fit.residuals, 1e-2
-        cost = self.cost(residuals)
-        for _ in range(rounds):
-            slopes = self._slopes(fit.candidates, x, sizes, residuals)
-            gradient = slopes.T @ residuals[self.rows]
+        current, damping = fit, 1e-2
+        for _ in range(ROUNDS):
+            slopes = self.slopes(current)
+            gradient = slopes.T @ current.residuals[self.rows]
             squares = slopes.T @ slopes
-            held = ((x <= 0.0) & (gradient > 0.0)) | ((x >= 1.0) & (gradient < 0.0)) | (np.diag(squares) <= 0.0)
-            if held.all():
+            x = current.position
+            is_bound = ((x <= 0.0) & (gradient > 0.0)) | ((x >= 1.0) & (gradient < 0.0)) | (np.diag(squares) <= 0.0)
+            if is_bound.all():
                 return self._scanned(fit)
-            moved = False
-            for _ in range(5):
-                step = np.zeros(x.size)
-                free = ~held
-                inner = squares[np.ix_(free, free)]
-                step[free] = -np.linalg.solve(inner + damping * np.diag(np.diag(inner)), gradient[free])
-                trial = np.clip(x + np.clip(step, -0.3, 0.3), 0.0, 1.0)
-                tried = self.residuals(fit.candidates, np.split(trial, np.cumsum(sizes)[:-1]))
-                if self.cost(tried) < cost:
-                    moved = True
-                    break
-                damping *= 6.0
-            if not moved or tried is None:
-                return self._scanned(fit) if residuals is fit.residuals else self._at(fit, x, sizes, residuals)
-            gain = cost - self.cost(tried)
-            x, residuals, cost, damping = trial, tried, self.cost(tried), damping / 6.0
-            if gain < SETTLED * cost:
+            moved, damping = self._moved(current, gradient, squares, ~is_bound, damping)
+            if moved is None:
+                return self._scanned(fit) if current is fit else current
+            gain = self.cost(current) - self.cost(moved)
+            current = moved
+            if gain < SETTLED * self.cost(current):
                 break
-        return self._at(fit, x, sizes, residuals)
+        return current
 
-    @staticmethod
-    def _at(fit: Fit, x: Floats, sizes: list[int], residuals: Floats) -> Fit:
-        return Fit(candidates=fit.candidates, places=tuple(np.split(x, np.cumsum(sizes)[:-1])), residuals=residuals)
+    def _moved(
+        self, fit: Fit, gradient: Floats, squares: Floats, is_free: Flags, damping: float
+    ) -> tuple[Fit | None, float]:
+        """First of some steps, each damped more, that leads down, and the damping of the next round."""
+        inner = squares[np.ix_(is_free, is_free)]
+        for _ in range(DAMPINGS):
+            step = np.zeros(is_free.size)
+            step[is_free] = -np.linalg.solve(inner + damping * np.diag(np.diag(inner)), gradient[is_free])
+            position = np.clip(fit.position + np.clip(step, -LONGEST_STEP, LONGEST_STEP), 0.0, 1.0)
+            tried = self.at(fit.candidates, fit.split(position))
+            if self.cost(tried) < self.cost(fit):
+                return tried, damping / 6.0
+            damping *= 6.0
+        return None, damping
 
     def _scanned(self, fit: Fit) -> Fit:
         """Fit with the last candidate's strengths tried nearer to neutral and further off: limits have no slope."""
-        candidate, best = fit.candidates[-1], fit
-        for k, free in enumerate(candidate.free):
+        best = fit
+        for k, free in enumerate(fit.candidates[-1].free):
             if free.neutral is None:
                 continue
-            neutral = free.share(free.neutral)
+            neutral = free.normalised(free.neutral)
             for factors in SCANS:
-                start = best.places[-1]
+                start = best.points[-1]
                 for factor in factors:
-                    place = start.copy()
-                    place[k] = min(max(neutral + factor * (start[k] - neutral), 0.0), 1.0)
-                    residuals = self.residuals(fit.candidates, (*fit.places[:-1], place))
-                    if residuals is not None and self.cost(residuals) < self.cost(best.residuals):
-                        best = Fit(candidates=fit.candidates, places=(*fit.places[:-1], place), residuals=residuals)
+                    point = start.copy()
+                    point[k] = min(max(neutral + factor * (start[k] - neutral), 0.0), 1.0)
+                    tried = self.at(fit.candidates, (*fit.points[:-1], point))
+                    if tried is not None and self.cost(tried) < self.cost(best):
+                        best = tried
         return best
 
     def slopes(self, fit: Fit) -> Floats:
-        """(fitted bins, parameters) change of the residuals with each place."""
-        return self._slopes(
-            fit.candidates, np.concatenate([*fit.places]), [place.size for place in fit.places], fit.residuals
-        )
-
-    def _slopes(self, candidates: Sequence[Candidate], x: Floats, sizes: list[int], residuals: Floats) -> Floats:
+        """(fitted bins, parameters) change of the residuals with each parameter."""
+        x, residuals = fit.position, fit.residuals[self.rows]
         slopes = np.zeros((int(self.rows.sum()), x.size))
         for k in range(x.size):
-            for step in (STEP, -STEP) if x[k] < 0.5 else (-STEP, STEP):
+            for step in (SLOPE_STEP, -SLOPE_STEP) if x[k] < 0.5 else (-SLOPE_STEP, SLOPE_STEP):
                 moved = x.copy()
                 moved[k] += step
-                beside = self.residuals(candidates, np.split(moved, np.cumsum(sizes)[:-1]))
+                beside = self.at(fit.candidates, fit.split(moved))
                 if beside is not None:
-                    slopes[:, k] = (beside[self.rows] - residuals[self.rows]) / step
+                    slopes[:, k] = (beside.residuals[self.rows] - residuals) / step
                     break
         return slopes

@@ -7,7 +7,7 @@ from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import POWER, Bins
-from wetwell.sim2real.residuals.residuals import Misfit
+from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.plant import plant_parameters
 from wetwell.simulator.power import loaded_power_kw
 
@@ -28,35 +28,37 @@ FINER = 4
 """Frequencies between two that the length of the recording tells apart."""
 
 
-def hints_of(candidate: Candidate, replay: Replay, misfit: Misfit, residuals: Floats) -> list[dict[str, float]]:
+def initial_guesses(
+    candidate: Candidate, replay: Replay, residuals: StationResiduals, plain: Floats
+) -> list[dict[str, float]]:
     """Sets of start values by parameter: what of deadbands, quanta, limits and swings the recording shows."""
     fixed = dict(candidate.fixed)
-    hints: dict[str, float] = {}
+    guess: dict[str, float] = {}
     names = {free.name for free in candidate.free}
-    for pattern in misfit.telemetry.patterns:
+    for pattern in residuals.telemetry.patterns:
         if "deadband" in names and pattern.deadband > 0.0 and fixed.get("channel") == pattern.quantity:
-            hints["deadband"] = pattern.deadband
+            guess["deadband"] = pattern.deadband
         if "quantum_m" in names and pattern.quantum > 0.0:
-            hints["quantum_m"] = pattern.quantum
+            guess["quantum_m"] = pattern.quantum
     control = replay.station.control
     middle_m = 0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])
-    hints |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
+    guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
-        hints["rated_factor"] = _rated_factor(replay)
+        guess["rated_factor"] = _rated_factor(replay)
     if "fast_period_s" in names:
-        hints |= _swing(misfit.bins, replay.traces.time_s, residuals)
+        guess |= _swing(residuals.bins, replay.traces.time_s, plain)
     if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
         flow_m3h = replay.traces.signals["flow_m3h"]
         least_m3h = float(np.min(flow_m3h[flow_m3h > 0.0], initial=np.inf))
-        return [hints | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [hints]
+        return [guess | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [guess]
     if "reference_level_m" in names:
-        return [hints | {"reference_level_m": far * middle_m} for far in REFERENCES]
+        return [guess | {"reference_level_m": far * middle_m} for far in REFERENCES]
     if "exponent" in names:
         low_m, high_m = control.stop_levels_m[0], control.start_levels_m[0]
         bench = {"exponent": BENCH, "top_factor": 1.0}
         edges_m = [low_m + share * (high_m - low_m) for share in EDGES]
-        return [hints, *(hints | bench | {"height_m": edge_m} for edge_m in edges_m)]
-    return [hints]
+        return [guess, *(guess | bench | {"height_m": edge_m} for edge_m in edges_m)]
+    return [guess]
 
 
 def _rated_factor(replay: Replay) -> float:

@@ -9,11 +9,11 @@ from wetwell.sim2real.residuals.bins import Bins
 from wetwell.simulator.effects import EFFECTS
 
 TWO_SIDED = 1.96
-BLOCKS = 24
+MOST_BLOCKS = 24
 """Most blocks of neighbouring cycles: noise that is slower than a cycle stays within one."""
 RISE = 10.0
 """Of the sum of squares, at the ends of an interval of a parameter that has no slope, such as a limit."""
-SCAN_S = 0.5
+HALF_SCAN_S = 0.5
 """Least half width of a time: a sample may stand for the begin or the end of its second."""
 FORM = (0.01, 0.03)
 """Least half width, as a share of the way from neutral, where a name fixes the equation, and where it does not."""
@@ -22,7 +22,7 @@ STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 
 
 
 def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
-    r"""(parameters, 2) ends of 95 % intervals, as places in the ranges, in the order of the candidates.
+    r"""(parameters, 2) ends of 95 % intervals, as points in the ranges, in the order of the candidates.
 
     $$\operatorname{cov} = H^{-1} \left(\sum_b g_b g_b^T + \sum_c g_c g_c^T + \sum_c t_c t_c^T\right) H^{-1},
     \qquad H = J^T J$$
@@ -35,14 +35,14 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
     ----------
     .. [1] K.-Y. Liang, S. L. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 1986.
     """
-    x = np.concatenate([*fit.places]) if fit.places else np.zeros(0)
+    x = fit.position
     if x.size == 0:
         return np.zeros((0, 2))
     rows = fitter.rows
     slopes, residuals = fitter.slopes(fit), fit.residuals[rows]
     cycles = np.unique(bins.cycle[rows], return_inverse=True)[1]
     count = int(cycles.max(initial=0)) + 1
-    block = cycles * min(BLOCKS, count) // count
+    block = cycles * min(MOST_BLOCKS, count) // count
     cell = np.unique(bins.signal[rows] * len(REGIMES) + bins.regime[rows], return_inverse=True)[1]
     pulls = [
         _sums(slopes * residuals[:, None], block),
@@ -59,9 +59,9 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
     for k, (free, candidate) in enumerate(frees):
         form = FORM[0] if EFFECTS[candidate.name].has_one_form else FORM[1]
         value = free.value(float(x[k]))
-        least = max(form * abs(value - (free.neutral or 0.0)), SCAN_S if free.unit == "s" else 0.0)
+        least = max(form * abs(value - (free.neutral or 0.0)), HALF_SCAN_S if free.unit == "s" else 0.0)
         low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
-        ends[k] = min(ends[k, 0], free.share(low)), max(ends[k, 1], free.share(high))
+        ends[k] = min(ends[k, 0], free.normalised(low)), max(ends[k, 1], free.normalised(high))
     return np.asarray(ends, dtype=np.float64)
 
 
@@ -70,23 +70,20 @@ def _sums(values: Floats, group: Integers) -> Floats:
     return np.array([np.bincount(group, column) for column in values.T]).T
 
 
-def _profile(fitter: Fitter, fit: Fit, x: Floats, place: int) -> tuple[float, float]:
-    """Places on both sides from which on the sum of squares has risen by `RISE`, the others kept."""
-    free = [free for candidate in fit.candidates for free in candidate.free][place]
-    neutral = 0.0 if free.neutral is None else free.share(free.neutral)
-    sizes = np.cumsum([part.size for part in fit.places])[:-1]
-    limit = fitter.cost(fit.residuals) + RISE
+def _profile(fitter: Fitter, fit: Fit, x: Floats, parameter: int) -> tuple[float, float]:
+    """Ends on both sides from which on the sum of squares has risen by `RISE`, the other parameters kept."""
+    free = [free for candidate in fit.candidates for free in candidate.free][parameter]
+    neutral = 0.0 if free.neutral is None else free.normalised(free.neutral)
+    limit = fitter.cost(fit) + RISE
     ends = []
     for side in (-1.0, 1.0):
-        end = x[place]
+        moved = x.copy()
         for stride in STRIDES:
-            moved = x.copy()
-            moved[place] = np.clip(x[place] + side * stride * (x[place] - neutral), 0.0, 1.0)
-            end = moved[place]
-            if fitter.cost(fitter.residuals(fit.candidates, np.split(moved, sizes))) > limit:
+            moved[parameter] = np.clip(x[parameter] + side * stride * (x[parameter] - neutral), 0.0, 1.0)
+            if fitter.cost(fitter.at(fit.candidates, fit.split(moved))) > limit:
                 break
         else:
             if side > 0.0:  # away from neutral nothing speaks against it
-                end = float(x[place] > neutral)
-        ends.append(float(end))
+                moved[parameter] = float(x[parameter] > neutral)
+        ends.append(float(moved[parameter]))
     return min(ends), max(ends)

@@ -4,7 +4,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 
-SURE = 4.0
+LIBRARY_ERRORS = 4.0
 """Standard errors: 3 for one trial, 4 for a library of them."""
 CLIP = 4.0
 """Medians beyond which a cycle counts no more, so that few large ones do not pass for scatter."""
@@ -12,11 +12,11 @@ STRONG = 40.0
 """Drop of the sum of squares of a cycle that noise does not bring about."""
 MIN_STRONG = 3
 OVERWHELMING = 1000.0
-"""The same of which two cycles are enough: pumps that seldom run together."""
+"""Drop of the sum of squares of which two cycles are enough: pumps that seldom run together."""
 MOST_LOSS = 0.2
 
 
-def is_sure(by_cycle: Floats) -> bool:
+def is_significant(by_cycle: Floats) -> bool:
     """Whether most cycles agree that something helps, or some do strongly and hardly any disagrees.
 
     Parameters
@@ -26,8 +26,10 @@ def is_sure(by_cycle: Floats) -> bool:
 
     Examples
     --------
-    >>> is_sure(np.full(20, 1.0)), is_sure(np.array([1.0, -1.0] * 10)), is_sure(np.array([0.0] * 90 + [500.0] * 4))
-    (True, False, True)
+    >>> is_significant(np.full(20, 1.0)), is_significant(np.array([1.0, -1.0] * 10))
+    (True, False)
+    >>> is_significant(np.array([0.0] * 90 + [500.0] * 4))
+    True
     """
     gain, loss = float(by_cycle[by_cycle > 0.0].sum()), -float(by_cycle[by_cycle < 0.0].sum())
     are_strong = int(np.sum(by_cycle > STRONG)) >= MIN_STRONG or int(np.sum(by_cycle > OVERWHELMING)) >= 2
@@ -35,4 +37,4 @@ def is_sure(by_cycle: Floats) -> bool:
         return True
     size = float(np.median(np.abs(by_cycle))) if by_cycle.size else 0.0
     clipped = np.clip(by_cycle, -CLIP * size, CLIP * size)
-    return float(clipped.sum()) > SURE * max(float(np.sqrt(np.sum(clipped**2))), 1e-12)
+    return float(clipped.sum()) > LIBRARY_ERRORS * max(float(np.sqrt(np.sum(clipped**2))), 1e-12)

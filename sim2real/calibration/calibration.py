@@ -1,7 +1,7 @@
 """Calibration of a station file from a recording: what it can tell, with intervals, and what it cannot."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydantic import ValidationError
@@ -12,26 +12,19 @@ from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.calibration.estimates import (
+    Estimate,
+    estimated,
+    is_spread,
+    mean_estimated,
+    polynomial_estimated,
+)
 from wetwell.sim2real.calibration.steady import SteadyPoints, running_flags, steady_points
 
-RESAMPLES = 200
-CONFIDENCE = 0.95
 MIN_RUNS = 4
-SPREAD_NEEDED = 0.08
-"""Relative spread of the flow (of Q/N, or of Q²) over which a slope can be told from an offset."""
 BESIDE_SWITCH_S = 60.0
 RAMP_ALLOWANCE_S = 5.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
-    """One parameter: its value with a 95 % interval, or why it cannot be told; `value` is then the configured one."""
-
-    name: str
-    unit: str
-    value: float
-    interval: tuple[float, float] | None
-    reason: str = ""
+CURVE_UNITS = ("m", "m/(m³/h)", "m/(m³/h)²")
 
 
 def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[Estimate, ...]:
@@ -63,81 +56,52 @@ def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple
     for pump in range(len(station.pump)):
         estimates += _pump_curve(points, station, pump, rng)
     estimates += _system_curve(points, station, rng)
-    estimates.append(_area(recording, station, rng))
+    estimates += _area(recording, station, rng)
     estimates += _levels(recording, station, rng)
-    estimates.append(_ramp(recording, station, rng))
+    estimates += _ramp(recording, station, rng)
     return tuple(estimates)
 
 
 def _pump_curve(points: SteadyPoints, station: Station, pump: int, rng: np.random.Generator) -> list[Estimate]:
     c0, c1, c2 = station.pump[pump].coefficients
-    names = [(f"pump[{pump + 1}].c{power}", unit) for power, unit in enumerate(("m", "m/(m³/h)", "m/(m³/h)²"))]
+    parameters = [
+        Estimate(name=f"pump[{pump + 1}].c{power}", unit=CURVE_UNITS[power], value=configured)
+        for power, configured in enumerate((c0, c1, c2))
+    ]
     mine = points.pump == pump
     runs = points.run[mine]
-    if np.unique(runs).size < MIN_RUNS:
-        reason = f"{np.unique(runs).size} runs with steady flow, head and frequency, at least {MIN_RUNS} are needed"
-        return [_kept(name, unit, value, reason) for (name, unit), value in zip(names, (c0, c1, c2), strict=True)]
+    count = np.unique(runs).size
+    if count < MIN_RUNS:
+        reason = f"{count} runs with steady flow, head and frequency, at least {MIN_RUNS} are needed"
+        return [parameter.kept(reason) for parameter in parameters]
     flow = points.flow_m3h[mine] / points.speed_ratio[mine]
     head = points.head_m[mine] / points.speed_ratio[mine] ** 2
-    if np.std(flow) > SPREAD_NEEDED * np.mean(flow):
-        scale = np.mean(flow)
-        design = np.column_stack([np.ones_like(flow), flow / scale, (flow / scale) ** 2])
-
-        def curve(rows: Integers) -> Floats:
-            fitted: Floats = np.linalg.lstsq(design[rows], head[rows], rcond=None)[0] / scale ** np.arange(3)
-            return fitted
-
-        values, low, high = _bootstrap(curve, runs, rng)
-        return [
-            Estimate(name=name, unit=unit, value=values[k], interval=(low[k], high[k]))
-            for k, (name, unit) in enumerate(names)
-        ]
-    rest = head - c1 * flow - c2 * flow**2
-    values, low, high = _bootstrap(_mean_of(rest), runs, rng)
+    if is_spread(flow):
+        return polynomial_estimated(parameters, flow, head, runs, rng)
     reason = f"the flow varies by {np.std(flow) / np.mean(flow):.1%} only: one point of the curve, no slope"
-    return [
-        Estimate(name=names[0][0], unit="m", value=values[0], interval=(low[0], high[0])),
-        *(_kept(name, unit, value, reason) for (name, unit), value in zip(names[1:], (c1, c2), strict=True)),
-    ]
+    offset = mean_estimated(parameters[0], head - c1 * flow - c2 * flow**2, runs, rng)
+    return offset + [parameter.kept(reason) for parameter in parameters[1:]]
 
 
 def _system_curve(points: SteadyPoints, station: Station, rng: np.random.Generator) -> list[Estimate]:
     main = station.rising_main
-    total = points.total_flow_m3h if main.layout == "common" else points.flow_m3h
+    head = Estimate(name="rising_main.static_head_m", unit="m", value=main.static_head_m)
+    friction = Estimate(name="rising_main.friction_h2_m5", unit="h²/m⁵", value=main.friction_h2_m5)
     if np.unique(points.run).size < MIN_RUNS:
-        reason = "too few runs with steady flow and head"
-        return [
-            _kept("rising_main.static_head_m", "m", main.static_head_m, reason),
-            _kept("rising_main.friction_h2_m5", "h²/m⁵", main.friction_h2_m5, reason),
-        ]
-    squared = total**2
-    if np.std(squared) > SPREAD_NEEDED * np.mean(squared):
-        scale = np.mean(squared)
-        design = np.column_stack([np.ones_like(squared), squared / scale])
-
-        def curve(rows: Integers) -> Floats:
-            fitted: Floats = np.linalg.lstsq(design[rows], points.head_m[rows], rcond=None)[0] / [1.0, scale]
-            return fitted
-
-        values, low, high = _bootstrap(curve, points.run, rng)
-        return [
-            Estimate(name="rising_main.static_head_m", unit="m", value=values[0], interval=(low[0], high[0])),
-            Estimate(name="rising_main.friction_h2_m5", unit="h²/m⁵", value=values[1], interval=(low[1], high[1])),
-        ]
-    friction = (points.head_m - main.static_head_m) / squared
-    values, low, high = _bootstrap(_mean_of(friction), points.run, rng)
+        return [parameter.kept("too few runs with steady flow and head") for parameter in (head, friction)]
+    squared = (points.total_flow_m3h if main.layout == "common" else points.flow_m3h) ** 2
+    if is_spread(squared):
+        return polynomial_estimated([head, friction], squared, points.head_m, points.run, rng)
     reason = "one operating point: static head and friction cannot be told apart, the static head is kept"
-    return [
-        _kept("rising_main.static_head_m", "m", main.static_head_m, reason),
-        Estimate(name="rising_main.friction_h2_m5", unit="h²/m⁵", value=values[0], interval=(low[0], high[0])),
-    ]
+    rest = (points.head_m - main.static_head_m) / squared
+    return [head.kept(reason), *mean_estimated(friction, rest, points.run, rng)]
 
 
-def _area(recording: Recording, station: Station, rng: np.random.Generator) -> Estimate:
+def _area(recording: Recording, station: Station, rng: np.random.Generator) -> list[Estimate]:
     """Area from the change of the level's slope when pumps start and stop: A Δ(dL/dt) = −Δ(ΣQ), inflow unchanged."""
-    name, unit, configured = "sump.area_m2", "m²", station.sump.area_m2
+    parameter = Estimate(name="sump.area_m2", unit="m²", value=station.sump.area_m2)
     if station.sump.profile is not None:
-        return _kept(name, unit, configured, "the file gives a profile")
+        return [parameter.kept("the file gives a profile")]
     pumps = len(station.pump)
     running = running_flags(recording, pumps)
     flow_m3h = recording.of_pumps("flow_m3h", pumps)
@@ -162,15 +126,14 @@ def _area(recording: Recording, station: Station, rng: np.random.Generator) -> E
             slopes.append(sides[1][0] - sides[0][0])
             flows.append(sides[1][1] - sides[0][1])
     if len(slopes) < MIN_RUNS:
-        return _kept(name, unit, configured, f"{len(slopes)} switches with a calm minute on both sides")
+        return [parameter.kept(f"{len(slopes)} switches with a calm minute on both sides")]
     change_m_h, change_m3h = np.array(slopes), np.array(flows)
 
     def area(rows: Integers) -> Floats:
         """Slopes carry the noise, flows hardly any: regress slopes on flows."""
         return np.array([-np.sum(change_m3h[rows] ** 2) / np.sum(change_m3h[rows] * change_m_h[rows])])
 
-    values, low, high = _bootstrap(area, np.arange(change_m_h.size), rng)
-    return Estimate(name=name, unit=unit, value=values[0], interval=(low[0], high[0]))
+    return estimated([parameter], area, np.arange(change_m_h.size), rng)
 
 
 def _levels(recording: Recording, station: Station, rng: np.random.Generator) -> list[Estimate]:
@@ -189,26 +152,24 @@ def _levels(recording: Recording, station: Station, rng: np.random.Generator) ->
         ("stop", falling, station.control.stop_levels_m),
     ):
         for n, level in enumerate(configured, start=1):
-            name = f"control.{kind}_levels_m[{n}]"
+            parameter = Estimate(name=f"control.{kind}_levels_m[{n}]", unit="m", value=level)
             rows = np.flatnonzero(events.any(axis=0))
             others = running[:, rows].sum(axis=0) - (kind == "stop")
             seen = level_m[rows[others == n - 1]]
             seen = seen[np.isfinite(seen)]
             if seen.size < MIN_RUNS:
-                estimates.append(_kept(name, "m", level, f"{seen.size} such events"))
+                estimates.append(parameter.kept(f"{seen.size} such events"))
                 continue
-            rate_m = np.median(np.abs(np.diff(level_m[np.isfinite(level_m)]))) / 2.0
+            rate_m = float(np.median(np.abs(np.diff(level_m[np.isfinite(level_m)]))) / 2.0)
             offset_m = -rate_m if kind == "start" else rate_m
-            values, low, high = _bootstrap(_mean_of(seen + offset_m), np.arange(seen.size), rng)
-            estimates.append(
-                Estimate(
-                    name=name, unit="m", value=values[0], interval=(low[0] - float(rate_m), high[0] + float(rate_m))
-                )
-            )
+            (mean,) = mean_estimated(parameter, seen + offset_m, np.arange(seen.size), rng)
+            low_m, high_m = mean.interval or (mean.value, mean.value)
+            estimates.append(replace(mean, interval=(low_m - rate_m, high_m + rate_m)))
     return estimates
 
 
-def _ramp(recording: Recording, station: Station, rng: np.random.Generator) -> Estimate:
+def _ramp(recording: Recording, station: Station, rng: np.random.Generator) -> list[Estimate]:
+    parameter = Estimate(name="control.ramp_s", unit="s", value=station.control.ramp_s)
     times_s = []
     for i, pump in enumerate(station.pump, start=1):
         frequency_hz = recording.column(pump_column(i, "frequency_hz"))
@@ -217,32 +178,9 @@ def _ramp(recording: Recording, station: Station, rng: np.random.Generator) -> E
         inner = (rate > 0) & (frequency_hz[:-1] > 0) & (frequency_hz[1:] < 0.99 * pump.nominal_frequency_hz)
         times_s += (pump.nominal_frequency_hz / rate[inner]).tolist()
     if len(times_s) < MIN_RUNS:
-        return _kept("control.ramp_s", "s", station.control.ramp_s, "no frequency in the recording rises in steps")
+        return [parameter.kept("no frequency in the recording rises in steps")]
     seen = np.array(times_s)
-    values, low, high = _bootstrap(lambda rows: np.array([np.median(seen[rows])]), np.arange(seen.size), rng)
-    return Estimate(name="control.ramp_s", unit="s", value=values[0], interval=(low[0], high[0]))
-
-
-def _mean_of(values: Floats) -> Callable[[Integers], Floats]:
-    return lambda rows: np.array([values[rows].mean()])
-
-
-def _kept(name: str, unit: str, value: float, reason: str) -> Estimate:
-    return Estimate(name=name, unit=unit, value=value, interval=None, reason=reason)
-
-
-def _bootstrap(
-    estimate: Callable[[Integers], Floats], groups: Integers, rng: np.random.Generator
-) -> tuple[list[float], list[float], list[float]]:
-    """Estimate on all rows, and its percentile interval under resampling of whole groups."""
-    members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
-    value = estimate(np.arange(groups.size))
-    drawn = [
-        estimate(np.concatenate([members[k] for k in rng.integers(0, len(members), len(members))]))
-        for _ in range(RESAMPLES)
-    ]
-    low, high = np.quantile(np.array(drawn), [(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0], axis=0)
-    return value.tolist(), low.tolist(), high.tolist()
+    return estimated([parameter], lambda rows: np.array([np.median(seen[rows])]), np.arange(seen.size), rng)
 
 
 def with_estimates(station: Station, estimates: Sequence[Estimate]) -> Station:

@@ -20,18 +20,16 @@ RAMP_STEP = 0.005
 class SteadyPoints:
     """Means over segments in which nothing was switched, (n,) each.
 
-    `run` numbers the pump runs, so that all segments of one can be drawn together; `pump` counts from 0; `running` is
-    the number of pumps on; `speed_ratio` is frequency over nominal frequency.
+    `run` numbers the pump runs, so that all segments of one can be drawn together; `pump` counts from 0;
+    `speed_ratio` is frequency over nominal frequency.
     """
 
     run: Integers
     pump: Integers
-    running: Integers
     flow_m3h: Floats
     total_flow_m3h: Floats
     head_m: Floats
     speed_ratio: Floats
-    level_m: Floats
 
 
 def running_flags(recording: Recording, pumps: int) -> Flags:
@@ -53,46 +51,29 @@ def steady_points(recording: Recording, station: Station) -> SteadyPoints:
     segment = ((since_s - WARM_UP_S) // SEGMENT_S).astype(np.int64)
     flow_m3h = recording.of_pumps("flow_m3h", pumps)
     total_m3h = np.where(running, flow_m3h, 0.0).sum(axis=0)
-    columns: list[list[Floats]] = [[] for _ in range(8)]
+    parts: list[dict[str, Floats]] = []
     for pump in range(pumps):
         run = np.cumsum(np.diff(running[pump], prepend=False) & running[pump])
         ratio = recording.column(pump_column(pump + 1, "frequency_hz")) / station.pump[pump].nominal_frequency_hz
         steps = np.abs(np.diff(ratio, prepend=ratio[:1], append=ratio[-1:]))
         is_level = np.maximum(steps[1:], steps[:-1]) < RAMP_STEP
         head_m = recording.column(pump_column(pump + 1, "head_m"))
-        level_m = np.nan_to_num(recording.column("level_m"), nan=0.0)
         usable = running[pump] & is_level & (segment >= 0) & np.isfinite(flow_m3h[pump] + head_m + ratio + total_m3h)
         key = period[usable] * 100_000 + segment[usable]
-        _, first, where, counts = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+        _, where, counts = np.unique(key, return_inverse=True, return_counts=True)
         whole = (
             counts >= 0.8 * SEGMENT_S / max(float(np.median(np.diff(time_s))), 1.0) if time_s.size > 1 else counts > 0
         )
-        for target, values in zip(
-            columns,
-            (
-                run * pumps + pump,
-                np.full(time_s.size, pump),
-                running.sum(axis=0),
-                flow_m3h[pump],
-                total_m3h,
-                head_m,
-                ratio,
-                level_m,
-            ),
-            strict=True,
-        ):
-            means = np.bincount(where, weights=values[usable].astype(float), minlength=first.size) / np.maximum(
-                counts, 1
-            )
-            target.append(means[whole])
-    runs, numbers, on, flows, totals, heads, ratios, levels = (np.concatenate(column) for column in columns)
-    return SteadyPoints(
-        run=np.rint(runs).astype(np.int64),
-        pump=np.rint(numbers).astype(np.int64),
-        running=np.rint(on).astype(np.int64),
-        flow_m3h=flows,
-        total_flow_m3h=totals,
-        head_m=heads,
-        speed_ratio=ratios,
-        level_m=levels,
-    )
+        rows = {
+            "run": run * pumps + pump,
+            "pump": np.full(time_s.size, pump),
+            "flow_m3h": flow_m3h[pump],
+            "total_flow_m3h": total_m3h,
+            "head_m": head_m,
+            "speed_ratio": ratio,
+        }
+        sums = {name: np.bincount(where, values[usable].astype(float), counts.size) for name, values in rows.items()}
+        parts.append({name: (values / np.maximum(counts, 1))[whole] for name, values in sums.items()})
+    means = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    numbers = {name: np.rint(means.pop(name)).astype(np.int64) for name in ("run", "pump")}
+    return SteadyPoints(**numbers, **means)

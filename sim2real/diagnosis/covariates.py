@@ -14,7 +14,7 @@ POINTS = 1500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Covariate:
-    """A covariate at the held-out bins of one signal, with the residuals there before and after."""
+    """A covariate at the bins of the validation of one signal, with the residuals there before and after."""
 
     name: str
     values: Floats
@@ -31,7 +31,7 @@ def best_covariate(diagnosis: Diagnosis, signal: int) -> Covariate:
         Index into `SIGNALS`.
     """
     bins, found, traces = diagnosis.bins, diagnosis.attribution, diagnosis.traces
-    rows = np.flatnonzero(found.held & (bins.signal == signal) & (np.abs(found.plain) + bins.floor > 0.1))
+    rows = np.flatnonzero(found.validation & (bins.signal == signal) & (np.abs(found.plain) + bins.floor > 0.1))
     rows = rows[:: max(rows.size // POINTS, 1)]
     second = bins.second[rows]
     level_m = filled(traces.level_m, traces.seconds, 0.0)
@@ -46,8 +46,7 @@ def best_covariate(diagnosis: Diagnosis, signal: int) -> Covariate:
     }
     before = found.plain[rows]
     name = max(choices, key=lambda key: _explained(choices[key], before))
-    after = before if found.accepted is None else found.accepted.residuals[rows]
-    return Covariate(name=name, values=choices[name], before=before, after=after)
+    return Covariate(name=name, values=choices[name], before=before, after=found.after[rows])
 
 
 def _smooth(values: Floats) -> Floats:

@@ -12,7 +12,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.effects import effective_parameters
 
-MOST_S = 86_400
+MOST_JUDGED_S = 86_400
 """Of a longer recording the first part is judged. [s]"""
 
 
@@ -46,7 +46,7 @@ def false_verdicts(recording: Recording, before: Station, after: Station) -> Fal
     The detector learns the offsets of the first hours, so that a constant effect makes hardly any difference to it.
     """
     seen = without_truth(_first_part(recording))
-    old, new = _nominal(before), _nominal(after)
+    old, new = _datasheet(before), _datasheet(after)
     verdicts, faults = _judged(seen, before.name, old)
     again = faults if new == old else _judged(seen, before.name, new)[1]
     days = float(seen.time_ns[-1] - seen.time_ns[0]) / NS_PER_S / 86_400.0
@@ -61,7 +61,7 @@ def _judged(recording: Recording, name: str, datasheet: Datasheet) -> tuple[int,
     return len(verdicts), sum(verdict.state in FAULTS for verdict in verdicts)
 
 
-def _nominal(station: Station) -> Datasheet:
+def _datasheet(station: Station) -> Datasheet:
     """Curves of a station under its effects."""
     plant = effective_parameters(station)
     return replace(
@@ -74,7 +74,7 @@ def _nominal(station: Station) -> Datasheet:
 
 
 def _first_part(recording: Recording) -> Recording:
-    rows = slice(0, int(np.searchsorted(recording.time_ns, recording.time_ns[0] + MOST_S * NS_PER_S)))
+    rows = slice(0, int(np.searchsorted(recording.time_ns, recording.time_ns[0] + MOST_JUDGED_S * NS_PER_S)))
     return replace(
         recording,
         time_ns=recording.time_ns[rows],

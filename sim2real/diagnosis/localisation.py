@@ -19,7 +19,7 @@ from wetwell.sim2real.residuals.bins import (
 from wetwell.simulator.effects.effect import Component
 from wetwell.simulator.plant import PlantParameters
 
-BLOCKS = 12
+DRIFT_BLOCKS = 12
 STRAIGHT = 0.8
 """Share of the scatter of blocks that a straight line explains; 0.6 for a sine of one period."""
 GROWN = 3.0
@@ -34,7 +34,7 @@ ALONE = 0.7
 """Share of the gap from which it is in one kind of signal alone."""
 
 
-def culprit(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters) -> Component:
+def localise(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters) -> Component:
     """Component that is held responsible.
 
     Flow and head that move along the pump curve say that the main has changed, along the system curve the pump (in
@@ -72,11 +72,11 @@ def culprit(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameter
 def _drifts(residuals: Floats, bins: Bins) -> bool:
     """Whether the power runs away in a straight line: a meter does, a supply swings."""
     rows = (bins.signal == POWER) & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
-    if rows.sum() < BLOCKS:
+    if rows.sum() < DRIFT_BLOCKS:
         return False
     order = np.argsort(bins.second[rows], kind="stable")
-    means = np.array([part.mean() for part in np.array_split(residuals[rows][order], BLOCKS)])
-    return bool(np.corrcoef(means, np.arange(BLOCKS))[0, 1] ** 2 > STRAIGHT)
+    means = np.array([part.mean() for part in np.array_split(residuals[rows][order], DRIFT_BLOCKS)])
+    return bool(np.corrcoef(means, np.arange(DRIFT_BLOCKS))[0, 1] ** 2 > STRAIGHT)
 
 
 def _wanders(residuals: Floats, bins: Bins, calm: Flags) -> bool:
@@ -90,7 +90,7 @@ def _wanders(residuals: Floats, bins: Bins, calm: Flags) -> bool:
     slope = np.diff(error_m) / np.maximum(np.diff(second), 1) + (error_m[1:] + error_m[:-1]) / 2.0 / LEVEL_TIME_S
     is_next = (np.diff(second) <= NEAR_S) & (np.diff(bins.regime[rows]) == 0)
     together = is_next[:-2] & is_next[1:-1] & is_next[2:]
-    if together.sum() < BLOCKS:
+    if together.sum() < DRIFT_BLOCKS:
         return False
     noise_m2 = bins.floor[rows] * bins.deviation[rows] ** 2
     noise = (noise_m2[1:] + noise_m2[:-1]) / np.maximum(np.diff(second), 1) ** 2

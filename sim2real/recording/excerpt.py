@@ -7,8 +7,8 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.recording.traces import Traces
 
-MOST_S = 172_800
-WINDOW_S = 14_400
+MOST_DIAGNOSED_S = 172_800
+PART_S = 14_400
 SEARCHED_S = 3_600
 """How far the edge of a part is moved to a second in which no pump runs."""
 BLANK_S = 330
@@ -16,7 +16,7 @@ BLANK_S = 330
 GOLDEN = 0.6180339887498949
 
 
-def excerpt(traces: Traces, most_s: int = MOST_S) -> Traces:
+def excerpt(traces: Traces, most_s: int = MOST_DIAGNOSED_S) -> Traces:
     """Traces of at most about `most_s`: whole ones, or parts of four hours each, one after the other.
 
     The recording is split into as many stretches as there are parts; where in its stretch a part lies goes by the
@@ -30,14 +30,14 @@ def excerpt(traces: Traces, most_s: int = MOST_S) -> Traces:
     """
     if traces.seconds <= most_s:
         return traces
-    count = max(most_s // WINDOW_S, 1)
+    count = max(most_s // PART_S, 1)
     stretch_s = traces.seconds / count
     idle = np.flatnonzero(~np.any(traces.frequency_hz > 0.0, axis=0))
     parts, last = [], 0
     for k in range(count):
-        begin = round(k * stretch_s + (k * GOLDEN % 1.0) * (stretch_s - WINDOW_S))
+        begin = round(k * stretch_s + (k * GOLDEN % 1.0) * (stretch_s - PART_S))
         first = max(_near(idle, begin), last)
-        last = max(min(_near(idle, begin + WINDOW_S) + 1, traces.seconds), first)
+        last = max(min(_near(idle, begin + PART_S) + 1, traces.seconds), first)
         parts.append(np.arange(first, last))
     return _of_rows(traces, parts)
 

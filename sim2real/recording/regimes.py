@@ -37,7 +37,7 @@ class Regimes:
     of_station : (n,) array
         Index into `REGIMES`.
     of_pumps : (pumps, n) array
-        The same of each pump; `IDLE` also where it stands and others run.
+        Index into `REGIMES` of each pump; `IDLE` also where it stands and others run.
     cycle : (n,) array
         Counts up with every start of a pump while all others stand.
     events : tuple of Event

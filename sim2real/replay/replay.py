@@ -21,7 +21,7 @@ LEVEL_TIME_S = 150.0
 FIRST = 5
 """Values of the level from which the observer begins."""
 UNKNOWN_INFLOW_TIME_S = 300.0
-"""The same where the inflow has to be followed too."""
+"""Time constant with which it follows where the inflow has to be followed too."""
 KEPT_RUNS = 3
 """Runs that are kept: what only the telemetry or the controller does differently is not computed again."""
 

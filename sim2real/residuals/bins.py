@@ -1,16 +1,20 @@
 """Where residuals are taken: means over short bins, one signal, pump, regime and cycle each."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.sim2real.recording.regimes import REGIMES
 
 Signal = Literal["flow", "head", "power", "level", "start_level", "stop_level", "telemetry"]
 SIGNALS: tuple[Signal, ...] = get_args(Signal)
 FLOW, HEAD, POWER, LEVEL, START_LEVEL, STOP_LEVEL, TELEMETRY = range(7)
 NO_PUMP = -1
+MIN_BINS = 12
+"""Bins without which a cell, a signal in a regime, says nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +47,14 @@ class Bins:
         """Number of bins."""
         return self.signal.size
 
+    def cells(self, rows: Flags, signals: Iterable[int] = range(len(SIGNALS))) -> Iterator[tuple[int, int, Flags]]:
+        """Signal, regime and rows of each cell in which enough of these rows lie."""
+        for signal in signals:
+            for regime in range(len(REGIMES)):
+                cell = rows & (self.signal == signal) & (self.regime == regime)
+                if cell.sum() >= MIN_BINS:
+                    yield signal, regime, cell
+
 
 def joined(parts: list[Bins]) -> Bins:
     """Bins one after the other."""
@@ -71,6 +83,29 @@ class Seconds:
         """(bins,) value of the first second of each bin."""
         begins = np.r_[True, self.bin[1:] != self.bin[:-1]] if self.bin.size else np.zeros(0, dtype=bool)
         return values[self.second[begins]]
+
+    def bins(
+        self,
+        signal: int,
+        pump: int,
+        regime: Integers,
+        cycle: Integers,
+        *,
+        deviation: Floats,
+        floor: Floats,
+        tolerance: Floats,
+    ) -> Bins:
+        """Bins of one signal of one pump, or of the station; regime and cycle are those of (n,) seconds."""
+        return Bins(
+            signal=np.full(self.counts.size, signal),
+            regime=self.first(regime),
+            cycle=self.first(cycle),
+            pump=np.full(self.counts.size, pump),
+            second=self.first(np.arange(regime.size)),
+            deviation=deviation,
+            floor=floor,
+            tolerance=tolerance,
+        )
 
 
 def binned(counted: Flags, key: Integers, length_s: Integers) -> Seconds:

@@ -18,7 +18,7 @@ from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.telemetry.channels import channels_of
 
 WINDOW_S = 30
-MIN_POINTS = 8
+MIN_LEVELS = 8
 SCAN_S = 1.0
 NEVER_S = 10**6
 """Since the event before the first one."""
@@ -45,15 +45,17 @@ class Stretches:
 
         Where too few values are left the line of the unshifted stretch is gone on with.
         """
-        level_m, slope_m_s = self._fitted(0)
         if shift_s == 0.0:
-            return level_m, slope_m_s
+            return self._fitted(0)
         whole = int(np.floor(shift_s))
         share = shift_s - whole
         near = self._fitted(whole)
         far = self._fitted(whole + 1) if share > 0.0 else near
         shifted_m, shifted_m_s = ((1.0 - share) * a + share * b for a, b in zip(near, far, strict=True))
         is_known = np.isfinite(shifted_m)
+        if is_known.all():
+            return shifted_m, shifted_m_s
+        level_m, slope_m_s = self._fitted(0)
         level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
         return level_m, np.where(is_known, shifted_m_s, slope_m_s)
 
@@ -62,7 +64,7 @@ class Stretches:
         values_m = self.level_m[np.clip(place, 0, self.level_m.size - 1)]
         is_known = self.is_counted & (place >= 0) & (place < self.level_m.size) & np.isfinite(values_m)
         count = is_known.sum(axis=1)
-        enough = np.where(count >= MIN_POINTS, count, np.nan)  # NaN is "no line"
+        enough = np.where(count >= MIN_LEVELS, count, np.nan)  # NaN is "no line"
         time_s, values_m = (
             np.where(is_known, self.counted - self.second[:, None], 0),
             np.where(is_known, values_m, 0.0),
@@ -74,7 +76,7 @@ class Stretches:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EventMisfit:
+class EventResiduals:
     """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0.
 
     `since_s` is the time since the event before.
@@ -87,7 +89,7 @@ class EventMisfit:
     noise_m: float
     pattern: Pattern | None
 
-    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
+    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
         """(events,) level that the controller saw, minus its threshold, over the standard deviation.
 
         A late level shows afterwards what the controller saw; under a late frequency the event was before its record.
@@ -115,7 +117,7 @@ class EventMisfit:
         return np.asarray(error_m / self.bins.deviation, dtype=np.float64)
 
 
-def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pattern | None) -> EventMisfit:
+def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern: Pattern | None) -> EventResiduals:
     """Of every start and stop that follows a straight stretch of the level."""
     noise_m = level_noise_m(traces, station)
     events: list[Event] = []
@@ -142,7 +144,7 @@ def event_misfit(traces: Traces, station: Station, regimes: Regimes, pattern: Pa
     slope_m_s = stretches.lines()[1]
     early_m = noise_m * _earliness(np.abs(slope_m_s) / noise_m)
     deviation = np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2)
-    return EventMisfit(
+    return EventResiduals(
         bins=Bins(
             signal=np.where(sign > 0, START_LEVEL, STOP_LEVEL),
             regime=regimes.of_station[second],

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import AnalogueQuantity
+from wetwell.protocols.station.station_file import Sensors
 
-SEGMENT_S = 20
-MIN_SEGMENTS = 8
-MIN_POINTS = 5
+BLOCK_S = 20
+MIN_VALUES = 8
+MIN_BLOCKS = 5
 GAUSSIAN_MAD = 0.6745
 MOST = 1.5
 """Noise over the configured one, beyond which it is taken for a gap."""
@@ -25,6 +27,17 @@ class Noise:
         """Standard deviation of means over `count` seconds."""
         fast = max(self.single**2 - self.slow**2, 0.0)
         return np.asarray(np.sqrt(fast / np.maximum(count, 1.0) + self.slow**2), dtype=np.float64)
+
+
+def configured_noise(sensors: Sensors) -> dict[AnalogueQuantity, float]:
+    """Noise of each quantity by the station file: of the level in m, of the others as a share of the reading."""
+    return {
+        "level_m": sensors.level_noise_m,
+        "inflow_m3h": sensors.inflow_noise,
+        "flow_m3h": sensors.flow_noise,
+        "head_m": sensors.head_noise,
+        "power_kw": sensors.power_noise,
+    }
 
 
 def noise_of(stretches: list[Floats], configured: float, tolerance: float) -> Noise:
@@ -50,28 +63,28 @@ def noise_of(stretches: list[Floats], configured: float, tolerance: float) -> No
         return Noise(single=float(np.hypot(configured, tolerance)), slow=tolerance)
     most = MOST * configured if configured > 0.0 else np.inf
     single = min(max(fine, spread if np.isfinite(spread) else 0.0, 0.5 * configured), most)
-    slow = min(max(moved**2 - fine**2 / SEGMENT_S, 0.0), (most / MOST) ** 2) if np.isfinite(moved) else 0.0
+    slow = min(max(moved**2 - fine**2 / BLOCK_S, 0.0), (most / MOST) ** 2) if np.isfinite(moved) else 0.0
     return Noise(single=float(np.hypot(single, tolerance)), slow=float(np.sqrt(slow + tolerance**2)))
 
 
 def _robust_sd(pieces: list[Floats], gain: float) -> float:
     values = np.concatenate(pieces) if pieces else np.zeros(0)
     values = values[np.isfinite(values)]
-    if values.size < MIN_SEGMENTS:
+    if values.size < MIN_VALUES:
         return float("nan")
     return float(np.median(np.abs(values)) / GAUSSIAN_MAD / gain)
 
 
 def _means(values: Floats) -> Floats:
-    count = values.size // SEGMENT_S
-    blocks = values[: count * SEGMENT_S].reshape(count, SEGMENT_S)
+    count = values.size // BLOCK_S
+    blocks = values[: count * BLOCK_S].reshape(count, BLOCK_S)
     known = np.isfinite(blocks)
     sums = np.where(known, blocks, 0.0).sum(axis=1)
-    return np.where(known.sum(axis=1) > SEGMENT_S // 2, sums / np.maximum(known.sum(axis=1), 1), np.nan)
+    return np.where(known.sum(axis=1) > BLOCK_S // 2, sums / np.maximum(known.sum(axis=1), 1), np.nan)
 
 
 def _without_line(values: Floats) -> Floats:
     known = np.flatnonzero(np.isfinite(values))
-    if known.size < MIN_POINTS:
+    if known.size < MIN_BLOCKS:
         return np.zeros(0)
     return np.asarray(values[known] - np.polyval(np.polyfit(known, values[known], 1), known), dtype=np.float64)

@@ -13,22 +13,22 @@ from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STE
 from wetwell.sim2real.recording.traces import Traces, repeated
 from wetwell.sim2real.replay.replay import LEVEL_TIME_S, UNKNOWN_INFLOW_TIME_S, Prediction
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
-from wetwell.sim2real.residuals.noise import Noise, noise_of
+from wetwell.sim2real.residuals.noise import GAUSSIAN_MAD, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.plant import PlantParameters
 from wetwell.simulator.telemetry.channels import channels_of
 
-SIGNAL_OF: dict[str, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
+SIGNAL_OF: dict[AnalogueQuantity, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
 STEADY_BIN_S = 20
 IDLE_LEVEL_BIN_S = 30
 RAMP_LEVEL_BIN_S = 5
 TOLERANCE = 0.0025
 """Share by which a right model may be off: the fit of a curve, the length of a step."""
-FLOOR = 0.005
-"""The same near zero, as a share of the rated value."""
+ZERO_TOLERANCE = 0.005
+"""Share of the rated value by which a right model may be off near zero."""
 TIMING_S = 0.2
 """Skew between signals that is nobody's fault: a scan takes its time."""
-STEP = 0.3
+UNRESOLVED_STEP = 0.3
 """Change of a pump's speed from one second to the next, as a share of nominal, that a recording does not resolve."""
 UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
 """Share of a jump of a signal that is open then, and in the seconds after: it began somewhere within a second."""
@@ -40,7 +40,7 @@ QUANTUM_SHARE = 0.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SignalMisfit:
+class SignalResiduals:
     """Residuals of one signal of one pump, or of the level."""
 
     bins: Bins
@@ -51,7 +51,7 @@ class SignalMisfit:
     is_repeated: Flags
     pattern: Pattern | None
 
-    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:
+    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:
         """(bins,) means of recorded minus predicted, over their standard deviation.
 
         Where the telemetry holds or rounds values, only what that cannot explain counts; in ramps, only what differs
@@ -77,13 +77,13 @@ def _channel(plant: PlantParameters, name: AnalogueQuantity, pump: int) -> int:
     return channels_of(name, plant.nominal_frequency_hz.size, None if pump == NO_PUMP else pump + 1)[0]
 
 
-def pump_misfits(
+def pump_residuals(
     traces: Traces,
     station: Station,
     regimes: Regimes,
     plain: Prediction,
     patterns: Mapping[AnalogueQuantity, Pattern],
-) -> list[SignalMisfit]:
+) -> list[SignalResiduals]:
     """Of every measured signal of every pump.
 
     Parameters
@@ -91,24 +91,18 @@ def pump_misfits(
     plain : Prediction
         Of the station as it is: what the noise is relative to, the same for every candidate.
     """
-    configured = {
-        "flow_m3h": station.sensors.flow_noise,
-        "head_m": station.sensors.head_noise,
-        "power_kw": station.sensors.power_noise,
-    }
+    configured = configured_noise(station.sensors)
     is_step = _steps(traces, plain)
-    misfits = []
+    found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
         noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
         for pump in range(traces.pumps):
             open_ = _unresolved(expected[pump], is_step)
-            misfit = _pump_misfit(
-                name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(name)
-            )
-            if misfit is not None:
-                misfits.append(misfit)
-    return misfits
+            one = _one_pump(name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(name))
+            if one is not None:
+                found.append(one)
+    return found
 
 
 def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list[Floats]:
@@ -128,7 +122,7 @@ def _steps(traces: Traces, plain: Prediction) -> Flags:
     """(n,) whether a pump is switched faster than a recording of each second shows."""
     nominal_hz = plain.plant.nominal_frequency_hz[:, None]
     moved = np.abs(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1])) / nominal_hz
-    return np.asarray(np.any(moved > STEP, axis=0))
+    return np.asarray(np.any(moved > UNRESOLVED_STEP, axis=0))
 
 
 def _unresolved(expected: Floats, is_step: Flags) -> Floats:
@@ -137,8 +131,8 @@ def _unresolved(expected: Floats, is_step: Flags) -> Floats:
     return np.asarray(np.convolve(jumps, UNRESOLVED)[: expected.size], dtype=np.float64)
 
 
-def _pump_misfit(
-    name: str,
+def _one_pump(
+    name: AnalogueQuantity,
     pump: int,
     recorded: Floats,
     expected: Floats,
@@ -146,7 +140,7 @@ def _pump_misfit(
     regimes: Regimes,
     noise: Noise,
     pattern: Pattern | None,
-) -> SignalMisfit | None:
+) -> SignalResiduals | None:
     regime = regimes.of_pumps[pump]
     counted = np.isfinite(recorded) & (regime != IDLE)
     if not counted.any():
@@ -160,19 +154,18 @@ def _pump_misfit(
     size = np.abs(np.where(counted, recorded, 0.0))
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
     late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
-    deviation = np.sqrt(noise_alone**2 + (FLOOR * rated) ** 2 / np.maximum(seconds.counts, 4.0) + late**2)
-    return SignalMisfit(
-        bins=Bins(
-            signal=np.full(seconds.counts.size, SIGNAL_OF[name]),
-            regime=seconds.first(regime),
-            cycle=seconds.first(regimes.cycle),
-            pump=np.full(seconds.counts.size, pump),
-            second=seconds.first(np.arange(regime.size)),
+    deviation = np.sqrt(noise_alone**2 + (ZERO_TOLERANCE * rated) ** 2 / np.maximum(seconds.counts, 4.0) + late**2)
+    return SignalResiduals(
+        bins=seconds.bins(
+            SIGNAL_OF[name],
+            pump,
+            regime,
+            regimes.cycle,
             deviation=deviation,
             floor=(noise_alone / deviation) ** 2,
             tolerance=np.hypot(TOLERANCE * seconds.means(size), late) / deviation,
         ),
-        name=name,  # type: ignore[arg-type]
+        name=name,
         pump=pump,
         seconds=seconds,
         recorded=recorded[seconds.second],
@@ -181,13 +174,13 @@ def _pump_misfit(
     )
 
 
-def level_misfit(
+def level_residuals(
     traces: Traces,
     station: Station,
     regimes: Regimes,
     plain: Prediction,
     patterns: Mapping[AnalogueQuantity, Pattern],
-) -> SignalMisfit:
+) -> SignalResiduals:
     """Of the level."""
     counted = np.isfinite(traces.level_m)
     regime = regimes.of_station
@@ -205,14 +198,13 @@ def level_misfit(
     if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know
         error_m = np.abs(seconds.means_of(traces.level_m[seconds.second] - plain.level_m[seconds.second]))
         is_idle = seconds.first(regime) == IDLE
-        balance_m = np.hypot(balance_m, np.median(error_m[is_idle]) / 0.6745 if is_idle.any() else 0.0)
-    return SignalMisfit(
-        bins=Bins(
-            signal=np.full(seconds.counts.size, LEVEL),
-            regime=seconds.first(regime),
-            cycle=seconds.first(regimes.cycle),
-            pump=np.full(seconds.counts.size, NO_PUMP),
-            second=seconds.first(np.arange(regime.size)),
+        balance_m = np.hypot(balance_m, np.median(error_m[is_idle]) / GAUSSIAN_MAD if is_idle.any() else 0.0)
+    return SignalResiduals(
+        bins=seconds.bins(
+            LEVEL,
+            NO_PUMP,
+            regime,
+            regimes.cycle,
             deviation=np.sqrt(noise_m2 + balance_m**2),
             floor=noise_m2 / (noise_m2 + balance_m**2),
             tolerance=balance_m / np.sqrt(noise_m2 + balance_m**2),
@@ -230,5 +222,5 @@ def level_noise_m(traces: Traces, station: Station) -> float:
     """Standard deviation of the level sensor's noise. [m]."""
     bends = np.diff(traces.level_m, n=2)
     bends = np.abs(bends[np.isfinite(bends)])
-    seen_m = float(np.median(bends)) / 0.6745 / np.sqrt(6.0) if bends.size else 0.0
+    seen_m = float(np.median(bends)) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
     return max(seen_m, 0.5 * station.sensors.level_noise_m, 1e-4)

@@ -11,6 +11,7 @@ from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Re
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
+from wetwell.sim2real.residuals.noise import configured_noise
 from wetwell.simulator.telemetry.channels import channels_of
 
 MIN_MOVES, FEWEST = 30, 10
@@ -20,7 +21,7 @@ SMALL = 0.1
 HELD_SHARE = 0.15
 """Share of repeated values from which a channel counts as held; noise repeats nothing."""
 NEARLY_ALL = 0.9
-"""The same where moves are too few, or most too long after another, to have an edge of their sizes."""
+"""Share from which it counts as held where moves are too few, or too far apart, to have an edge of their sizes."""
 DEAD_ZONE = 0.35
 """Small moves over the median one; 0.19 for noise. Small: one in ten is smaller, such as those sent after a time."""
 EDGE = 1.5
@@ -29,12 +30,12 @@ FEW = 0.005
 """Share of moves that may be smaller than the deadband: values that were lost, or sent twice."""
 OFTEN_S = 60
 """A value that is held for less was not sent because its time was up."""
-SEEN = (0.97, 1.03)
+SEEN_SHARES = (0.97, 1.03)
 """Shares of a deadband that was seen between which it may be: in noise or slow moves."""
 IN_RAMPS = (0.1, 1.4)
-"""The same in the steps of ramps, of which the smallest may be far over it."""
+"""Shares between which a deadband may be that was seen in the steps of ramps, whose smallest may be far over it."""
 BY_TIME = (0.6, np.inf)
-"""The same over the largest move of a value whose time was up."""
+"""Shares of the largest move of a value whose time was up between which its deadband may be."""
 LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
 STRENGTH = 12.0
@@ -60,14 +61,14 @@ class Pattern:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TelemetryMisfit:
+class TelemetryResiduals:
     """One residual a cycle for each pattern that was found."""
 
     bins: Bins
     patterns: tuple[Pattern, ...]
     cycles: int
 
-    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
+    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
         """(patterns * cycles,) nothing where the plant holds or rounds the channel so, else `STRENGTH`."""
         sensors, pumps = prediction.plant.sensors, prediction.plant.nominal_frequency_hz.size
         left = []
@@ -78,12 +79,12 @@ class TelemetryMisfit:
         return np.repeat(np.array(left), self.cycles)
 
 
-def telemetry_misfit(traces: Traces, station: Station, regimes: Regimes) -> TelemetryMisfit:
+def telemetry_residuals(traces: Traces, station: Station, regimes: Regimes) -> TelemetryResiduals:
     """Patterns of all channels that carry noise; a recording without noise shows none."""
     cycle, first = np.unique(regimes.cycle, return_index=True)
     patterns = tuple(_patterns(traces, station.sensors, regimes))
     count = len(patterns)
-    return TelemetryMisfit(
+    return TelemetryResiduals(
         bins=Bins(
             signal=np.full(cycle.size * count, TELEMETRY),
             regime=np.full(cycle.size * count, STEADY),
@@ -107,13 +108,7 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
         series.append(("inflow_m3h", [traces.inflow_m3h]))
     for name, values in traces.signals.items():
         series.append((name, [np.where(running[i], values[i], np.nan) for i in range(traces.pumps)]))
-    noise = {
-        "level_m": sensors.level_noise_m,
-        "inflow_m3h": sensors.inflow_noise,
-        "flow_m3h": sensors.flow_noise,
-        "head_m": sensors.head_noise,
-        "power_kw": sensors.power_noise,
-    }
+    noise = configured_noise(sensors)
     for quantity, parts in series:
         is_ramp = np.isin(regimes.of_pumps, (START_RAMP, STOP_RAMP)) & (quantity in traces.signals)
         if noise[quantity] <= 0.0:
@@ -151,7 +146,7 @@ def _held(
         return None
     if soon.size < MIN_MOVES:
         return Pattern(quantity=quantity, deadband=float(np.quantile(jumps, SMALL)), within=IN_RAMPS)
-    within = SEEN if is_calm.sum() >= MIN_MOVES else IN_RAMPS
+    within = SEEN_SHARES if is_calm.sum() >= MIN_MOVES else IN_RAMPS
     return Pattern(quantity=quantity, deadband=float(np.quantile(soon, FEW)), within=within)
 
 

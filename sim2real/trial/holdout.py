@@ -9,7 +9,7 @@ from wetwell.protocols.quantities import PUMP_METERS, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
 
-SOFT = 5.0
+ASINH_SCALE = 5.0
 SMALLEST_SHARE = 0.05
 """Noise at the least, as that of so large a share of the largest reading: small readings in ramps do not rule."""
 NOTHING = 0.02
@@ -32,7 +32,7 @@ def whitened(predicted: Recording, recorded: Recording, sensors: Sensors) -> dic
 
 
 def gap(residuals: Mapping[str, Floats]) -> float:
-    r"""Root mean square over signals of soft residuals; noise alone has about 1.
+    r"""Root mean square over signals of residuals under the asinh loss; noise alone has about 1.
 
     $$g = \sqrt{\overline{\overline{z'^2}}}, \qquad z' = 5 \operatorname{asinh}(z / 5)$$
 
@@ -49,7 +49,7 @@ def gap(residuals: Mapping[str, Floats]) -> float:
         joined = np.concatenate(parts) if parts else np.empty(0)
         joined = joined[np.isfinite(joined)]
         if joined.size:
-            by_signal.append(float(np.mean((SOFT * np.arcsinh(joined / SOFT)) ** 2)))
+            by_signal.append(float(np.mean((ASINH_SCALE * np.arcsinh(joined / ASINH_SCALE)) ** 2)))
     return float(np.sqrt(np.mean(by_signal))) if by_signal else float("nan")
 
 

@@ -17,7 +17,7 @@ PRISM, CONE, BENCH = range(3)
 
 
 class Spec(NamedTuple):
-    """A station as it truly is, SI units: m, m³/s, s, W; arrays are one value a pump.
+    """A station as it truly is, SI units: m, m³/s, s, W; arrays are one value a pump. Defaults deviate in nothing.
 
     Attributes
     ----------
@@ -65,45 +65,45 @@ class Spec(NamedTuple):
     ring_leak: Floats
     rag_limit: Floats
     rag_half_m3: Floats
-    vortex_m: float
-    vortex_level_m: float
-    flap_leak: float
-    flap_opening_m: float
     lift_m: float
-    lift_slope: float
-    lift_reference_m: float
     own_loss: float
     shared_loss: float
-    smoothness: float
     rated_flow: float
-    own_inertance: float
-    shared_inertance: float
-    air_limit_m: float
-    air_seed_m: float
-    air_rate: float
-    air_purge_m3: float
-    siphon_m: float
-    siphon_flow: float
-    siphon_prime_s: float
     area_m2: float
-    shape: float
-    floor_factor: float
-    shape_height_m: float
-    hidden_inflow: float
     crest_m: float
-    slip: float
-    hunting: float
-    hunting_s: float
-    ramp_bow: float
     ramp_s: float
     rated_power_w: float
-    load_share: float
-    rated_factor: float
     start_m: Floats
     stop_m: Floats
-    timer_s: float
-    level_lag_s: float
-    flow_lag_s: float
+    vortex_m: float = 0.0
+    vortex_level_m: float = 1.0
+    flap_leak: float = 0.0
+    flap_opening_m: float = 0.0
+    lift_slope: float = 0.0
+    lift_reference_m: float = 0.0
+    smoothness: float = 0.0
+    own_inertance: float = SMALL_INERTANCE
+    shared_inertance: float = 0.0
+    air_limit_m: float = 0.0
+    air_seed_m: float = 0.0
+    air_rate: float = 0.0
+    air_purge_m3: float = 1.0
+    siphon_m: float = 0.0
+    siphon_flow: float = 0.0
+    siphon_prime_s: float = 1.0
+    shape: float = PRISM
+    floor_factor: float = 1.0
+    shape_height_m: float = 1.0
+    hidden_inflow: float = 0.0
+    slip: float = 0.0
+    hunting: float = 0.0
+    hunting_s: float = 1.0
+    ramp_bow: float = 0.0
+    load_share: float = 0.0
+    rated_factor: float = 1.0
+    timer_s: float = 0.0
+    level_lag_s: float = 0.0
+    flow_lag_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,45 +158,16 @@ def spec_of(station: Station) -> Spec:
         ring_leak=np.zeros(pumps),
         rag_limit=np.zeros(pumps),
         rag_half_m3=np.ones(pumps),
-        vortex_m=0.0,
-        vortex_level_m=1.0,
-        flap_leak=0.0,
-        flap_opening_m=0.0,
         lift_m=main.static_head_m,
-        lift_slope=0.0,
-        lift_reference_m=0.0,
         own_loss=0.0 if is_common else loss,
         shared_loss=loss if is_common else 0.0,
-        smoothness=0.0,
         rated_flow=duty_m3h(station)[0] / HOUR_S,
-        own_inertance=SMALL_INERTANCE,
-        shared_inertance=0.0,
-        air_limit_m=0.0,
-        air_seed_m=0.0,
-        air_rate=0.0,
-        air_purge_m3=1.0,
-        siphon_m=0.0,
-        siphon_flow=0.0,
-        siphon_prime_s=1.0,
         area_m2=station.sump.area_m2,
-        shape=PRISM,
-        floor_factor=1.0,
-        shape_height_m=1.0,
-        hidden_inflow=0.0,
         crest_m=control.start_levels_m[-1] + 3.0,
-        slip=0.0,
-        hunting=0.0,
-        hunting_s=1.0,
-        ramp_bow=0.0,
         ramp_s=control.ramp_s,
         rated_power_w=math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor,
-        load_share=0.0,
-        rated_factor=1.0,
         start_m=np.array(control.start_levels_m),
         stop_m=np.array(control.stop_levels_m),
-        timer_s=0.0,
-        level_lag_s=0.0,
-        flow_lag_s=0.0,
     )
 
 

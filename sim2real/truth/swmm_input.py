@@ -48,7 +48,7 @@ SWMM_RAMPS_S = (1, 2)
 """Ramps of soft starters. In longer ones its pumps move no water at twice the head they need, then let go. [s]"""
 
 ROUTING_STEP_S = 0.5
-SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
+MAIN_SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
 """Inertance of the mains, times rated flow over head: with more or less, pumps stick or surge in ramps. [s]"""
 FASTEST_M_S = 14.0
 """Beyond, the solver loses friction: a fifth of it at 18 m/s."""
@@ -71,7 +71,7 @@ def swmm_input(spec: Spec, level_m: float) -> str:
     """
     numbers = range(1, spec.shutoff_m.size + 1)
     total = spec.own_loss + spec.shared_loss
-    settling_s = HEADER_SETTLING_S if spec.shared_loss > 0 else SETTLING_S
+    settling_s = HEADER_SETTLING_S if spec.shared_loss > 0 else MAIN_SETTLING_S
     inertance = settling_s * (spec.lift_m + total * spec.rated_flow**2) / spec.rated_flow
     own = _main(spec.own_loss, inertance * spec.own_loss / total, spec.rated_flow) if spec.own_loss > 0 else None
     shared = (

@@ -11,7 +11,7 @@ from wetwell.protocols.station.station_file import EffectTable, load_station
 from wetwell.services.batch.gap import diagnose_file, replay_file
 from wetwell.services.stations import find_scenario
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
-from wetwell.sim2real.diagnosis.report import GapReport, report_of
+from wetwell.sim2real.diagnosis.report import GapReport
 from wetwell.simulator.simulation import Simulation
 
 LENGTH_S = 21_600
@@ -36,7 +36,7 @@ def plain(alpha):
 
 
 def test_without_a_gap_it_is_silent(alpha, plain):
-    report = report_of(diagnose(plain, alpha))
+    report = diagnose(plain, alpha).report()
     assert (report.verdict, report.effects, report.where) == ("none", (), ())
     assert report.gap.before < 1.1
 
@@ -44,7 +44,7 @@ def test_without_a_gap_it_is_silent(alpha, plain):
 @pytest.mark.parametrize("name", MODERATE)
 def test_a_single_effect_is_named_with_its_size(alpha, name):
     diagnosis = diagnose(record(alpha, [{"name": name, **MODERATE[name]}]), alpha)
-    report = report_of(diagnosis)
+    report = diagnosis.report()
     assert report.verdict == "effect"
     assert [effect.name for effect in report.effects] == [name]
     for parameter, value in MODERATE[name].items():
@@ -58,7 +58,7 @@ def test_a_single_effect_is_named_with_its_size(alpha, name):
 def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
     ragging = {"name": "ragging", "speed_loss": 0.1, "growth_s": 200.0}
     cutoff = {"name": "flow_low_cutoff", "cutoff_m3h": 60.0}
-    report = report_of(diagnose(record(alpha, [ragging, cutoff]), alpha))
+    report = diagnose(record(alpha, [ragging, cutoff]), alpha).report()
     assert [effect.name for effect in report.effects] == ["ragging", "flow_low_cutoff"]
     assert report.effects[1].parameters["cutoff_m3h"].value == pytest.approx(60.0, rel=0.15)
 
@@ -66,14 +66,14 @@ def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
 def test_a_cutoff_of_a_second_or_two_a_ramp_is_told_beside_a_rougher_main(alpha):
     """What the rougher main explains in all is many times more, but not in these seconds."""
     main, cutoff = {"name": "friction_bias", "factor": 2.5}, {"name": "flow_low_cutoff", "cutoff_m3h": 60.0}
-    report = report_of(diagnose(record(alpha, [main, cutoff], 2 * LENGTH_S), alpha))
+    report = diagnose(record(alpha, [main, cutoff], 2 * LENGTH_S), alpha).report()
     assert [effect.name for effect in report.effects] == ["friction_bias", "flow_low_cutoff"]
 
 
 def test_a_delay_under_a_second_is_not_told_beside_a_lag(alpha):
     lag = {"name": "flow_meter_lag", "lag_s": 6.0}
     delay = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.3}
-    report = report_of(diagnose(record(alpha, [lag, delay]), alpha))
+    report = diagnose(record(alpha, [lag, delay]), alpha).report()
     assert [effect.name for effect in report.effects] == ["flow_meter_lag"]
 
 
@@ -83,7 +83,7 @@ def test_a_channel_that_is_sent_when_its_time_is_up_is_found(alpha):
     recording = record(station)
     names = [f"pump{i}_power_kw" for i in (1, 2, 3)]
     columns = recording.columns | {name: held(recording.columns[name], 3.0, 240) for name in names}
-    report = report_of(diagnose(replace(recording, columns=columns), station))
+    report = diagnose(replace(recording, columns=columns), station).report()
     assert [effect.name for effect in report.effects] == ["report_by_exception"]
     low_kw, high_kw = report.effects[0].parameters["deadband"].ci
     assert low_kw < 3.0 < high_kw
@@ -103,7 +103,7 @@ def held(values, deadband, report_s):
 def test_a_bench_in_the_sump_is_found(alpha):
     """Its edge is within a few centimetres, unlike a cone's wall."""
     bench = {"name": "sump_area_profile", "bottom_factor": 0.5, "height_m": 1.2, "exponent": 10.0}
-    report = report_of(diagnose(record(alpha, [bench]), alpha))
+    report = diagnose(record(alpha, [bench]), alpha).report()
     assert (report.verdict, [effect.name for effect in report.effects]) == ("effect", ["sump_area_profile"])
     assert report.effects[0].parameters["exponent"].value == pytest.approx(10.0, rel=0.2)
     assert report.gap.shrinkage > 0.9
@@ -111,21 +111,21 @@ def test_a_bench_in_the_sump_is_found(alpha):
 
 def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     recording = record(alpha, [{"name": "flow_meter_gain", "factor": 0.94}])
-    report = report_of(diagnose(recording, alpha, without=["flow_meter_gain"]))
+    report = diagnose(recording, alpha, without=["flow_meter_gain"]).report()
     assert report.verdict == "unknown"
     assert report.effects == ()
     assert report.where[0].component == "flow_meter"
 
 
 def test_inertia_that_is_over_within_a_second_is_no_gap(alpha):
-    report = report_of(diagnose(record(alpha, [{"name": "water_inertia", "inertia_s2_m2": 250.0}]), alpha))
+    report = diagnose(record(alpha, [{"name": "water_inertia", "inertia_s2_m2": 250.0}]), alpha).report()
     assert (report.verdict, report.effects) == ("none", ())
     assert report.gap.before > 1.1
 
 
 def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):
     recording = record(alpha, [{"name": "control_delay", "delay_s": 20.0}])
-    report = report_of(diagnose(recording, alpha, without=["control_delay"]))
+    report = diagnose(recording, alpha, without=["control_delay"]).report()
     assert report.verdict == "unknown"
     assert report.where[0].component == "controller"
 
@@ -133,7 +133,7 @@ def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):
 def test_a_late_frequency_is_no_late_controller(alpha):
     """What was switched, was switched before its record: at the configured levels."""
     recording = record(alpha, [{"name": "channel_delay", "channel": "frequency_hz", "delay_s": 12.0}])
-    report = report_of(diagnose(recording, alpha))
+    report = diagnose(recording, alpha).report()
     assert (report.verdict, [effect.name for effect in report.effects]) == ("effect", ["channel_delay"])
     assert report.effects[0].parameters["delay_s"].value == pytest.approx(12.0, abs=0.6)
     assert report.gap.by_signal["start_level"].after < 1.5
@@ -143,14 +143,14 @@ def test_a_late_frequency_is_no_late_controller(alpha):
 def test_it_works_without_a_channel(alpha, missing):
     recording = record(alpha, [{"name": "friction_bias", "factor": 1.3}])
     kept = {name: values for name, values in recording.columns.items() if not name.endswith(missing)}
-    report = report_of(diagnose(replace(recording, columns=kept), alpha))
+    report = diagnose(replace(recording, columns=kept), alpha).report()
     assert report.verdict == "effect"
     assert report.effects[0].component == "rising_main"
 
 
 def test_columns_of_truth_change_nothing(alpha, plain):
     marked = replace(plain, truth={"truth_state": np.full(len(plain), "pump_fault")})
-    assert report_of(diagnose(marked, alpha)) == report_of(diagnose(plain, alpha))
+    assert diagnose(marked, alpha).report() == diagnose(plain, alpha).report()
 
 
 def _rows(recording, rows):

@@ -85,7 +85,7 @@ def test_what_needs_the_truth_later_gets_the_published_attempt(tmp_path, monkeyp
     monkeypatch.setenv("FAKE_MODE", "none")
     monkeypatch.setenv("FAKE_FOLDER", str(tmp_path))
     held_out = []
-    monkeypatch.setattr(run, "hold_out", lambda case, *_: held_out.append(case))
+    monkeypatch.setattr(run, "measure_holdout", lambda case, *_: held_out.append(case))
     run.run_trial(replace(PLAN, replay=("replay",)), tmp_path, workers=1)
     assert [case.attempt for case in held_out] == [2, 0]
     for case in held_out:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.sim2real.attribution.significance import is_sure
+from wetwell.sim2real.attribution.significance import is_significant
 
 
 @pytest.mark.parametrize(
@@ -20,4 +20,4 @@ from wetwell.sim2real.attribution.significance import is_sure
     ],
 )
 def test_a_gain_is_sure_where_cycles_agree_or_few_gain_much(by_cycle, sure):
-    assert is_sure(np.array(by_cycle)) is sure
+    assert is_significant(np.array(by_cycle)) is sure

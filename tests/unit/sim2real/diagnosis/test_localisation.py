@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.sim2real.diagnosis.localisation import culprit
+from wetwell.sim2real.diagnosis.localisation import localise
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.simulator.plant import plant_parameters
@@ -30,7 +30,7 @@ def bins_of(signals, regime):
 
 
 def blamed(residuals, bins, station):
-    return culprit(residuals**2, residuals, bins, plant_parameters(station))
+    return localise(residuals**2, residuals, bins, plant_parameters(station))
 
 
 def test_power_that_runs_away_is_its_meter_and_power_that_swings_the_drive(alpha):

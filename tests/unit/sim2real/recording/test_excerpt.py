@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wetwell.sim2real.recording.excerpt import BLANK_S, WINDOW_S, excerpt
+from wetwell.sim2real.recording.excerpt import BLANK_S, PART_S, excerpt
 from wetwell.sim2real.recording.traces import Traces
 
 
@@ -30,7 +30,7 @@ def test_parts_keep_their_rows_together_and_spread_over_days_and_hours():
     assert part.seconds <= 172_800 + 12 * (BLANK_S + 1200)
     assert np.array_equal(part.level_m[~is_blank], part.time_s[~is_blank])
     begins = np.flatnonzero(~is_blank & np.r_[True, is_blank[:-1]])
-    assert begins.size == 172_800 // WINDOW_S
+    assert begins.size == 172_800 // PART_S
     assert np.ptp(part.time_s[begins]) > 22 * 86_400
     hours = np.sort(part.time_s[begins] % 86_400 / 3600.0)
     assert np.diff(hours, append=hours[0] + 24.0).max() < 8.0

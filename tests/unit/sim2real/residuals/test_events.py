@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import START_LEVEL, Bins
-from wetwell.sim2real.residuals.events import WINDOW_S, EventMisfit, Stretches
+from wetwell.sim2real.residuals.events import WINDOW_S, EventResiduals, Stretches
 from wetwell.simulator.plant import plant_parameters
 
 TURN_S = 100
@@ -51,7 +51,7 @@ def test_a_timer_may_begin_after_the_event_before(alpha, delay_s, since_s, above
     """Then the level is past its threshold already, though not short of it."""
     start, plant = stretches(TURN_S), replace(plant_parameters(alpha), control_delay_s=delay_s)
     one = np.ones(1)
-    misfit = EventMisfit(
+    residuals = EventResiduals(
         bins=Bins(
             **dict.fromkeys(("regime", "cycle", "pump", "second"), np.zeros(1, dtype=np.int64)),
             **dict.fromkeys(("deviation", "floor", "tolerance"), one),
@@ -63,7 +63,7 @@ def test_a_timer_may_begin_after_the_event_before(alpha, delay_s, since_s, above
         noise_m=0.002,
         pattern=None,
     )
-    residual = misfit.residuals(Prediction(level_m=one, signals={}, plant=plant))[0]
+    residual = residuals.of(Prediction(level_m=one, signals={}, plant=plant))[0]
     assert residual == pytest.approx(
         0.0 if is_excused else above_m - 0.002 * delay_s, abs=0.0 if is_excused else 0.01
     )

@@ -6,7 +6,7 @@ import pytest
 from wetwell.services.stations import find_scenario
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
-from wetwell.sim2real.residuals.telemetry import telemetry_misfit
+from wetwell.sim2real.residuals.telemetry import telemetry_residuals
 from wetwell.simulator.simulation import Simulation
 
 NAMES = [f"pump{i}_power_kw" for i in (1, 2, 3)]
@@ -33,7 +33,7 @@ def recorded(request, alpha):
 def patterns(station, recording, **changed):
     columns = recording.columns | changed
     traces = traces_of(type(recording)(time_ns=recording.time_ns, columns=columns), station)
-    return telemetry_misfit(traces, station, regimes_of(traces, station)).patterns
+    return telemetry_residuals(traces, station, regimes_of(traces, station)).patterns
 
 
 def test_noise_and_a_meter_that_is_stuck_are_not_held(recorded):

@@ -25,7 +25,7 @@ POSSIBLE = (0.3, 3.0)
 LIKELY = 0.35
 """Logarithm of a ratio that hardly any effect brings about alone."""
 LEVEL_SHARE = 0.3
-"""The same of a start level, as a share of the height between start and stop."""
+"""Shift of a start level that hardly any effect brings about alone, as a share of the height to the stop."""
 MANY = 3
 """Independent parts that are far off from which the file is taken for that of another station."""
 MIN_IDLE_S = 600

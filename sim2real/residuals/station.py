@@ -10,11 +10,9 @@ from wetwell.sim2real.recording.regimes import Regimes
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import Bins, joined
-from wetwell.sim2real.residuals.events import event_misfit
-from wetwell.sim2real.residuals.signals import level_misfit, pump_misfits
-from wetwell.sim2real.residuals.telemetry import telemetry_misfit
-
-SOFT = 5.0
+from wetwell.sim2real.residuals.events import event_residuals
+from wetwell.sim2real.residuals.signals import level_residuals, pump_residuals
+from wetwell.sim2real.residuals.telemetry import telemetry_residuals
 
 
 class _Part(Protocol):
@@ -23,26 +21,21 @@ class _Part(Protocol):
     @property
     def bins(self) -> Bins: ...
 
-    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats: ...
+    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats: ...
 
 
-class Misfit:
+class StationResiduals:
     """Residuals of a recording; which they are and what they weigh is the same for every prediction."""
 
     def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> None:
-        self.telemetry = telemetry_misfit(traces, station, regimes)
+        self.telemetry = telemetry_residuals(traces, station, regimes)
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
-        self._parts: list[_Part] = [*pump_misfits(traces, station, regimes, plain, patterns), self.telemetry]
+        self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
-            self._parts.append(level_misfit(traces, station, regimes, plain, patterns))
-            self._parts.append(event_misfit(traces, station, regimes, patterns.get("level_m")))
+            self._parts.append(level_residuals(traces, station, regimes, plain, patterns))
+            self._parts.append(event_residuals(traces, station, regimes, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 
-    def residuals(self, prediction: Prediction, excused_s: int = 0) -> Floats:
+    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:
         """(bins,) residuals in units of noise; with transients in ramps excused that are over within some seconds."""
-        return np.concatenate([part.residuals(prediction, excused_s) for part in self._parts])
-
-
-def soft(residuals: Floats) -> Floats:
-    r"""Residuals whose large values count less: $5 \operatorname{asinh}(z / 5)$."""
-    return np.asarray(SOFT * np.arcsinh(residuals / SOFT), dtype=np.float64)
+        return np.concatenate([part.of(prediction, excused_s) for part in self._parts])

@@ -5,7 +5,7 @@ import pytest
 
 from wetwell.sim2real.attribution.attribution import Attribution
 from wetwell.sim2real.attribution.fitting import Fit
-from wetwell.sim2real.diagnosis.diagnosis import _is_wide
+from wetwell.sim2real.diagnosis.verdict import _is_wide
 from wetwell.sim2real.residuals.bins import FLOW, LEVEL, SIGNALS, Bins
 
 EACH = 40
@@ -26,13 +26,13 @@ def outcome(residuals, left):
     )
     found = Attribution(
         plain=10.0 * ones,
-        accepted=Fit(candidates=(), places=(), residuals=np.repeat(residuals, EACH)),
+        accepted=Fit(candidates=(), points=(), residuals=np.repeat(residuals, EACH)),
         left=np.repeat(left, EACH),
         equivalent=(),
         ends=np.zeros((0, 2)),
         singles=(),
-        fitted=ones < 1.0,
-        held=ones > 0.0,
+        training=ones < 1.0,
+        validation=ones > 0.0,
     )
     return bins, found
 

@@ -1,0 +1,112 @@
+"""The effects of the library, tried one by one: alone, and beside others."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.gains import Gains, RankedFit, penalise
+
+Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+"""Applies a function to items, in order, as `map` does: perhaps side by side."""
+
+PROBES = (0.02,)
+"""Strengths, as shares of the range, by which a further effect is judged before it is fitted."""
+MOST_FITTED = 8
+"""Further effects that are fitted, the most promising first."""
+MOST_REFINED = 4
+PROMISING = 0.02
+"""Share of the best gain before refinement under which a candidate is not refined."""
+
+
+class Trials:
+    """Fits candidates to the training cycles, and ranks them on the others.
+
+    Parameters
+    ----------
+    fitter : Fitter
+    gains : Gains
+    guesses : mapping of Candidate to list of dict
+        Where the search for each begins.
+    progress : callable
+        Gets the share of the work that is done, 0 to 1.
+    each : callable
+        Tries candidates, perhaps side by side: the replay holds no lock.
+    """
+
+    def __init__(
+        self,
+        fitter: Fitter,
+        gains: Gains,
+        guesses: Mapping[Candidate, Sequence[Mapping[str, float]]],
+        progress: Callable[[float], None],
+        each: Each,
+    ) -> None:
+        self._fitter = fitter
+        self._gains = gains
+        self._guesses = guesses
+        self._progress = progress
+        self._each = each
+
+    def singles(self) -> list[RankedFit]:
+        """Single effects, best first."""
+        fitter, before = self._fitter, self._fitter.cost(self._fitter.plain)
+        firsts: list[Fit] = []
+        tried = self._each(lambda candidate: fitter.first(candidate, self._start_grids(candidate)), self._guesses)
+        for k, fit in enumerate(tried):
+            firsts += [fit] if fit is not None else []
+            self._progress(0.3 * (k + 1) / len(self._guesses))
+        most = max((before - fitter.cost(fit) for fit in firsts), default=0.0)
+
+        def refined(fit: Fit) -> Fit:
+            gain = before - fitter.cost(fit)
+            return fitter.refine(fit) if gain > PROMISING * most and gain > 0.0 else fit
+
+        ranked = []
+        for k, fit in enumerate(self._each(refined, firsts)):
+            ranked.append(self._gains.ranked(fit))
+            self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
+        return penalise(ranked)
+
+    def with_one_more(self, current: Fit, library: Sequence[Candidate]) -> list[RankedFit]:
+        """Fits of the current effects with one more, best first."""
+        fitter = self._fitter
+        taken = {c.component for c in current.candidates} if len(current.names) > 1 else set()
+        free = [c for c in library if c.name not in current.names and c.component not in taken]
+        promises = list(self._each(lambda candidate: self._promise(candidate, current), free))
+        likely = [free[k] for k in np.argsort(-np.array(promises), kind="stable")[:MOST_FITTED]]
+        tried = self._each(
+            lambda candidate: fitter.first(candidate, self._start_grids(candidate), others=current), likely
+        )
+        firsts = sorted((fit for fit in tried if fit is not None), key=fitter.cost)
+        refined = self._each(fitter.refine, firsts[:MOST_REFINED])
+        ranked = penalise([self._gains.ranked(fit) for fit in refined], self._gains.of(current))
+        while ranked and self._is_contrived(ranked[0].fit):
+            del ranked[0]
+        return ranked
+
+    def _start_grids(self, candidate: Candidate, strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
+        """Points to begin at, each grid once: guesses that leave the strength open have the same ones."""
+        grids = [grid for guess in self._guesses[candidate] for grid in candidate.start_grids(guess, strengths)]
+        return list({b"".join(point.tobytes() for point in grid): grid for grid in grids}.values())
+
+    def _promise(self, candidate: Candidate, current: Fit) -> float:
+        """Drop of the sum of squares that one trial of each strength promises, as if all were linear in it."""
+        rows = self._fitter.rows
+        before = current.residuals[rows]
+        most = 0.0
+        for (start,) in self._start_grids(candidate, PROBES):
+            tried = self._fitter.at((*current.candidates, candidate), (*current.points, start))
+            if tried is not None:
+                change = tried.residuals[rows] - before
+                along = max(-float(change @ before), 0.0)
+                most = max(most, along**2 / max(float(change @ change), 1e-12))
+        return most
+
+    def _is_contrived(self, fit: Fit) -> bool:
+        """Whether an effect makes a gap in signals that show none, which the others undo."""
+        fewer = (self._fitter.without(fit, k) for k in range(len(fit.names)))
+        return any(one is not None and self._gains.is_undone(one) for one in fewer)

@@ -1,0 +1,81 @@
+"""What an attribution comes to in a report: accepted effects, the ranking of single ones, the cells of the gap."""
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.attribution.attribution import Attribution
+from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, RankedCandidate, Where
+from wetwell.sim2real.diagnosis.shrinkage import cell_gap, gap_of
+from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.sim2real.residuals.asinh_loss import squares_of
+from wetwell.sim2real.residuals.bins import SIGNALS, Bins
+from wetwell.simulator.effects.effect import Component
+
+
+def found_effects(found: Attribution) -> tuple[FoundEffect, ...]:
+    """Accepted effects with their parameters."""
+    if found.accepted is None:
+        return ()
+    fit = found.accepted
+    ends = np.split(found.ends, np.cumsum([point.size for point in fit.points])[:-1])
+    return tuple(
+        FoundEffect(
+            name=candidate.name,
+            component=candidate.component,
+            equivalent=equivalent,
+            parameters=_parameters(candidate, point, interval),
+        )
+        for candidate, point, interval, equivalent in zip(
+            fit.candidates, fit.points, ends, found.equivalent, strict=True
+        )
+    )
+
+
+def _parameters(candidate: Candidate, point: Floats, ends: Floats) -> dict[str, FittedParameter]:
+    """What is fixed first, then what was fitted."""
+    fixed = {name: FittedParameter(value=value, ci=None, unit="") for name, value in candidate.fixed}
+    return fixed | {
+        free.name: FittedParameter(
+            value=free.value(float(one)), ci=(free.value(float(low)), free.value(float(high))), unit=free.unit
+        )
+        for free, one, (low, high) in zip(candidate.free, point, ends, strict=True)
+    }
+
+
+def ranking(found: Attribution, bins: Bins, rng: np.random.Generator) -> tuple[RankedCandidate, ...]:
+    """Single effects, best first, with the shrinkage by each alone."""
+    gaps = [gap_of(found.plain, single.fit.residuals, bins, found.validation, rng) for single in found.singles]
+    return tuple(
+        RankedCandidate(
+            name=single.fit.names[0], score=single.score, shrinkage=gap.shrinkage, shrinkage_ci=gap.shrinkage_ci
+        )
+        for single, gap in zip(found.singles, gaps, strict=True)
+    )
+
+
+def where_it_lies(
+    found: Attribution, bins: Bins, excess: Floats, component: Component, rng: np.random.Generator
+) -> tuple[Where, ...]:
+    """Cells of the gap, the largest first.
+
+    Parameters
+    ----------
+    excess : (bins,) array
+        What of each square the gap is made of.
+    component : Component
+        The one held responsible.
+    """
+    beyond_noise = squares_of(found.plain) - bins.floor
+    total = float(np.maximum(np.bincount(bins.signal * len(REGIMES) + bins.regime, excess), 0.0).sum())
+    places: list[tuple[float, Where]] = []
+    for signal, regime, cell in bins.cells(found.validation):
+        share = float(excess[cell].sum()) / max(total, 1e-12)
+        if share <= 0.0:
+            continue
+        gap, ci = cell_gap(beyond_noise, bins, cell, rng)
+        place = Where(
+            component=component, signal=SIGNALS[signal], regime=REGIMES[regime], gap=gap, ci=ci, share=share
+        )
+        places.append((share, place))
+    return tuple(place for _, place in sorted(places, key=lambda pair: -pair[0]))

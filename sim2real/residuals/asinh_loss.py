@@ -1,0 +1,23 @@
+"""The loss of the fits: large residuals count less than their squares."""
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+
+ASINH_SCALE = 5.0
+
+
+def asinh_loss(residuals: Floats) -> Floats:
+    r"""Residuals that a fit squares: $5 \operatorname{asinh}(z / 5)$."""
+    return np.asarray(ASINH_SCALE * np.arcsinh(residuals / ASINH_SCALE), dtype=np.float64)
+
+
+def squares_of(losses: Floats) -> Floats:
+    """Squares of the residuals themselves, from what `asinh_loss` made of them.
+
+    Examples
+    --------
+    >>> squares_of(asinh_loss(np.array([0.0, -20.0]))).round(6)
+    array([  0., 400.])
+    """
+    return np.asarray((ASINH_SCALE * np.sinh(losses / ASINH_SCALE)) ** 2, dtype=np.float64)
