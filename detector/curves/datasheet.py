@@ -10,6 +10,8 @@ import numpy.typing as npt
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Station
 
+Curve = tuple[float, float, float]
+"""(c0, c1, c2) of the pump curve at nominal speed, Q in m³/h."""
 Table = npt.NDArray[np.void]
 TABLE = np.dtype(
     [
@@ -41,7 +43,7 @@ class Datasheet:
         Cross-section of the wet well. [m²]
     """
 
-    curves: tuple[tuple[float, float, float], ...]
+    curves: tuple[Curve, ...]
     frequencies_hz: tuple[float, ...]
     static_head_m: float
     friction_h2_m5: float

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.evaluation.detections import (
     DAY_S,
     ORIGINS,
@@ -21,7 +22,6 @@ from wetwell.detector.evaluation.scores import (
     ABSTENTIONS,
     CLASSES,
     FAULTS,
-    LEARNING_S,
     ScoredRun,
     confusion,
     f1,

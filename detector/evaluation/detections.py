@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from wetwell.detector.evaluation.scores import FAULTS, LEARNING_S, learning_end_ns, severity_column, step_s, truth_of
+from wetwell.detector.baseline.learning import LEARNING_S
+from wetwell.detector.evaluation.scores import FAULTS, learning_end_ns, severity_column, step_s, truth_of
 from wetwell.detector.stream.run_state import WARM_UP_S
 from wetwell.protocols.arrays import Flags
 from wetwell.protocols.messages.messages import State, Verdict

@@ -12,10 +12,11 @@ from typing import Any, Protocol
 
 from pydantic import TypeAdapter
 
+from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.backtest import Outcome, outcome, summary
 from wetwell.detector.evaluation.methods import DETECTORS, detector_class
-from wetwell.detector.evaluation.scores import LEARNING_S, in_order_of_time, without_truth
+from wetwell.detector.evaluation.scores import in_order_of_time, without_truth
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
@@ -298,7 +299,7 @@ def verdicts_on(
     for block in blocks(without_truth(recording), datasheet.pumps):
         for name, judge_one in judges.items():
             started_s = time.perf_counter()
-            verdicts[name].extend(judge_one.take(block))
+            verdicts[name].extend(judge_one.update_block(block))
             spent_s[name] += time.perf_counter() - started_s
     for name, judge_one in judges.items():
         verdicts[name].extend(judge_one.finish())
