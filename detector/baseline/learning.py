@@ -11,9 +11,8 @@ from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.runs.run import Segments
 from wetwell.detector.statistics.robust import step_variance
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.timestamps import LEARNING_S
 
-LEARNING_S = 6.0 * 3600.0
-"""What ends in this time from the first sample is not scored either, whoever judges it. [s]"""
 DAY_S = 24.0 * 3600.0
 DRIFT_SIGMAS = 5.0
 WANDERING_SHARE = 0.02

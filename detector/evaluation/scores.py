@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.protocols.arrays import Integers
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.recordings.recording import TRUTH_PREFIX, Recording
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 
 CLASSES: tuple[State, ...] = ("normal", "pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault")
 FAULTS = CLASSES[1:]

@@ -17,7 +17,7 @@ from wetwell.detector.stream.block import Block
 from wetwell.detector.stream.loop import Stop, process_samples
 from wetwell.detector.stream.missing_signals import new_missing_signals
 from wetwell.detector.stream.run_state import SIGNALS, count_steady, drop_ended
-from wetwell.detector.stream.state import Records, new_state
+from wetwell.detector.stream.state import new_state
 from wetwell.detector.stream.steady_samples import (
     LEAST_ROOM,
     SEGMENT_S,
@@ -26,6 +26,7 @@ from wetwell.detector.stream.steady_samples import (
     segment_averages,
 )
 from wetwell.detector.stream.stuck_sensors import stuck_names
+from wetwell.protocols.arrays import Records
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
 

@@ -12,11 +12,10 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.stream.gate import MAX_GAP_S, seconds_between
 from wetwell.detector.stream.run_state import is_break
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
@@ -42,7 +41,7 @@ PHASE = np.dtype(
 NO_PHASE = -1
 
 
-def new_phases() -> npt.NDArray[np.void]:
+def new_phases() -> Records:
     """The phase that goes on, and the last one without any pump."""
     phases = np.zeros(2, dtype=PHASE)
     phases["running"] = NO_PHASE

@@ -15,10 +15,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.curves.datasheet import Datasheet
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, INFLOW, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
@@ -59,7 +58,7 @@ RANGES = np.dtype(
 )
 
 
-def new_gate() -> npt.NDArray[np.void]:
+def new_gate() -> Records:
     """State of the gate before the first sample."""
     return np.zeros(1, dtype=GATE)
 
@@ -69,7 +68,7 @@ def gate_counts(gate: Any) -> dict[str, int]:
     return {name: int(gate[name][0]) for name in COUNTS if gate[name][0]}
 
 
-def gate_ranges(datasheet: Datasheet) -> npt.NDArray[np.void]:
+def gate_ranges(datasheet: Datasheet) -> Records:
     """Lowest and highest readings that each pump can show."""
     return np.array([_ranges(datasheet, pump) for pump in range(datasheet.pumps)], dtype=RANGES)
 

@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Table
 from wetwell.detector.statistics.rolling_f_test import FIGURES, LEAST_SAMPLES, LOG_P, add_sample, solve
 from wetwell.detector.stream.drawdown import draw_down
 from wetwell.detector.stream.gate import let_through
 from wetwell.detector.stream.missing_signals import gather_segments
 from wetwell.detector.stream.run_state import collect, count_steady, note_gap, note_running
 from wetwell.detector.stream.stuck_sensors import watch_sensors
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Floats, Integers, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -46,7 +45,7 @@ def process_samples(
     values: Floats,
     sample_pumps: int,
     is_bad: bool,
-    table: Table,
+    table: Records,
     ranges: Any,
     area_m2: float,
     frame: Floats,

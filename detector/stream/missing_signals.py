@@ -4,12 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.stream.gate import seconds_between
 from wetwell.detector.stream.run_state import WARM_UP_NS
 from wetwell.detector.stream.steady_samples import SEGMENT_S, SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_METERS, PUMP_VALUES
 
@@ -21,7 +20,7 @@ MISSING_SIGNALS = np.dtype(
 is the first since the pump started, others did, or the stream broke."""
 
 
-def new_missing_signals(pumps: int) -> npt.NDArray[np.void]:
+def new_missing_signals(pumps: int) -> Records:
     """State of the segments of so many pumps before the first sample."""
     return np.zeros(pumps, dtype=MISSING_SIGNALS)
 

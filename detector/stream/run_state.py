@@ -4,11 +4,10 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import Datasheet, Table, duty_flows
+from wetwell.detector.curves.datasheet import Datasheet, duty_flows
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
@@ -69,7 +68,7 @@ SAMPLING_PERIOD = np.dtype([("segment_samples", np.int64), ("gap_s", np.float64)
 """How fast a feed comes: samples in a segment, as the last run had them, and the last two gaps that are known."""
 
 
-def new_pumps(datasheet: Datasheet) -> npt.NDArray[np.void]:
+def new_pumps(datasheet: Datasheet) -> Records:
     """State of the pumps of a station before the first sample."""
     pumps = np.zeros(datasheet.pumps, dtype=PUMP_STATE)
     pumps["speed_ratio"] = pumps["log_ratio"] = math.nan
@@ -77,7 +76,7 @@ def new_pumps(datasheet: Datasheet) -> npt.NDArray[np.void]:
     return pumps
 
 
-def new_sampling_period() -> npt.NDArray[np.void]:
+def new_sampling_period() -> Records:
     """Sampling period of a feed before its first sample."""
     period = np.zeros(1, dtype=SAMPLING_PERIOD)
     period["segment_samples"] = SEGMENT_SAMPLES
@@ -116,7 +115,7 @@ def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
 
 
 @compiled
-def note_running(table: Table, pumps: Any, period: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
     is_broken = is_break(period, gap_s, BREAK_S)
     is_changed = any_ending = False
@@ -165,7 +164,7 @@ def drop_ended(pumps: Any, steady_samples: Any, time_ns: int) -> None:
 
 
 @compiled
-def _note_duty(table: Table, pumps: Any, frame: Floats) -> None:
+def _note_duty(table: Records, pumps: Any, frame: Floats) -> None:
     """Flows by the datasheet; worked out anew only when a speed has changed."""
     is_new = False
     for number in range(pumps.shape[0]):
@@ -178,7 +177,7 @@ def _note_duty(table: Table, pumps: Any, frame: Floats) -> None:
 
 
 @compiled
-def _collect(table: Table, pumps: Any, number: int, time_ns: int, frame: Floats, steady: Any) -> bool:
+def _collect(table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, steady: Any) -> bool:
     """Take the frame into the open run of a pump; whether it is steady, and so has become this record."""
     pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
     flow_m3h, head_m = frame[at + FLOW], frame[at + HEAD]
@@ -216,7 +215,7 @@ def _collect(table: Table, pumps: Any, number: int, time_ns: int, frame: Floats,
 
 
 @compiled
-def collect(table: Table, pumps: Any, time_ns: int, frame: Floats, steady_samples: Any) -> bool:
+def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, steady_samples: Any) -> bool:
     """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind."""
     at = count_steady(pumps)
     any_blind = False

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import Datasheet, Table
+from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.statistics.rolling_f_test import RollingFTest
 from wetwell.detector.stream.drawdown import new_phases
 from wetwell.detector.stream.gate import gate_ranges, new_gate
@@ -14,10 +14,8 @@ from wetwell.detector.stream.missing_signals import new_missing_signals
 from wetwell.detector.stream.run_state import new_pumps, new_sampling_period
 from wetwell.detector.stream.steady_samples import new_steady_samples
 from wetwell.detector.stream.stuck_sensors import new_stuck_sensors
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Floats, Integers, Records
 from wetwell.protocols.quantities import FIRST_PUMP, PUMP_VALUES
-
-Records = npt.NDArray[np.void]
 
 
 class StreamState(NamedTuple):
@@ -35,7 +33,7 @@ class StreamState(NamedTuple):
         Of `RollingFTest`.
     """
 
-    table: Table
+    table: Records
     ranges: Records
     area_m2: float
     frame: Floats

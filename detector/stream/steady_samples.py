@@ -3,10 +3,9 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wetwell.detector.curves.residuals import distances
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 
 SEGMENT_SAMPLES = 25
@@ -39,7 +38,7 @@ SEGMENT_MEANS = ("flow_m3h", "total_m3h", "duty_m3h", "duty_total_m3h", "level_m
 SEGMENT_SUM = np.dtype([(name, np.float64) for name in ("pump_m", "system_m", *SEGMENT_MEANS)])
 
 
-def new_steady_samples(room: int = LEAST_ROOM) -> npt.NDArray[np.void]:
+def new_steady_samples(room: int = LEAST_ROOM) -> Records:
     """Room for so many steady samples."""
     return np.zeros(room, dtype=STEADY_SAMPLE)
 

@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, LEVEL, PUMP_METERS, PUMP_VALUES, pump_column
 from wetwell.protocols.timestamps import NS_PER_S
@@ -22,7 +21,7 @@ STUCK_SENSOR = np.dtype(
 did while it was learnt."""
 
 
-def new_stuck_sensors(pumps: int) -> npt.NDArray[np.void]:
+def new_stuck_sensors(pumps: int) -> Records:
     """State of the level and of three sensors a pump."""
     return np.zeros(1 + len(PUMP_METERS) * pumps, dtype=STUCK_SENSOR)
 

@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 from pydantic import TypeAdapter
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.backtest import Outcome, outcome, summary
 from wetwell.detector.evaluation.methods import DETECTORS, detector_class
@@ -23,6 +22,7 @@ from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.recordings.recording import Recording, read_recording
 from wetwell.protocols.station.station_file import Station, load_station
+from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.dataset import MANIFEST, read_manifest
 from wetwell.services.batch.journal import Journal, fingerprint, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through

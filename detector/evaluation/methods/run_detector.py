@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.baseline.model import MIN_RUNS, MIN_SEGMENTS
 from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.runs.run import Run
@@ -12,7 +11,7 @@ from wetwell.detector.stream.loop import Stop
 from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.messages.messages import State, Verdict
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 
 ALPHA = 1e-3
 """Share of healthy runs in which one test may reject, for the methods of which nobody has said another."""

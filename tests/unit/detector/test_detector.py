@@ -7,12 +7,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation

@@ -5,11 +5,10 @@ import copy
 import numpy as np
 import pytest
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULT_STATES
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.inflow.diurnal import DiurnalInflow

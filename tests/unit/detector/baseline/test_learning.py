@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from wetwell.detector.baseline.learning import DAY_S, LEARNING_S, Learning, sibling_rejection, stationarity_rejection
+from wetwell.detector.baseline.learning import DAY_S, Learning, sibling_rejection, stationarity_rejection
 from wetwell.detector.baseline.model import MIN_RUNS
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.detector import Detector
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.services.stations import find_scenario
 from wetwell.simulator.simulation import Simulation
 
