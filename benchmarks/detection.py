@@ -20,6 +20,7 @@ import numpy as np
 
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.backtest import SimulatedRecording, detector_names, run_backtest
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.faults import Fault
@@ -30,7 +31,6 @@ from wetwell.simulator.inflow.surges import Surges
 from wetwell.simulator.scenario import Scenario
 
 DAY_S = 86_400
-LEARNING_S = DAY_S / 4
 
 
 @dataclass(frozen=True, slots=True)

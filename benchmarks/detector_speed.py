@@ -22,7 +22,7 @@ from timing import least_s
 
 from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.pump_judge import ROLLING_SAMPLES
+from wetwell.detector.runs.run_tracker import ROLLING_SAMPLES
 from wetwell.detector.statistics.rolling_f_test import LOG_P, RollingFTest, scan
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.arrays import Floats
@@ -45,7 +45,7 @@ def judge(datasheet: Datasheet, recording: Recording) -> None:
     """The whole pipeline over a recording, as `wetwell detect` has it."""
     detector = Detector("alpha", datasheet)
     for block in blocks(recording, datasheet.pumps):
-        detector.take(block)
+        detector.update_block(block)
     detector.finish()
 
 
@@ -99,7 +99,7 @@ def memory_kb(seed: int, days: Sequence[int]) -> dict[str, dict[str, float]]:
     largest = 0.0
     for day in range(1, max(days) + 1):
         for block in blocks(simulation.advance(DAY_S, truth=False), datasheet.pumps):
-            detector.take(block)
+            detector.update_block(block)
         state = detector.snapshot()
         gc.collect()
         tracemalloc.start()

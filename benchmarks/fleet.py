@@ -47,7 +47,7 @@ def wanted(folder: Path, load: list[Played]) -> Told:
         detector = Detector(station.name, datasheet_of(station))
         detector.restore((folder / "state" / f"{each.name}.detector.json").read_bytes())
         for block in blocks(each.recording, len(station.pump)):
-            for verdict in detector.take(block._replace(seq=block.seq + each.begin_s)):
+            for verdict in detector.update_block(block._replace(seq=block.seq + each.begin_s)):
                 told[verdict.station, verdict.time, verdict.pump] = verdict.encode()
     return told
 

@@ -130,7 +130,7 @@ def blocks_of(recording: Recording) -> Iterator[Block]:
 
 def judged(detector: Any, recording: Recording) -> list[ScoredRun]:
     """Cycles of pump 1 after learning, as a detector tells them."""
-    verdicts = [verdict for block in blocks_of(recording) for verdict in detector.take(block)]
+    verdicts = [verdict for block in blocks_of(recording) for verdict in detector.update_block(block)]
     verdicts += detector.finish()
     return [run for run in scored_runs(verdicts, recording) if run.pump == 1]
 
@@ -164,7 +164,7 @@ def reasons(station: Station, recording: Recording) -> dict[str, Any]:
     datasheet = datasheet_of(station)
     keeper = Cycles(station.name, datasheet)
     for block in blocks_of(recording):
-        keeper.take(block)
+        keeper.update_block(block)
     keeper.finish()
     origin_ns = int(recording.time_ns[0])
     figures: dict[str, Any] = {}

@@ -66,7 +66,7 @@ def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
                 break
             until_s = LEARNT_S + share * SHIFT_S
             for block in blocks(part_of(recording, begin_s, until_s), len(small.pump)):
-                detector.take(block._replace(seq=block.seq + begin_s))
+                detector.update_block(block._replace(seq=block.seq + begin_s))
             begin_s, name = until_s, f"s{index:05d}"
             (folder / "stations" / f"{name}.toml").write_text(source.replace('"alpha"', f'"{name}"'))
             head, _, body = detector.snapshot().partition(b"\n")

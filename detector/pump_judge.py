@@ -1,169 +1,268 @@
-"""What the detector knows of one pump."""
+"""The judge of one pump: what its runs say, held against what it has learnt."""
 
-from collections import deque
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
-from wetwell.detector.baseline.learning import Learning
-from wetwell.detector.baseline.model import Baseline, Curve
-from wetwell.detector.inference.observation import Check, learn_check, log_power
-from wetwell.detector.inference.onset import onset_s
-from wetwell.detector.inference.prior import PumpBelief
-from wetwell.detector.runs.run import Run
-from wetwell.detector.statistics.cusum import Cusum
-from wetwell.detector.stream.missing_signals import BlindWatch
-from wetwell.detector.stream.stuck_sensors import healthy_noise, reading_noise
-from wetwell.detector.verdict.control_limits import IndexLimits
-from wetwell.protocols.arrays import Floats
+import numpy as np
+
+from wetwell.detector.baseline.healthy_reference import HealthyReference
+from wetwell.detector.baseline.learning import Learning, sibling_rejection
+from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.inference.decision import decide, onset_component
+from wetwell.detector.inference.observation import observe
+from wetwell.detector.inference.posterior import (
+    BOTH,
+    FAULT_STATES,
+    PUMP_FAULT,
+    SYSTEM_FAULT,
+    Posterior,
+    fault_scales,
+    posterior_of,
+)
+from wetwell.detector.inference.prior import SystemPrior, joint_prior, update_prior
+from wetwell.detector.pump_memory import PumpMemory
+from wetwell.detector.runs.run import Run, Segments
+from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, silencing_sensors
+from wetwell.detector.statistics.robust import median
+from wetwell.detector.stream.run_state import NEEDED
+from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE
+from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
+from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
+from wetwell.detector.verdict.severity import severity
 from wetwell.protocols.messages.messages import State
-from wetwell.protocols.timestamps import NS_PER_S
 
-ROLLING_SAMPLES = 300
-RECENT_RUNS = 12
-LEARNING_VALUES = 500
+EARLY_PROBABILITY = 0.999
+EARLY_SEGMENTS = 2
+NOISE_WEIGHT = 0.05
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Knowledge:
-    """A learnt baseline with all that was learnt beside it.
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What a verdict says, but for who says it and when."""
 
-    Attributes
+    state: State
+    onset_ns: int | None
+    window_ns: tuple[int, int]
+    probability: Mapping[State, float]
+    evidence: dict[str, Any]
+
+
+class PumpJudge:
+    """Judges one pump: its runs, looks at one that goes on, and what is left of it without head or frequency.
+
+    Parameters
     ----------
-    version : int
-        From 1; each learning phase adds one.
-    learnt_ns : int
-        Stamp of the end of the learning phase.
-    baseline : Baseline
-    drawdown, power : Check
-    noise : (2,) array
-        Of flow and head from second to second, as shares of their means.
+    pump : int
+        From 0.
+    datasheet : Datasheet
+        Of the station.
+    costs : Costs
+        For the expected cost of each act.
     """
 
-    version: int
-    learnt_ns: int
-    baseline: Baseline
-    drawdown: Check
-    power: Check
-    noise: Floats
+    def __init__(self, pump: int, datasheet: Datasheet, costs: Costs) -> None:
+        self.memory = PumpMemory()
+        self._pump = pump
+        self._datasheet = datasheet
+        self._curve = datasheet.curves[pump]
+        self._costs = costs
 
+    def tell(self, time_ns: int, reason: str) -> Judgement:
+        """What was told last, with the reason why it is told again."""
+        evidence: dict[str, Any] = {"reason": reason}
+        if self.memory.reference is not None:
+            evidence["baseline"] = self.memory.reference.version
+        return self._judgement((time_ns, time_ns), {self.memory.state: 1.0}, evidence)
 
-@dataclass(slots=True)
-class PumpRecord:
-    """State of one pump.
+    def judge(self, run: Run, time_ns: int, system: SystemPrior, station: Sequence[PumpMemory]) -> Judgement:
+        """Judge a run that has ended, or that has turned out to lack a signal.
 
-    Attributes
-    ----------
-    learning : Learning
-        The learning phase; None when it is over.
-    known, previous : Knowledge
-        The baseline in use, and the one that a re-baseline has put aside.
-    belief : PumpBelief
-    state : State
-        What was told last.
-    onset_ns : int
-        Estimate of when the fault began that is told.
-    blind : BlindWatch
-        What is watched while head or frequency is not measured.
-    early : State
-        Fault that the last look at an open run was sure of.
-    """
+        Parameters
+        ----------
+        run : Run
+        time_ns : int
+            When it is judged.
+        system : SystemPrior
+            Of the main; what the run says of it is taken in.
+        station : sequence of PumpMemory
+            Of all pumps: what is learnt must agree with the siblings.
+        """
+        memory = self.memory
+        memory.early = None
+        memory.cusum.reset()
+        evidence: dict[str, Any] = {"steady_samples": len(run.time_s)}
+        if run.missing:
+            evidence["missing"] = sorted(run.missing)
+        if not len(run.segments):
+            return self._without_segment(run, evidence)
+        wrong = silencing_sensors(run, memory.reference)
+        if wrong:
+            return self._sensor_fault(run, evidence | wrong)
+        if memory.learning is not None:
+            self._learn(run, memory.learning, time_ns, station)
+        rng = _generator(run)
+        evidence |= run_evidence(run, self._datasheet, rng)
+        if memory.reference is None:
+            memory.state = "learning"
+            evidence["reason"] = memory.learning.reason if memory.learning is not None else ""
+            return self._judgement(run.window_ns, {"learning": 1.0}, evidence)
+        return self._compare(run, memory.reference, system, evidence, rng)
 
-    learning: Learning | None = field(default_factory=Learning)
-    began_s: float = 0.0
-    known: Knowledge | None = None
-    previous: Knowledge | None = None
-    versions: int = 0
-    belief: PumpBelief = field(default_factory=PumpBelief)
-    state: State = "learning"
-    onset_ns: int | None = None
-    early: State | None = None
-    blind: BlindWatch = field(default_factory=BlindWatch)
-    cusum: Cusum = field(default_factory=Cusum)
-    limits: IndexLimits = field(default_factory=IndexLimits)
-    log_ratios: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
-    log_powers: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
-    noises: deque[Floats] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
-    recent: deque[tuple[int, Floats]] = field(default_factory=lambda: deque(maxlen=RECENT_RUNS))
+    def segments_since_change(self, last: Segments) -> int:
+        """Segments of the open run since a change that is worth a look, by the last of them; 0 without one."""
+        memory = self.memory
+        if memory.reference is None:
+            return 0
+        baseline = memory.reference.baseline
+        deviation_m = np.sqrt(baseline.noise(last).diagonal() + baseline.run_covariance.diagonal())
+        since = memory.cusum.update(baseline.shifts(last)[0], deviation_m)
+        if since >= EARLY_SEGMENTS:
+            return since
+        memory.early = None
+        return 0
 
-    @property
-    def offset_m(self) -> float | None:
-        """r_p of the pump, learnt or being learnt; None while there is nothing to tell it from. [m]."""
-        if self.known is not None:
-            return float(self.known.baseline.offset_m[0])
-        return self.learning.offset_m if self.learning is not None else None
-
-    def learn(
-        self, run: Run, log_ratio: float, seen_s: float, curve: Curve, friction_h2_m5: float
-    ) -> Baseline | None:
-        """Take a run of the learning phase into account; the baseline if that can end it."""
-        if self.learning is None:
+    def look_early(self, run: Run, system: SystemPrior) -> Judgement | None:
+        """Judge the last segments of an open run, if two looks in a row are sure of a fault not told yet."""
+        memory = self.memory
+        reference = memory.reference
+        if reference is None or run.stuck:
+            memory.early = None
             return None
-        self.learning.add(run.segments, seen_s - self.began_s)
-        self.log_ratios.append(log_ratio)
-        self.log_powers.append(log_power(run))
-        self.noises.append(reading_noise(run))
-        found = self.learning.baseline(seen_s - self.began_s, curve, friction_h2_m5)
-        return None if found is None else found[0]
+        is_dry = median(run.total_flow_m3h) < NO_FLOW_SHARE * self._datasheet.runout_flow_m3h(self._pump)
+        if is_dry and math.isfinite(reference.drawdown.mean):
+            return None  # the drawdown will tell at the end of the run whether the flow meter is dead
+        evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
+        posterior = self._posterior(replace(run, log_ratio=math.nan), reference, system, evidence)
+        state, remark = decide(posterior, float(median(run.head_m)))
+        fault = posterior.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum()
+        previous, memory.early = memory.early, state if state in FAULT_STATES and fault > EARLY_PROBABILITY else None
+        if memory.early is None or memory.early != previous or state == memory.state:
+            return None
+        rng = _generator(run)
+        memory.recent.append((sum(run.window_ns) // 2, posterior.shift_m))
+        memory.tell(state, run.window_ns, onset_component(state))
+        memory.recent.pop()
+        evidence |= run_evidence(run, self._datasheet, rng)
+        evidence["index"] = memory.limits.figures(run.segments, reference.baseline, rng)
+        evidence |= self._consequences(run, reference, posterior, posterior.by_state(), state, remark)
+        return self._judgement(run.window_ns, posterior.by_state(), evidence)
 
-    def settle(self, baseline: Baseline, now_ns: int, seen_s: float) -> None:
-        """End the learning phase with this baseline."""
-        if self.learning is None:
+    def watch_missing(self, gathered: Any, lacking: list[str], time_ns: int) -> Judgement | None:
+        """Judge a pump that lacks signals by a full segment of `new_missing_signals`, where what is off changes."""
+        if not self.memory.missing_signals.update(gathered):
+            return None
+        now = time_ns, time_ns
+        self.memory.tell("unknown", now, None)
+        evidence = {"early": True, "missing": lacking, "reason": _missing_reason(lacking)}
+        evidence |= self.memory.missing_signals.evidence(int(gathered["running"]))
+        return self._judgement(now, {"unknown": 1.0}, evidence)
+
+    def _without_segment(self, run: Run, evidence: dict[str, Any]) -> Judgement:
+        """Judge a run without a segment."""
+        memory, lacking = self.memory, sorted(run.missing & NEEDED)
+        is_learnt = memory.reference is not None
+        if lacking and is_learnt:
+            return self._sensor_fault(run, evidence | {"lost": lacking})
+        few = f"fewer than {run.segments.samples} steady samples"
+        evidence["reason"] = _missing_reason(lacking) if lacking else few
+        if lacking or is_learnt:
+            memory.tell("unknown", run.window_ns, None)
+        if lacking:
+            evidence |= memory.missing_signals.evidence(run.running)
+        return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
+
+    def _sensor_fault(self, run: Run, evidence: dict[str, Any]) -> Judgement:
+        """Judge a run of which a sensor is wrong without doubt."""
+        self.memory.tell("sensor_fault", run.window_ns, None)
+        evidence["advice"] = advice("sensor_fault", in_words(evidence))
+        return self._judgement(run.window_ns, {"sensor_fault": 1.0}, evidence)
+
+    def _learn(self, run: Run, learning: Learning, time_ns: int, station: Sequence[PumpMemory]) -> None:
+        baseline = self.memory.learn(learning, run, self._curve, self._datasheet.friction_h2_m5)
+        if baseline is None:
             return
-        self.versions += 1
-        self.known = Knowledge(
-            version=self.versions,
-            learnt_ns=now_ns,
-            baseline=baseline,
-            drawdown=learn_check(self.log_ratios),
-            power=learn_check(self.log_powers),
-            noise=healthy_noise(self.noises),
-        )
-        self.limits = IndexLimits()
-        for segments in self.learning.runs(seen_s - self.began_s, float("inf")):
-            self.limits.add(segments, baseline)
-        self.learning = None
-        self._forget()
+        rejection = sibling_rejection(self._pump, [pump.offset_m for pump in station], self._datasheet.curves)
+        if rejection is None:
+            self.memory.settle(learning, baseline, time_ns, run.seen_s)
+        else:
+            learning.reason = rejection
 
-    def rebaseline(self, seen_s: float) -> None:
-        """Put the baseline aside and learn anew."""
-        self.previous, self.known = self.known or self.previous, None
-        self.learning = Learning()
-        self.began_s = seen_s
-        self.state = "learning"
-        self._begin_anew()
+    def _compare(
+        self,
+        run: Run,
+        reference: HealthyReference,
+        system: SystemPrior,
+        evidence: dict[str, Any],
+        rng: np.random.Generator,
+    ) -> Judgement:
+        """Judge a run by what was learnt."""
+        memory = self.memory
+        posterior = self._posterior(run, reference, system, evidence)
+        update_prior(posterior.probability, memory.prior, system)
+        state, remark = decide(posterior, float(median(run.head_m)))
+        memory.recent.append((sum(run.window_ns) // 2, posterior.shift_m))
+        wrong = doubtful_sensors(run, reference)
+        evidence |= wrong
+        if wrong and state not in FAULT_STATES:
+            state, remark = "sensor_fault", in_words(wrong)
+        memory.tell(state, run.window_ns, onset_component(state))
+        evidence["index"] = memory.limits.figures(run.segments, reference.baseline, rng)
+        if state == "normal":
+            baseline = reference.baseline.with_noise_of(run.segments, NOISE_WEIGHT, self._curve[0])
+            memory.reference = replace(reference, baseline=baseline)
+            memory.limits.add(run.segments, baseline)
+        probability = posterior.by_state()
+        if state == "sensor_fault" and wrong:
+            probability |= {"normal": 0.0, "sensor_fault": probability["normal"] + probability["sensor_fault"]}
+        evidence |= self._consequences(run, reference, posterior, probability, state, remark)
+        return self._judgement(run.window_ns, probability, evidence)
 
-    def revert(self) -> bool:
-        """Take the baseline back that was put aside last; False if there is none."""
-        if self.previous is None:
-            return False
-        self.known, self.previous, self.learning = self.previous, self.known, None
-        self.state = "unknown"
-        self._begin_anew()
-        return True
+    def _posterior(
+        self, run: Run, reference: HealthyReference, system: SystemPrior, evidence: dict[str, Any]
+    ) -> Posterior:
+        """Probability of each cause; what it rests on becomes part of the evidence."""
+        observation = observe(run, reference, self._curve, self._datasheet.friction_h2_m5)
+        evidence |= shift_evidence(observation)
+        evidence["baseline"] = reference.version
+        scales = fault_scales(self._datasheet, self._pump, reference.baseline)
+        return posterior_of(observation, scales, joint_prior(self.memory.prior, system))
 
-    def _begin_anew(self) -> None:
-        """Forget what belongs to another baseline."""
-        self._forget()
-        self.belief = PumpBelief()
-        self.onset_ns, self.early = None, None
-        self.limits = IndexLimits()
-        self.recent.clear()
-        self.blind = BlindWatch()
-        self.cusum.reset()
+    def _consequences(
+        self,
+        run: Run,
+        reference: HealthyReference,
+        posterior: Posterior,
+        probability: Mapping[State, float],
+        state: State,
+        remark: str | None,
+    ) -> dict[str, Any]:
+        """Severity, advice and expected costs."""
+        flow_m3h = float(median(run.segments.flow_m3h))
+        friction_m = self._datasheet.friction_h2_m5 * float(median(run.segments.total_m3h)) ** 2
+        healthy_m3h = reference.baseline.explained_flows(run.segments)[0]
+        power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
+        run_share = run.run_s / max(run.seen_s, 1.0)
+        wasted_kwh = power_kw * 24.0 * run_share * max(1.0 - flow_m3h / max(healthy_m3h, 1e-9), 0.0)
+        return {
+            "severity": severity(posterior.shift_m, posterior.deviation_m, self._curve, flow_m3h, friction_m),
+            "advice": advice(state, remark),
+            "cost": expected_costs(probability, wasted_kwh, self._costs),
+        }
 
-    def _forget(self) -> None:
-        """Forget the figures of the learning phase."""
-        self.log_ratios.clear()
-        self.log_powers.clear()
-        self.noises.clear()
+    def _judgement(
+        self, window_ns: tuple[int, int], probability: Mapping[State, float], evidence: dict[str, Any]
+    ) -> Judgement:
+        memory = self.memory
+        onset_ns = memory.onset_ns if memory.state in FAULT_STATES else None
+        return Judgement(memory.state, onset_ns, window_ns, probability, evidence)
 
-    def take_state(self, state: State, window_ns: tuple[int, int], component: int | None) -> None:
-        """Tell a state; of a new fault the onset is estimated from the recent runs and stays."""
-        if component is None:
-            self.onset_ns = None
-        elif self.onset_ns is None:
-            first_ns = self.recent[0][0] if self.recent else window_ns[0]
-            times_s = [(time_ns - first_ns) / NS_PER_S for time_ns, _ in self.recent]
-            shifts_m = [float(shift_m[component]) for _, shift_m in self.recent]
-            estimate_ns = first_ns + round(onset_s(times_s, shifts_m)) * NS_PER_S if times_s else window_ns[0]
-            self.onset_ns = min(estimate_ns, window_ns[1])
-        self.state = state
+
+def _generator(run: Run) -> np.random.Generator:
+    """What resamples of a run are drawn with: the same whenever it is judged."""
+    return np.random.default_rng(abs(run.window_ns[0]) + run.pump)
+
+
+def _missing_reason(lacking: list[str]) -> str:
+    return f"without {', '.join(lacking)} pump and system cannot be told apart"

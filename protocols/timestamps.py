@@ -10,6 +10,8 @@ import numpy.typing as npt
 from wetwell.protocols.arrays import Integers
 
 NS_PER_S = 1_000_000_000
+LEARNING_S = 6.0 * 3600.0
+"""The first six hours are healthy: a detector learns from them, no fault begins in them, nothing is scored. [s]"""
 MAX_STAMP_NS = 2**63 - 1
 """In the year 2262; the first stamp is as far before 1970."""
 

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from wetwell.protocols.quantities import STATION_QUANTITIES
 from wetwell.protocols.station.station_file import Control, EffectTable, Pump, Station
+from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.simulator.duty import check_operable
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.faults import FAULTS
@@ -27,8 +28,6 @@ from wetwell.simulator.scenario import Scenario
 
 FaultClass = Literal["normal", "pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault"]
 
-LEARNING_S = 21_600.0
-"""No fault begins in the first six hours, in which a detector may learn. [s]"""
 MIN_LENGTH_S = LEARNING_S + 3600.0
 MIN_RAMP_S = 300.0
 MAX_PUMPS = 4

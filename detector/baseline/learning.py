@@ -5,13 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wetwell.detector.baseline.model import FLOOR_SHARE, MIN_RUNS, MIN_SEGMENTS, Baseline, Curve, learn
+from wetwell.detector.baseline.model import FLOOR_SHARE, MIN_RUNS, MIN_SEGMENTS, Baseline, learn
+from wetwell.detector.curves.datasheet import Curve
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.runs.run import Segments
 from wetwell.detector.statistics.robust import step_variance
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.timestamps import LEARNING_S
 
-LEARNING_S = 6.0 * 3600.0
 DAY_S = 24.0 * 3600.0
 DRIFT_SIGMAS = 5.0
 WANDERING_SHARE = 0.02
@@ -72,13 +73,13 @@ class Learning:
         runs = self.runs(seen_s, LEARNING_S)
         baseline = learn(runs, curve, friction_h2_m5)
         deviations_m = baseline.deviations(runs)
-        doubt = objection(deviations_m, baseline, runs, curve[0])
+        doubt = stationarity_rejection(deviations_m, baseline, runs, curve[0])
         if doubt is None:
             self.reason = ""
             return baseline, runs
         self.reason = doubt
         across_m, gains = _meter_apart(deviations_m, baseline, curve, friction_h2_m5)
-        is_like_meter = objection(across_m, baseline, runs, curve[0]) is None
+        is_like_meter = stationarity_rejection(across_m, baseline, runs, curve[0]) is None
         self._is_wandering = is_like_meter and float(np.std(gains)) <= WANDERING_SHARE
         return None
 
@@ -91,7 +92,7 @@ class Learning:
         runs = self.runs(seen_s, DAY_S)
         baseline = learn(runs, curve, friction_h2_m5)
         across_m, gains = _meter_apart(baseline.deviations(runs), baseline, curve, friction_h2_m5)
-        doubt = objection(across_m, baseline, runs, curve[0])
+        doubt = stationarity_rejection(across_m, baseline, runs, curve[0])
         if doubt is None and float(np.std(gains)) <= WANDERING_SHARE:
             self.reason = ""
             return baseline, runs
@@ -100,7 +101,7 @@ class Learning:
         return None
 
 
-def objection(
+def stationarity_rejection(
     deviations_m: Floats, baseline: Baseline, runs: Sequence[Segments], shutoff_head_m: float
 ) -> str | None:
     """Why runs cannot serve as a baseline, or None: what they deviate by must not have moved while it was learnt.
@@ -142,9 +143,7 @@ def _meter_apart(
     return deviations_m - np.outer(gains, direction), gains
 
 
-def sibling_objection(
-    pump: int, offsets_m: Sequence[float | None], curves: Sequence[tuple[float, float, float]]
-) -> str | None:
+def sibling_rejection(pump: int, offsets_m: Sequence[float | None], curves: Sequence[Curve]) -> str | None:
     """Why a pump cannot be healthy if its siblings are, or None.
 
     Parameters

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.detector.runs.run import SEGMENT_SAMPLES, Segments
+from wetwell.detector.curves.datasheet import Curve
+from wetwell.detector.runs.run import Segments
 from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
-
-Curve = tuple[float, float, float]
 
 MIN_RUNS = 4
 MIN_SEGMENTS = 2

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wetwell.protocols.arrays import Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Station
 
-Table = npt.NDArray[np.void]
+Curve = tuple[float, float, float]
+"""(c0, c1, c2) of the pump curve at nominal speed, Q in m³/h."""
 TABLE = np.dtype(
     [
         (name, np.float64)
@@ -41,7 +42,7 @@ class Datasheet:
         Cross-section of the wet well. [m²]
     """
 
-    curves: tuple[tuple[float, float, float], ...]
+    curves: tuple[Curve, ...]
     frequencies_hz: tuple[float, ...]
     static_head_m: float
     friction_h2_m5: float
@@ -58,7 +59,7 @@ class Datasheet:
         c0, c1, c2 = self.curves[pump]
         return 2.0 * c0 / (-c1 + math.sqrt(c1 * c1 - 4.0 * c2 * c0))
 
-    def table(self) -> Table:
+    def table(self) -> Records:
         """One record a pump, as compiled code reads the datasheet."""
         station = (self.static_head_m, self.friction_h2_m5, self.is_common_header)
         return np.array(

@@ -5,11 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.detector.curves.datasheet import Curve
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
-
-Curve = tuple[float, float, float]
-"""(c0, c1, c2) of the pump curve at nominal speed, Q in m³/h."""
 
 
 def _distances(

@@ -2,9 +2,8 @@
 
 import numpy as np
 
+from wetwell.detector.curves.datasheet import Curve
 from wetwell.protocols.arrays import Floats
-
-Curve = tuple[float, float, float]
 
 
 def flow_meter_direction(

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from wetwell.detector.baseline.learning import DAY_S
 from wetwell.detector.evaluation.detections import (
-    DAY_S,
     ORIGINS,
     Detection,
     FalseAlarms,
@@ -21,7 +21,6 @@ from wetwell.detector.evaluation.scores import (
     ABSTENTIONS,
     CLASSES,
     FAULTS,
-    LEARNING_S,
     ScoredRun,
     confusion,
     f1,
@@ -32,6 +31,7 @@ from wetwell.detector.evaluation.scores import (
 )
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.timestamps import LEARNING_S
 
 SEVERITY_EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)
 _LEAST = 1e-9  # a fault that has just begun belongs to the first bin

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from wetwell.detector.evaluation.scores import FAULTS, LEARNING_S, learning_end_ns, severity_column, step_s, truth_of
+from wetwell.detector.baseline.learning import DAY_S
+from wetwell.detector.evaluation.scores import FAULTS, learning_end_ns, severity_column, step_s, truth_of
 from wetwell.detector.stream.run_state import WARM_UP_S
 from wetwell.protocols.arrays import Flags
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 
-DAY_S = 86_400.0
 MERGE_S = 3600.0
 """A fault that comes again within this time is the same fault. [s]"""
 ORIGINS: tuple[State, ...] = ("pump_fault", "system_fault", "sensor_fault")

@@ -9,13 +9,11 @@ import numpy.typing as npt
 from wetwell.protocols.arrays import Integers
 from wetwell.protocols.messages.messages import State, Verdict
 from wetwell.protocols.recordings.recording import TRUTH_PREFIX, Recording
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 
 CLASSES: tuple[State, ...] = ("normal", "pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault")
 FAULTS = CLASSES[1:]
 ABSTENTIONS: tuple[State, ...] = ("unknown", "learning")
-LEARNING_S = 6.0 * 3600.0
-"""What ends in this time from the first sample is not scored, whoever judges it. [s]"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from wetwell.detector.inference.posterior import (
     PUMP_FAULT,
     STATES,
     SYSTEM_FAULT,
-    Weighed,
+    Posterior,
 )
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
@@ -27,7 +27,7 @@ METER_TOLERANCE = 0.03
 """Relative error of a meter that is told but not taken for a fault: in health it may wander by as much."""
 
 
-def decide(weighed: Weighed, head_m: float) -> tuple[State, str | None]:
+def decide(posterior: Posterior, head_m: float) -> tuple[State, str | None]:
     """State to tell, and a remark.
 
     A fault above `ALARM_PROBABILITY`, if one of them stands out and its shift is larger than `tolerance_m`; a wrong
@@ -36,24 +36,24 @@ def decide(weighed: Weighed, head_m: float) -> tuple[State, str | None]:
 
     Parameters
     ----------
-    weighed : Weighed
+    posterior : Posterior
     head_m : float
         Head of the run, to which the error of the head sensor is compared. [m]
     """
-    p = weighed.probability
+    p = posterior.probability
     fault = float(p[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum())
     meter = float(p[[FLOW_METER, HEAD_SENSOR]].sum())
     is_flow = p[FLOW_METER] >= p[HEAD_SENSOR]
     scale = 1.0 if is_flow else max(abs(head_m), 1e-9)
-    error = (weighed.flow_error if is_flow else weighed.head_error_m) / scale
-    deviation = max((weighed.flow_deviation if is_flow else weighed.head_deviation_m) / scale, 1e-9)
+    error = (posterior.flow_error if is_flow else posterior.head_error_m) / scale
+    deviation = max((posterior.flow_deviation if is_flow else posterior.head_deviation_m) / scale, 1e-9)
     beyond = float(_beyond(error, deviation, METER_TOLERANCE))
     name = "flow meter" if is_flow else "head sensor"
     if fault > ALARM_PROBABILITY:
         best = PUMP_FAULT + int(np.argmax(p[[PUMP_FAULT, SYSTEM_FAULT, BOTH]]))
         if p[best] < SEPARATED_SHARE * fault:
             return "unknown", "something has moved, but pump and system cannot be told apart yet"
-        return _sized(best, weighed)
+        return _sized(best, posterior)
     if meter * beyond > METER_PROBABILITY:
         return "sensor_fault", f"the {name} reads {error:+.1%}"
     remark = f"the {name} may read {error:+.1%}" if meter > 0.5 else None
@@ -65,17 +65,17 @@ def onset_component(state: State) -> int | None:
     return {"pump_fault": PUMP, "system_fault": SYSTEM, "pump_and_system_fault": PUMP}.get(state)
 
 
-def _sized(best: int, weighed: Weighed) -> tuple[State, str | None]:
+def _sized(best: int, posterior: Posterior) -> tuple[State, str | None]:
     """State and remark of a fault that is certain, by how large it is."""
     moved = np.array([best in (PUMP_FAULT, BOTH), best in (SYSTEM_FAULT, BOTH)])
-    beyond = np.where(moved, _beyond(weighed.shift_m, weighed.deviation_m, weighed.tolerance_m), 0.0)
+    beyond = np.where(moved, _beyond(posterior.shift_m, posterior.deviation_m, posterior.tolerance_m), 0.0)
     has_pump, has_system = beyond > BEYOND_PROBABILITY
-    if has_pump and weighed.shift_m[PUMP] > 0.0:
+    if has_pump and posterior.shift_m[PUMP] > 0.0:
         return "unknown", "the pump gives more head than when it was learnt: re-baseline if it was repaired"
     if has_pump:
         return STATES[BOTH if has_system else PUMP_FAULT], None
     if has_system:
-        is_burst = weighed.shift_m[SYSTEM] < 0.0
+        is_burst = posterior.shift_m[SYSTEM] < 0.0
         return STATES[
             SYSTEM_FAULT
         ], "the main takes less head: look for a burst or an open drain" if is_burst else None

@@ -1,54 +1,23 @@
 """What a run shows, as distances from what its pump's baseline expects."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.detector.baseline.model import MIN_RUNS, Baseline, Curve
+from wetwell.detector.baseline.healthy_reference import HealthyReference, log_power
+from wetwell.detector.curves.datasheet import Curve
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction, head_sensor_direction
 from wetwell.detector.runs.run import Run
-from wetwell.detector.statistics.robust import NORMAL_MEDIAN, median, step_variance
+from wetwell.detector.statistics.robust import median, step_variance
 from wetwell.protocols.arrays import Floats
 
 PUMP, SYSTEM, DRAWDOWN, POWER = range(4)
 """Components of an observation."""
 COMPONENTS = ("pump", "system", "drawdown", "power")
 
-CHECK_FLOOR = 0.004
-"""Least standard deviation of the logarithm of drawdown and power between runs."""
 MIN_STEPS = 4
 NOISIER_FACTOR = 3.0
 """A run's own variance counts where it is larger than this times the learnt one."""
-POWER_EXPONENT = 2.0
-"""Of the speed: between 1 for a constant load and 3 for a free one; the scatter learnt covers the rest."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
-    """Mean and variance of a figure that does without the curves, over healthy runs; NaN where it was never known."""
-
-    mean: float
-    variance: float
-
-
-def learn_check(values: Sequence[float]) -> Check:
-    """Median and robust variance of the finite values, NaN with fewer than `MIN_RUNS`."""
-    known = np.array([value for value in values if math.isfinite(value)])
-    if len(known) < MIN_RUNS:
-        return Check(mean=math.nan, variance=math.nan)
-    middle = float(median(known))
-    deviation = NORMAL_MEDIAN * float(median(np.abs(known - middle)))
-    return Check(mean=middle, variance=max(deviation, CHECK_FLOOR) ** 2 * (1.0 + 1.0 / len(known)))
-
-
-def log_power(run: Run) -> float:
-    """Logarithm of the electrical power of a run, taken to nominal speed; NaN where it is not measured."""
-    known = np.isfinite(run.power_kw) & (run.power_kw > 0.0)
-    if 2 * np.count_nonzero(known) < len(run.power_kw) or not known.any():
-        return math.nan
-    return float(np.mean(np.log(run.power_kw[known]) - POWER_EXPONENT * np.log(run.speed_ratio[known])))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,15 +52,7 @@ class Observation:
         return sigmas
 
 
-def observe(
-    run: Run,
-    baseline: Baseline,
-    curve: Curve,
-    friction_h2_m5: float,
-    *,
-    drawdown: tuple[float, Check],
-    power: Check,
-) -> Observation:
+def observe(run: Run, reference: HealthyReference, curve: Curve, friction_h2_m5: float) -> Observation:
     """Observation of a run with at least one segment.
 
     The median over its segments, whose variance is π/2 times that of the mean: a run in which something comes or goes
@@ -101,16 +62,12 @@ def observe(
     Parameters
     ----------
     run : Run
-    baseline : Baseline
+    reference : HealthyReference
         Of its pump.
     curve, friction_h2_m5
         By the datasheet.
-    drawdown : (float, Check)
-        Logarithm of metered flow over drawdown flow, and what it is in health.
-    power : Check
-        What the logarithm of the power is in health.
     """
-    segments = run.segments
+    segments, baseline = run.segments, reference.baseline
     shifts_m = baseline.shifts(segments)
     flow_m3h, total_m3h = float(median(segments.flow_m3h)), float(median(segments.total_m3h))
     level_m = float(median(segments.level_m))
@@ -127,12 +84,13 @@ def observe(
         + baseline.run_covariance
         + np.diag(healthy_variance)
     )
-    covariance[DRAWDOWN, DRAWDOWN] = drawdown[1].variance
-    covariance[POWER, POWER] = power.variance
+    covariance[DRAWDOWN, DRAWDOWN] = reference.drawdown.variance
+    covariance[POWER, POWER] = reference.power.variance
     speed_ratio = float(median(segments.speed_ratio))
     direction = flow_meter_direction(flow_m3h, flow_m3h * speed_ratio, total_m3h, curve, friction_h2_m5)
+    drawdown, power = run.log_ratio - reference.drawdown.mean, log_power(run) - reference.power.mean
     return Observation(
-        mean=np.array([*median(shifts_m), drawdown[0] - drawdown[1].mean, log_power(run) - power.mean]),
+        mean=np.array([*median(shifts_m), drawdown, power]),
         covariance=covariance,
         slope_variance=slope_variance,
         flow_meter=np.array([*direction, 1.0, 0.0]),

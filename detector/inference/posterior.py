@@ -12,7 +12,7 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.messages.messages import State
 
 STATES: tuple[State, ...] = ("normal", "pump_fault", "system_fault", "pump_and_system_fault")
-FAULTS = STATES[1:]
+FAULT_STATES = STATES[1:]
 
 NORMAL, PUMP_FAULT, SYSTEM_FAULT, BOTH, FLOW_METER, HEAD_SENSOR = range(6)
 """Hypotheses."""
@@ -56,7 +56,7 @@ class Scales:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Weighed:
+class Posterior:
     """What a run says.
 
     Attributes
@@ -135,7 +135,7 @@ def fault_scales(datasheet: Datasheet, pump: int, baseline: Baseline) -> Scales:
     )
 
 
-def weigh(observation: Observation, scales: Scales, prior: Floats) -> Weighed:
+def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Posterior:
     r"""Probability of each hypothesis after a run.
 
     $$P(h \mid y) \propto P(h)\; N(y;\ 0,\ C + D_h)\; S_h, \qquad
@@ -187,7 +187,7 @@ def weigh(observation: Observation, scales: Scales, prior: Floats) -> Weighed:
     head_error_m, head_deviation_m = _meter_error(
         observation.head_sensor[known], scales.head_m**2, inverse[HEAD_SENSOR], mean
     )
-    return Weighed(
+    return Posterior(
         probability=weight / weight.sum(),
         shift_m=estimates,
         deviation_m=deviations,

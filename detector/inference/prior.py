@@ -1,4 +1,4 @@
-"""What is believed before the next run: of each pump and its meters, and of the main that they share."""
+"""Probabilities before the next run: of each pump and its meters, and of the main that they share."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,11 @@ SYSTEM_PRIOR = 0.05
 FLOW_METER_PRIOR = 0.01
 HEAD_SENSOR_PRIOR = 0.005
 CHANGE_PER_RUN = 0.05
-"""Share of a belief that is forgotten from run to run: faults come and go."""
+"""Share of a prior that is forgotten from run to run: faults come and go."""
 
 
 @dataclass(slots=True)
-class PumpBelief:
+class PumpPrior:
     """Probabilities that a pump has a fault, and that its flow meter or its head sensor is wrong."""
 
     pump: float = PUMP_PRIOR
@@ -25,13 +25,13 @@ class PumpBelief:
 
 
 @dataclass(slots=True)
-class SystemBelief:
+class SystemPrior:
     """Probability that the system has a fault: what one pump meets, the others will."""
 
     system: float = SYSTEM_PRIOR
 
 
-def joint_prior(pump: PumpBelief, system: SystemBelief) -> Floats:
+def joint_prior(pump: PumpPrior, system: SystemPrior) -> Floats:
     """(6,) prior of the hypotheses; one meter at most is wrong, and then pump and system are not at fault."""
     p, s, q, h = pump.pump, system.system, pump.flow_meter, pump.head_sensor
     healthy = (1.0 - p) * (1.0 - s)
@@ -42,8 +42,8 @@ def joint_prior(pump: PumpBelief, system: SystemBelief) -> Floats:
     return prior
 
 
-def remember(probability: Floats, pump: PumpBelief, system: SystemBelief) -> None:
-    """Take what a run has said into the beliefs, in place; a little is forgotten, so that nothing is ever certain."""
+def update_prior(probability: Floats, pump: PumpPrior, system: SystemPrior) -> None:
+    """Take what a run has said into the priors, in place; a little is forgotten, so that nothing is ever certain."""
     pump.pump = _mixed(probability[PUMP_FAULT] + probability[BOTH], PUMP_PRIOR)
     pump.flow_meter = _mixed(probability[FLOW_METER], FLOW_METER_PRIOR)
     pump.head_sensor = _mixed(probability[HEAD_SENSOR], HEAD_SENSOR_PRIOR)

@@ -1,15 +1,10 @@
 """A pump run: its steady samples, and their means over segments."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.arrays import Floats
-
-SEGMENT_SAMPLES = 25
-SEGMENT_S = 25.0
-"""A feed slower than one sample a second has fewer samples in a segment, but one at least."""
-SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m", "power_kw")
-NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
-"""Without these a pump cannot be told from the system."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +53,14 @@ class Run:
     segments : Segments
     missing : frozenset of str
         Signals that no sample of the run had.
+    stuck : list of str
+        Readings that were stuck in it.
+    log_ratio : float
+        Logarithm of metered flow over drawdown flow; NaN without a drawdown.
+    run_s, seen_s : float
+        Time that the pump has run in all, and that the station has been seen. [s]
+    running : int
+        Number of pumps that ran in its last segment without a signal.
     """
 
     pump: int
@@ -71,3 +74,8 @@ class Run:
     power_kw: Floats
     segments: Segments
     missing: frozenset[str]
+    stuck: list[str] = field(default_factory=list)
+    log_ratio: float = math.nan
+    run_s: float = 0.0
+    seen_s: float = 0.0
+    running: int = 0

@@ -1,153 +1,206 @@
-"""Cuts the samples of a station into pump runs."""
+"""From the samples of a station to its pump runs: hands blocks to the compiled loop, and runs on where it stops."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from wetwell.detector.curves.datasheet import Datasheet
-from wetwell.detector.runs.run import SEGMENT_S, SEGMENT_SAMPLES, SIGNALS, Run, Segments
+from wetwell.detector.runs.run import Run, Segments
+from wetwell.detector.statistics.curve_drift import CurveFTests
 from wetwell.detector.statistics.robust import median
-from wetwell.detector.stream.gate import Frame
-from wetwell.detector.stream.run_state import (
-    COLUMNS,
+from wetwell.detector.statistics.rolling_f_test import RollingFTest
+from wetwell.detector.stream.block import Block
+from wetwell.detector.stream.loop import Stop, process_samples
+from wetwell.detector.stream.missing_signals import new_missing_signals
+from wetwell.detector.stream.run_state import SIGNALS, count_steady, drop_ended
+from wetwell.detector.stream.state import new_state
+from wetwell.detector.stream.steady_samples import (
     LEAST_ROOM,
-    SEGMENT_MEANS,
-    average,
-    collect,
-    drop_ended,
-    new_pace,
-    new_pumps,
-    note_gap,
-    note_running,
-    steady_rows,
+    SEGMENT_S,
+    SEGMENT_SAMPLES,
+    new_steady_samples,
+    segment_averages,
 )
-from wetwell.protocols.arrays import Floats
+from wetwell.detector.stream.stuck_sensors import stuck_names
+from wetwell.protocols.arrays import Records
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
+
+ROLLING_SAMPLES = 300
 
 
 class RunTracker:
-    """Cuts the frames of a station into pump runs.
+    """Cuts the samples of a station into pump runs.
 
     A sample is steady `WARM_UP_S` after its pump has started and after any other pump has started or stopped, and
     `SETTLING_S` after the last change of its speed. A run ends when the pump stops, when the stream breaks for more
-    than `BREAK_S` and its own pace explain, or in parts of `MAX_RUN_S`, so that one that never stops is judged too.
+    than `BREAK_S` and its own period explain, or in parts of `MAX_RUN_S`, so that one that never stops is judged too.
 
     Memory: 80 bytes a steady sample of the open runs, at most `MAX_RUN_S` of each.
     """
 
     def __init__(self, datasheet: Datasheet) -> None:
         self._datasheet = datasheet
-        self.table = datasheet.table()
-        self.pumps = new_pumps(datasheet)
-        self.pace = new_pace()
-        self.rows = np.zeros((LEAST_ROOM, COLUMNS))
+        self._rolling = RollingFTest(ROLLING_SAMPLES, datasheet.pumps)
+        self.state = new_state(datasheet, self._rolling)
 
-    def update(self, frame: Frame) -> list[Run]:
-        """Runs that this frame ends."""
-        values = np.array(frame.values())
-        is_ending = note_running(self.table, self.pumps, self.pace[0], frame.time_ns, frame.gap_s, values)
-        note_gap(self.pace[0], frame.gap_s)
-        ended = self.take_ended(frame.time_ns) if is_ending else []
-        if self.is_full:
-            self.make_room()
-        collect(self.table, self.pumps, frame.time_ns, values, self.rows)
-        return ended
+    def stops(self, block: Block) -> Iterator[int]:
+        """Yield each `Stop` in a block at which there is something to judge; it goes on from there."""
+        row, stop = self._process(0, Stop.SAMPLES_DONE.value, block)
+        while stop != Stop.SAMPLES_DONE:
+            if stop == Stop.ROOM_FULL:
+                room = np.concatenate((self.state.steady_samples, new_steady_samples()))
+                self.state = self.state._replace(steady_samples=room)
+            else:
+                yield stop
+            row, stop = self._process(row, stop, block)
 
     @property
-    def is_full(self) -> bool:
-        """Whether another sample of each pump may not find room."""
-        return steady_rows(self.pumps) + len(self.pumps) > len(self.rows)
+    def now_ns(self) -> int:
+        """Time of the last sample that was let through; 0 before the first."""
+        return int(self.state.gate["time_ns"][0])
 
-    def make_room(self) -> None:
-        """Make room for some more steady samples."""
-        self.rows = np.concatenate((self.rows, np.zeros((LEAST_ROOM, COLUMNS))))
+    @property
+    def seen_s(self) -> float:
+        """Time that the station has been seen."""
+        return float(self.state.gate["seen_s"][0])
 
-    def take_ended(self, time_ns: int) -> list[Run]:
-        """Runs that end with the frame of this stamp; what was kept of them is dropped."""
-        ended = [self._finished(pump) for pump in np.flatnonzero(self.pumps["is_ending"]).tolist()]
-        drop_ended(self.pumps, self.rows, time_ns)
-        needed = LEAST_ROOM * (1 + steady_rows(self.pumps) // LEAST_ROOM)
-        if needed < len(self.rows):
-            self.rows = self.rows[:needed].copy()
-        return ended
+    def ended_runs(self) -> list[Run]:
+        """Runs that end with the last sample; what was kept of them is dropped."""
+        return self._take_ended(self.now_ns)
 
     def finish(self) -> list[Run]:
         """Runs that are still open, at the end of a recording."""
-        self.pumps["is_ending"] = self.pumps["is_open"]
-        self.pumps["is_open"] = 0
-        return self.take_ended(0)
+        self.state.pumps["is_ending"] = self.state.pumps["is_open"]
+        self.state.pumps["is_open"] = 0
+        return self._take_ended(0)
 
     def newly_blind_runs(self) -> list[Run]:
         """Open runs that have lacked a needed signal since their start, `BLIND_S` ago; each is given once."""
-        return [self._as_run(pump) for pump in np.flatnonzero(self.pumps["is_blind"]).tolist()]
+        blind = np.flatnonzero(self.state.pumps["is_blind"]).tolist()
+        return [self._handed_over(self._open_run(pump)) for pump in blind]
+
+    def gathered_pumps(self) -> list[int]:
+        """Pumps that lack signals, and have just filled a segment of what is left."""
+        gathered: list[int] = np.flatnonzero(self.state.missing_signals["is_full"]).tolist()
+        return gathered
 
     def full_pumps(self) -> list[int]:
         """Pumps that have just filled a segment."""
-        return [pump for pump in range(len(self.pumps)) if self.full_segments(pump)]
-
-    def full_segments(self, pump: int) -> int:
-        """Number of segments of an open run, when it has just filled one; else 0."""
-        state = self.pumps[pump]
-        if not state["is_steady"] or state["samples"] % self._segment_samples:
-            return 0
-        return int(state["samples"]) // self._segment_samples
+        pumps = self.state.pumps
+        is_full = (pumps["is_steady"] != 0) & (pumps["samples"] % self._segment_samples == 0)
+        full: list[int] = np.flatnonzero(is_full).tolist()
+        return full
 
     def last_segments(self, pump: int, segments: int) -> Run:
-        """The last segments of an open run, of which the window begins with them."""
-        if not self.pumps["is_open"][pump]:
+        """The last segments of an open run, or all if it has fewer; the window begins with them."""
+        if not self.state.pumps["is_open"][pump]:
             raise ValueError(f"pump {pump} has no open run")
-        return self._as_run(pump, int(self.pumps["samples"][pump]) - segments * self._segment_samples)
+        samples = int(self.state.pumps["samples"][pump])
+        return self._open_run(pump, max(samples - segments * self._segment_samples, 0))
 
     def last_segment(self, pump: int) -> Segments:
         """The last segment of an open run."""
-        return self._segments(pump, self._rows_of(pump)[-self._segment_samples :])
+        return self._segments(pump, self._steady_of(pump)[-self._segment_samples :])
+
+    def missing_now(self, pump: int) -> list[str]:
+        """Needed signals that the last sample lacks of a pump."""
+        reading = self.state.frame[FIRST_PUMP + PUMP_VALUES * pump :]
+        needed = {"flow_m3h": FLOW, "frequency_hz": FREQUENCY, "head_m": HEAD}
+        return [name for name, at in needed.items() if math.isnan(reading[at])]
+
+    def rolling_tests(self, pump: int) -> CurveFTests | None:
+        """Both F-tests over the last steady samples; None while there are too few."""
+        return self._rolling.value(pump)
+
+    def strongest_log_p(self, pump: int) -> dict[str, float]:
+        """Least log p of the rolling tests of both curves since this was asked last."""
+        own = self.state.pumps[pump]
+        strongest = {"pump": float(own["pump_log_p"]), "system": float(own["system_log_p"])}
+        own["pump_log_p"] = own["system_log_p"] = 0.0
+        return strongest
+
+    def set_learning(self, pump: int, *, is_learning: bool) -> None:
+        """Say whether a pump is being learnt: then there are no looks at its open runs."""
+        self.state.pumps["is_learning"][pump] = is_learning
+
+    def begin_anew(self, pump: int, *, is_learning: bool) -> None:
+        """Forget what the open run has shown under another baseline."""
+        self.set_learning(pump, is_learning=is_learning)
+        self.state.pumps["stuck"][pump] = 0
+        self.state.missing_signals[pump] = new_missing_signals(1)[0]
+
+    def restore(self, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Go on from what `StreamState.remembered` gave; what is not there is as before the first sample."""
+        arrays = RunTracker(self._datasheet).state.remembered() | dict(arrays)
+        self.state = self.state._replace(steady_samples=np.empty_like(arrays["steady_samples"]))
+        for name, array in self.state.remembered().items():
+            array[...] = arrays[name]
+
+    def _process(self, row: int, stop: int, block: Block) -> tuple[int, int]:
+        arrays: tuple[Any, ...] = self.state  # handed over one by one: as one value they take twice as long
+        return process_samples(row, stop, *block, *arrays)
 
     @property
     def _segment_samples(self) -> int:
-        return int(self.pace["segment_samples"][0])
+        return int(self.state.sampling_period["segment_samples"][0])
 
-    def _rows_of(self, pump: int) -> Floats:
-        rows = self.rows[: steady_rows(self.pumps)]
-        own: Floats = rows[rows[:, 0] == pump]
-        return own
+    def _take_ended(self, time_ns: int) -> list[Run]:
+        pumps = self.state.pumps
+        ended = [self._handed_over(self._finished(pump)) for pump in np.flatnonzero(pumps["is_ending"]).tolist()]
+        drop_ended(pumps, self.state.steady_samples, time_ns)
+        needed = LEAST_ROOM * (1 + count_steady(pumps) // LEAST_ROOM)
+        if needed < len(self.state.steady_samples):
+            self.state = self.state._replace(steady_samples=self.state.steady_samples[:needed].copy())
+        return ended
 
-    def _segments(self, pump: int, rows: Floats) -> Segments:
-        samples = self._segment_samples
-        means = np.empty((SEGMENT_MEANS, len(rows) // samples))
-        average(self.table, pump, rows, samples, means)
-        flow_m3h, total_m3h, duty_m3h, duty_total_m3h, level_m, speed_ratio = means[2:]
-        return Segments(
-            residual_m=np.ascontiguousarray(means[:2].T),
-            flow_m3h=flow_m3h,
-            total_m3h=total_m3h,
-            duty_m3h=duty_m3h,
-            duty_total_m3h=duty_total_m3h,
-            level_m=level_m,
-            speed_ratio=speed_ratio,
-            samples=samples,
-        )
+    def _handed_over(self, run: Run) -> Run:
+        """The run with the drawdown, which is told once, as are the readings that were stuck."""
+        own = self.state.pumps[run.pump]
+        log_ratio, own["log_ratio"], own["stuck"] = float(own["log_ratio"]), math.nan, 0
+        return replace(run, log_ratio=log_ratio)
 
     def _finished(self, pump: int) -> Run:
-        """The whole open run; its pace says how many samples a segment has from now on."""
-        time_s = self._rows_of(pump)[:, 1]
+        """The whole open run; its period says how many samples a segment has from now on."""
+        time_s = self._steady_of(pump)["time_s"]
         if len(time_s) > 1:
             period_s = float(median(np.diff(time_s)))
-            self.pace["segment_samples"] = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
-        return self._as_run(pump)
+            samples = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
+            self.state.sampling_period["segment_samples"] = samples
+        return self._open_run(pump)
 
-    def _as_run(self, pump: int, first_row: int = 0) -> Run:
-        """The open run from a row on; where that is not the first, its window begins there."""
-        state, rows = self.pumps[pump], self._rows_of(pump)[first_row:]
-        part_ns, seen = int(state["part_ns"]), int(state["seen"])
-        time_s = rows[:, 1]
+    def _open_run(self, pump: int, first: int = 0) -> Run:
+        """The open run from a steady sample on; where that is not the first, its window begins there."""
+        own, steady = self.state.pumps[pump], self._steady_of(pump)[first:]
+        part_ns, seen, time_s = int(own["part_ns"]), int(own["seen"]), steady["time_s"]
         return Run(
             pump=pump,
-            window_ns=(part_ns + round(time_s[0] * NS_PER_S) if first_row else part_ns, int(state["last_ns"])),
+            window_ns=(part_ns + round(time_s[0] * NS_PER_S) if first else part_ns, int(own["last_ns"])),
             time_s=time_s,
-            flow_m3h=rows[:, 2],
-            head_m=rows[:, 3],
-            speed_ratio=rows[:, 4],
-            total_flow_m3h=rows[:, 5],
-            level_m=rows[:, 6],
-            power_kw=rows[:, 7],
-            segments=self._segments(pump, rows),
+            flow_m3h=steady["flow_m3h"],
+            head_m=steady["head_m"],
+            speed_ratio=steady["speed_ratio"],
+            total_flow_m3h=steady["total_m3h"],
+            level_m=steady["level_m"],
+            power_kw=steady["power_kw"],
+            segments=self._segments(pump, steady),
             missing=frozenset(name for bit, name in enumerate(SIGNALS) if not seen >> bit & 1),
+            stuck=stuck_names(pump, int(own["stuck"])),
+            run_s=float(own["run_s"]),
+            seen_s=float(self.state.gate["seen_s"][0]),
+            running=int(self.state.missing_signals["running"][pump]),
         )
+
+    def _steady_of(self, pump: int) -> Records:
+        steady = self.state.steady_samples[: count_steady(self.state.pumps)]
+        own: Records = steady[steady["pump"] == pump]
+        return own
+
+    def _segments(self, pump: int, steady: Records) -> Segments:
+        samples = self._segment_samples
+        residual_m, means = segment_averages(self.state.table[pump], steady, samples)
+        return Segments(residual_m=residual_m, samples=samples, **means)

@@ -5,55 +5,77 @@ import hashlib
 import json
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from wetwell.detector.baseline.healthy_reference import Check, HealthyReference
 from wetwell.detector.baseline.learning import Learning
 from wetwell.detector.baseline.model import Baseline, Model
 from wetwell.detector.curves.datasheet import Datasheet
-from wetwell.detector.inference.observation import Check
-from wetwell.detector.inference.prior import PumpBelief, SystemBelief
-from wetwell.detector.pump_judge import Knowledge, PumpRecord
+from wetwell.detector.inference.prior import PumpPrior, SystemPrior
+from wetwell.detector.pump_memory import PumpMemory
 from wetwell.detector.runs.run import Segments
+from wetwell.detector.sensors.missing_signals import MissingSignals
 from wetwell.detector.snapshot.upgrades import UPGRADES
 from wetwell.detector.statistics.cusum import Cusum
-from wetwell.detector.stream.missing_signals import BlindWatch
-from wetwell.detector.verdict.control_limits import IndexLimits
+from wetwell.detector.stream.steady_samples import STEADY_SAMPLE
+from wetwell.detector.verdict.control_limits import ControlLimits
 from wetwell.protocols.errors import WetwellError
 
 _SCHEMA_NAME, FORM = "wetwell.detector-snapshot", 2
 SCHEMA = f"{_SCHEMA_NAME}/{FORM}"
 
 _CLASSES: Mapping[str, type] = {
-    cls.__name__: cls
-    for cls in (
-        Baseline,
-        BlindWatch,
-        Check,
-        Cusum,
-        IndexLimits,
-        Knowledge,
-        Learning,
-        Model,
-        PumpBelief,
-        PumpRecord,
-        Segments,
-        SystemBelief,
-    )
+    "Baseline": Baseline,
+    "BlindWatch": MissingSignals,
+    "Check": Check,
+    "Cusum": Cusum,
+    "IndexLimits": ControlLimits,
+    "Knowledge": HealthyReference,
+    "Learning": Learning,
+    "Model": Model,
+    "PumpBelief": PumpPrior,
+    "PumpRecord": PumpMemory,
+    "Segments": Segments,
+    "SystemBelief": SystemPrior,
 }
+"""By the names that they bore when form 2 was made."""
+_STORED_CLASSES = {cls: name for name, cls in _CLASSES.items()}
+_FIELDS: Mapping[str, Mapping[str, str]] = {
+    "PumpRecord": {"known": "reference", "belief": "prior", "blind": "missing_signals"},
+}
+"""Of these classes, by stored name, where the name is another now."""
+_STORED_FIELDS = {name: {new: old for old, new in fields.items()} for name, fields in _FIELDS.items()}
+_ARRAYS: Mapping[str, str] = {
+    "pace": "sampling_period",
+    "rows": "steady_samples",
+    "meters": "stuck_sensors",
+    "blinds": "missing_signals",
+}
+"""The same of `StreamState`. Steady samples are stored as rows of numbers."""
+_STORED_ARRAYS = {new: old for old, new in _ARRAYS.items()}
 
 
 class SnapshotError(WetwellError):
     """A snapshot is damaged, of another format, or of another station."""
 
 
-def encode_snapshot(station: str, datasheet: Datasheet, state: Mapping[str, Any]) -> bytes:
+def encode_snapshot(
+    station: str,
+    datasheet: Datasheet,
+    arrays: Mapping[str, npt.NDArray[Any]],
+    system: SystemPrior,
+    pumps: Sequence[PumpMemory],
+) -> bytes:
     """Bytes of a detector's state; the datasheet is not kept, only its fingerprint."""
-    text = json.dumps(_encoded(dict(state)), separators=(",", ":"), allow_nan=False)
+    stored = {_STORED_ARRAYS.get(name, name): array for name, array in arrays.items()}
+    stored["rows"] = stored["rows"].view(np.float64).reshape(-1, len(STEADY_SAMPLE.descr))
+    state = {"arrays": stored, "system": system, "pumps": list(pumps)}
+    text = json.dumps(_encoded(state), separators=(",", ":"), allow_nan=False)
     header = {
         "schema": SCHEMA,
         "station": station,
@@ -63,8 +85,10 @@ def encode_snapshot(station: str, datasheet: Datasheet, state: Mapping[str, Any]
     return f"{json.dumps(header)}\n{text}\n".encode()
 
 
-def decode_snapshot(data: bytes, station: str, datasheet: Datasheet) -> dict[str, Any]:
-    """State in a snapshot; one of an older form is taken over, see `UPGRADES`.
+def decode_snapshot(
+    data: bytes, station: str, datasheet: Datasheet
+) -> tuple[dict[str, npt.NDArray[Any]], SystemPrior, list[PumpMemory]]:
+    """Arrays, system and pumps in a snapshot; one of an older form is taken over, see `UPGRADES`.
 
     Raises
     ------
@@ -91,10 +115,13 @@ def decode_snapshot(data: bytes, station: str, datasheet: Datasheet) -> dict[str
         encoded = json.loads(text)
         while form < FORM:
             encoded, form = UPGRADES[form](encoded, datasheet), form + 1
-        state: dict[str, Any] = _decoded(encoded, datasheet)
+        state = _decoded(encoded, datasheet)
+        arrays = {_ARRAYS.get(name, name): array for name, array in state["arrays"].items()}
+        if "steady_samples" in arrays:
+            arrays["steady_samples"] = arrays["steady_samples"].view(STEADY_SAMPLE)[:, 0]
+        return arrays, state["system"], state["pumps"]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
-    return state
 
 
 def _fingerprint(datasheet: Datasheet) -> str:
@@ -111,10 +138,12 @@ def _encoded(value: Any) -> Any:
     for kinds, encode in _ENCODERS:
         if isinstance(value, kinds):
             return encode(value)
-    name = type(value).__name__
-    if _CLASSES.get(name) is not type(value):
-        raise TypeError(f"a {name} cannot be part of a snapshot")
-    return {"object": [name, {field: _encoded(getattr(value, field)) for field in _attributes(value)}]}
+    name = _STORED_CLASSES.get(type(value))
+    if name is None:
+        raise TypeError(f"a {type(value).__name__} cannot be part of a snapshot")
+    stored = _STORED_FIELDS.get(name, {})
+    fields = {stored.get(field, field): _encoded(getattr(value, field)) for field in _attributes(value)}
+    return {"object": [name, fields]}
 
 
 def _encoded_float(value: float) -> Any:
@@ -162,7 +191,8 @@ def _array(content: list[Any], _datasheet: Datasheet) -> Any:
 
 
 def _object(content: list[Any], datasheet: Datasheet) -> Any:
-    name, fields = content
+    name, stored = content
+    fields = {_FIELDS.get(name, {}).get(field, field): value for field, value in stored.items()}
     lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys()
     if lacking:
         raise ValueError(f"a {name} without {', '.join(sorted(lacking))}")

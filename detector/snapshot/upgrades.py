@@ -3,18 +3,15 @@
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.sensors.missing_signals import MissingSignals
 from wetwell.detector.statistics.cusum import Cusum
-from wetwell.detector.stream.gate import COUNTS, STATE
-from wetwell.detector.stream.missing_signals import BlindWatch
+from wetwell.detector.stream.gate import COUNTS, new_gate
 from wetwell.detector.stream.run_state import new_pumps
-from wetwell.detector.stream.stuck_sensors import new_meters
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
+from wetwell.detector.stream.stuck_sensors import new_stuck_sensors
 from wetwell.protocols.quantities import PUMP_METERS, pump_column
 
-SEGMENT_SAMPLES = 25
-"""Of all segments of form 1."""
 MOVED = ("run_s", "stuck", "rolling")
 """Of a pump in form 1: kept in arrays now, where it goes on."""
 
@@ -26,21 +23,21 @@ def from_1(encoded: Any, datasheet: Datasheet) -> Any:
     as before the first sample.
     """
     state = dict(encoded["dict"])
-    gate, pumps, meters = np.zeros(1, dtype=STATE), new_pumps(datasheet), new_meters(datasheet.pumps)
-    _take_gate(gate, _fields(state["_gate"]), state["_seen_s"])
-    _take_meters(meters, _fields(state["_repeats"]))
+    gate, pumps, sensors = new_gate(), new_pumps(datasheet), new_stuck_sensors(datasheet.pumps)
+    _fill_gate(gate, _fields(state["_gate"]), state["_seen_s"])
+    _fill_sensors(sensors, _fields(state["_repeats"]))
     for number, fields in enumerate(map(_fields, state["_pumps"])):
         pumps["is_learning"][number] = fields["known"] is None
         pumps["run_s"][number] = fields["run_s"]
         for name in MOVED:
             del fields[name]
-        fields |= {"early": None, "cusum": Cusum(), "blind": BlindWatch()}
+        fields |= {"early": None, "cusum": Cusum(), "blind": MissingSignals()}
     for name, fields in _objects([state["_pumps"]]):
         if name == "Baseline":
-            fields["segment_samples"] = SEGMENT_SAMPLES
+            fields["segment_samples"] = SEGMENT_SAMPLES  # of all segments of form 1
         elif name == "Segments":
             fields["samples"] = SEGMENT_SAMPLES
-    arrays = [["gate", gate], ["pumps", pumps], ["meters", meters]]
+    arrays = [["gate", gate], ["pumps", pumps], ["meters", sensors]]
     return {"dict": [["arrays", {"dict": arrays}], ["system", state["_system"]], ["pumps", state["_pumps"]]]}
 
 
@@ -64,7 +61,7 @@ def _objects(encoded: Any) -> Iterator[tuple[str, dict[str, Any]]]:
             yield from _objects(part)
 
 
-def _take_gate(gate: Any, fields: Mapping[str, Any], seen_s: float) -> None:
+def _fill_gate(gate: Any, fields: Mapping[str, Any], seen_s: float) -> None:
     if fields["_last_ns"] is not None:
         gate["is_begun"], gate["time_ns"], gate["seq"] = 1, fields["_last_ns"], fields["_last_seq"]
     gate["seen_s"] = seen_s
@@ -73,9 +70,9 @@ def _take_gate(gate: Any, fields: Mapping[str, Any], seen_s: float) -> None:
             gate[name] = count
 
 
-def _take_meters(meters: Any, fields: Mapping[str, Any]) -> None:
+def _fill_sensors(sensors: Any, fields: Mapping[str, Any]) -> None:
     """Keep for how long each reading repeated itself while it was learnt."""
-    pumps = (len(meters) - 1) // len(PUMP_METERS)
+    pumps = (len(sensors) - 1) // len(PUMP_METERS)
     names = ["level_m", *(pump_column(pump, name) for pump in range(1, pumps + 1) for name in PUMP_METERS)]
     longest_ns = dict(fields["longest_ns"]["dict"])
-    meters["longest_ns"] = [longest_ns.get(name, 0) for name in names]
+    sensors["longest_ns"] = [longest_ns.get(name, 0) for name in names]

@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.protocols.jit import compiled
 
 _EPS: Final = float(np.finfo(float).eps)
-_TINY: Final = 1e-300
+_LEAST_DIVISOR: Final = 1e-300
 _LARGE: Final = 10.0
 """From here on Stirling's series is exact to rounding."""
 _MAX_TERMS: Final = 10_000
@@ -36,7 +36,7 @@ def _log_beta(a: float, b: float) -> float:
 def _fraction(a: float, b: float, x: float) -> float:
     """Continued fraction of the incomplete beta function, from the front, by Lentz's method."""
     c, d = 1.0, 1.0 - (a + b) * x / (a + 1.0)
-    d = 1.0 / (d if abs(d) > _TINY else _TINY)
+    d = 1.0 / (d if abs(d) > _LEAST_DIVISOR else _LEAST_DIVISOR)
     value = d
     for m in range(1, _MAX_TERMS):
         even = m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m))
@@ -44,8 +44,8 @@ def _fraction(a: float, b: float, x: float) -> float:
         change = 1.0
         for part in (even, odd):
             d, c = 1.0 + part * d, 1.0 + part / c
-            d = 1.0 / (d if abs(d) > _TINY else _TINY)
-            c = c if abs(c) > _TINY else _TINY
+            d = 1.0 / (d if abs(d) > _LEAST_DIVISOR else _LEAST_DIVISOR)
+            c = c if abs(c) > _LEAST_DIVISOR else _LEAST_DIVISOR
             change = d * c
             value *= change
         if abs(change - 1.0) <= _EPS:

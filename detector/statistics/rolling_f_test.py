@@ -81,7 +81,7 @@ def _begin_anew(window: Floats, moments: Floats, samples: int) -> None:
 
 
 @compiled
-def take(
+def add_sample(
     window: Floats,
     moments: Floats,
     counts: Integers,
@@ -154,7 +154,7 @@ def solve(moments: Floats, figures: Floats) -> bool:
 @compiled
 def _scan(samples: Floats, window: Floats, moments: Floats, counts: Integers, figures: Floats) -> None:
     for n in range(samples.shape[1]):
-        take(window, moments, counts, samples[0, n], samples[1, n], samples[2, n], samples[3, n], samples[4, n])
+        add_sample(window, moments, counts, samples[0, n], samples[1, n], samples[2, n], samples[3, n], samples[4, n])
         if n + 1 < LEAST_SAMPLES or not solve(moments, figures[n]):
             figures[n] = math.nan
 
@@ -251,7 +251,7 @@ class RollingFTest:
                 "a sample must be finite and its speed_ratio positive, "
                 f"got {(time_s, flow_m3h, head_m, speed_ratio, total)}"
             )
-        take(*self.arrays(), float(time_s), flow_m3h, head_m, speed_ratio, total)
+        add_sample(*self.arrays(), float(time_s), flow_m3h, head_m, speed_ratio, total)
 
     def samples(self, pump: int = 0) -> Floats:
         """Window as a (5, n) array, oldest first: time, flow, head, speed ratio, total flow."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from wetwell.detector.curves.residuals import Curve
+from wetwell.detector.curves.datasheet import Curve
 from wetwell.protocols.arrays import Floats
 
 

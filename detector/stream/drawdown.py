@@ -12,11 +12,10 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.detector.stream.gate import seconds_between
+from wetwell.detector.stream.gate import MAX_GAP_S, seconds_between
 from wetwell.detector.stream.run_state import is_break
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
@@ -25,12 +24,11 @@ SETTLED_S = 15.0
 SETTLED_NS = int(SETTLED_S * NS_PER_S)
 MIN_S = 60.0
 MIN_NS = int(MIN_S * NS_PER_S)
-MIN_SAMPLES = 4
+MIN_READINGS = 4
 MAX_S = 600.0
 MAX_NS = int(MAX_S * NS_PER_S)
 """A longer phase begins anew, so that the inflow before a run is that just before it."""
 MAX_AGE_S = 600.0
-MAX_GAP_S = 10.0
 DEAD_RATIO = 0.01
 """Metered over drawdown flow of a meter that reads nothing."""
 
@@ -43,7 +41,7 @@ PHASE = np.dtype(
 NO_PHASE = -1
 
 
-def new_phases() -> npt.NDArray[np.void]:
+def new_phases() -> Records:
     """The phase that goes on, and the last one without any pump."""
     phases = np.zeros(2, dtype=PHASE)
     phases["running"] = NO_PHASE
@@ -73,7 +71,7 @@ def _end(phases: Any, area_m2: float, pumps: Any) -> None:
     """Keep what the phase that ends has told."""
     phase, idle = phases[NOW], phases[IDLE]
     running = phase["running"]
-    if running == NO_PHASE or phase["samples"] < MIN_SAMPLES or phase["end_ns"] - phase["begin_ns"] < MIN_NS:
+    if running == NO_PHASE or phase["samples"] < MIN_READINGS or phase["end_ns"] - phase["begin_ns"] < MIN_NS:
         return
     if running == 0:
         phases[IDLE] = phases[NOW]
@@ -106,7 +104,9 @@ def _add(phase: Any, time_ns: int, level_m: float, inflow_m_s: float, flow_m3h: 
 
 
 @compiled
-def draw_down(phases: Any, area_m2: float, pace: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any) -> None:
+def draw_down(
+    phases: Any, area_m2: float, period: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any
+) -> None:
     """Take a frame into account.
 
     Parameters
@@ -114,7 +114,7 @@ def draw_down(phases: Any, area_m2: float, pace: Any, time_ns: int, gap_s: float
     phases : new_phases()
     area_m2 : float
         A. [m²]
-    pace : new_pace()[0]
+    period : new_sampling_period()[0]
         Before this frame.
     time_ns, gap_s, frame
         A sample that has passed the gate.
@@ -126,7 +126,7 @@ def draw_down(phases: Any, area_m2: float, pace: Any, time_ns: int, gap_s: float
         if pumps[pump]["is_running"]:
             running |= 1 << pump
     phase = phases[NOW]
-    if phase["running"] != running or is_break(pace, gap_s, MAX_GAP_S):
+    if phase["running"] != running or is_break(period, gap_s, MAX_GAP_S):
         _end(phases, area_m2, pumps)
         _begin(phase, running, time_ns)
     elif time_ns - phase["begin_ns"] >= MAX_NS and running == 0:

@@ -1,16 +1,24 @@
-"""The gate: order, range and presence of values, before any statistic sees them."""
+"""The gate: order, range and presence of values, before any statistic sees them.
+
+It lets samples through in the order of their time, with values that can be. A value that is absent, NaN or outside
+its range becomes NaN and is counted. A sample that is doubled or late is dropped and counted. A sample that jumps
+more than `MAX_JUMP_S` ahead ("future"), and samples that are behind, may come from a source whose clock was set:
+after `CONFIRMATIONS` such samples in a row that agree with one another, the gate follows them and counts a clock
+step. Those that are behind with old numbers are most likely sent again after a lost link, and it takes more than
+`RESENT_SAMPLES` of them: then the source has begun anew.
+
+`samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has passed
+over; a sample that comes late after all is counted there too.
+"""
 
 import math
-from collections import Counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from wetwell.detector.curves.datasheet import Datasheet
-from wetwell.detector.stream.block import Block, LiveBlock
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
-from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, INFLOW, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -39,7 +47,7 @@ COUNTS = (
     "missing_values",
     "out_of_range_values",
 )
-STATE = np.dtype(
+GATE = np.dtype(
     [(name, np.int64) for name in ("is_begun", "time_ns", "seq", "other_ns", "other_count", *COUNTS)]
     + [(name, np.float64) for name in ("gap_s", "seen_s")]
 )
@@ -50,82 +58,19 @@ RANGES = np.dtype(
 )
 
 
-class PumpFrame(NamedTuple):
-    """What is known of one pump in one second; NaN is "no value", None is "not said"."""
-
-    frequency_hz: float
-    flow_m3h: float
-    head_m: float
-    power_kw: float
-    running: bool | None
+def new_gate() -> Records:
+    """State of the gate before the first sample."""
+    return np.zeros(1, dtype=GATE)
 
 
-class Frame(NamedTuple):
-    """A sample that has passed the gate.
-
-    `gap_s` is the time since the one before: 0 for the first, infinite where nobody knows, after a clock step.
-    """
-
-    time_ns: int
-    gap_s: float
-    level_m: float
-    inflow_m3h: float
-    pumps: tuple[PumpFrame, ...]
-
-    def values(self) -> list[float]:
-        """The values in the order of a block."""
-        return [
-            self.level_m,
-            self.inflow_m3h,
-            *(math.nan if v is None else float(v) for pump in self.pumps for v in pump),
-        ]
+def gate_counts(gate: Any) -> dict[str, int]:
+    """How many samples and values were let through, marked or dropped; those that are not 0."""
+    return {name: int(gate[name][0]) for name in COUNTS if gate[name][0]}
 
 
-class Gate:
-    """Lets samples through in the order of their time, with values that can be.
-
-    A value that is absent, NaN or outside its range becomes NaN and is counted. A sample that is doubled or late is
-    dropped and counted. A sample that jumps more than `MAX_JUMP_S` ahead ("future"), and samples that are behind, may
-    come from a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another,
-    the gate follows them and counts a clock step. Those that are behind with old numbers are most likely sent again
-    after a lost link, and it takes more than `RESENT_SAMPLES` of them: then the source has begun anew.
-
-    `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has
-    passed over; a sample that comes late after all is counted there too.
-
-    Memory: constant.
-    """
-
-    def __init__(self, datasheet: Datasheet) -> None:
-        self.state = np.zeros(1, dtype=STATE)
-        self.ranges = np.array([_ranges(datasheet, pump) for pump in range(datasheet.pumps)], dtype=RANGES)
-        self.frame = np.full(FIRST_PUMP + PUMP_VALUES * datasheet.pumps, math.nan)
-        self._live = LiveBlock(datasheet.pumps)
-
-    @property
-    def counts(self) -> Counter[str]:
-        """How many samples and values were let through, marked or dropped; those that are not 0."""
-        return Counter({name: int(self.state[name][0]) for name in COUNTS if self.state[name][0]})
-
-    def update(self, sample: Readings) -> Frame | None:
-        """Frame of a sample, or None where it is dropped."""
-        return self.update_row(self._live.fill(sample), 0)
-
-    def update_row(self, block: Block, row: int) -> Frame | None:
-        """Frame of a row of a block, or None where it is dropped."""
-        state, now_ns = self.state[0], block.time_ns[row]
-        told = (now_ns, block.seq[row], block.values[row], block.pumps, block.is_bad)
-        if not let_through(state, self.ranges, *told, self.frame):
-            return None
-        level_m, inflow_m3h, *rest = self.frame.tolist()
-        readings = (rest[first : first + PUMP_VALUES] for first in range(0, len(rest), PUMP_VALUES))
-        return Frame(
-            int(now_ns),
-            float(state["gap_s"]),
-            level_m,
-            inflow_m3h,
-            tuple(PumpFrame(f, q, h, p, None if math.isnan(on) else on > 0.0) for f, q, h, p, on in readings),
-        )
+def gate_ranges(datasheet: Datasheet) -> Records:
+    """Lowest and highest readings that each pump can show."""
+    return np.array([_ranges(datasheet, pump) for pump in range(datasheet.pumps)], dtype=RANGES)
 
 
 def _ranges(datasheet: Datasheet, pump: int) -> tuple[float, ...]:

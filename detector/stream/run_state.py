@@ -4,12 +4,10 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wetwell.detector.curves.datasheet import Datasheet, Table, duty_flows
-from wetwell.detector.curves.residuals import distances
-from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, SIGNALS
-from wetwell.protocols.arrays import Floats
+from wetwell.detector.curves.datasheet import Datasheet, duty_flows
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
+from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
@@ -26,14 +24,15 @@ USUAL_GAPS = 2.5
 """A feed that is slow by itself breaks only where it lacks more than so many of its usual steps."""
 RUNNING_SHARE = 0.05
 """Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
-NO_FLOW_SHARE = 0.01
-"""Share of the run-out flow below which the check valve is closed: then the main may take less than its curve."""
+SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m", "power_kw")
+NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
+"""Without these a pump cannot be told from the system."""
 NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
 BLIND_S = 60.0
 """A run that has lacked one of them for so long is reported at once."""
 WARM_UP_NS, SETTLING_NS, PART_NS, BLIND_NS = (int(s * NS_PER_S) for s in (WARM_UP_S, SETTLING_S, MAX_RUN_S, BLIND_S))
 
-PUMP = np.dtype(
+PUMP_STATE = np.dtype(
     [
         (name, np.int64)
         for name in (
@@ -65,41 +64,37 @@ samples it has, a bit for each signal that it has had, and whether one that is n
 by the datasheet. For others: whether the pump is being learnt, a bit for each meter that was stuck in the run, time
 that it ran, the drawdown figure of its last run, and the smallest log p of the rolling tests since they were told.
 """
-PACE = np.dtype([("segment_samples", np.int64), ("gap_s", np.float64), ("gap_before_s", np.float64)])
-"""How fast a feed comes: samples in a segment, by the pace of the last run, and the last two gaps that are known."""
-COLUMNS = 10
-"""Of a steady sample: pump, time, flow, head, speed ratio, total flow, level, power, both flows by the datasheet."""
-LEAST_ROOM = 256
-SEGMENT_MEANS = 8
+SAMPLING_PERIOD = np.dtype([("segment_samples", np.int64), ("gap_s", np.float64), ("gap_before_s", np.float64)])
+"""How fast a feed comes: samples in a segment, as the last run had them, and the last two gaps that are known."""
 
 
-def new_pumps(datasheet: Datasheet) -> npt.NDArray[np.void]:
+def new_pumps(datasheet: Datasheet) -> Records:
     """State of the pumps of a station before the first sample."""
-    pumps = np.zeros(datasheet.pumps, dtype=PUMP)
+    pumps = np.zeros(datasheet.pumps, dtype=PUMP_STATE)
     pumps["speed_ratio"] = pumps["log_ratio"] = math.nan
     pumps["is_learning"] = 1
     return pumps
 
 
-def new_pace() -> npt.NDArray[np.void]:
-    """Pace of a feed before its first sample."""
-    pace = np.zeros(1, dtype=PACE)
-    pace["segment_samples"] = SEGMENT_SAMPLES
-    return pace
+def new_sampling_period() -> Records:
+    """Sampling period of a feed before its first sample."""
+    period = np.zeros(1, dtype=SAMPLING_PERIOD)
+    period["segment_samples"] = SEGMENT_SAMPLES
+    return period
 
 
 @compiled
-def is_break(pace: Any, gap_s: float, limit_s: float) -> bool:
-    """Whether a gap is longer than the limit, and than the feed's own pace explains."""
-    return bool(gap_s > limit_s and gap_s > USUAL_GAPS * min(pace["gap_s"], pace["gap_before_s"]))
+def is_break(period: Any, gap_s: float, limit_s: float) -> bool:
+    """Whether a gap is longer than the limit, and than the feed's own period explains."""
+    return bool(gap_s > limit_s and gap_s > USUAL_GAPS * min(period["gap_s"], period["gap_before_s"]))
 
 
 @compiled
-def note_gap(pace: Any, gap_s: float) -> None:
+def note_gap(period: Any, gap_s: float) -> None:
     """Remember a gap, after it has been judged."""
     if gap_s < math.inf:
-        pace["gap_before_s"] = pace["gap_s"]
-        pace["gap_s"] = gap_s
+        period["gap_before_s"] = period["gap_s"]
+        period["gap_s"] = gap_s
 
 
 @compiled
@@ -120,9 +115,9 @@ def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
 
 
 @compiled
-def note_running(table: Table, pumps: Any, pace: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
-    is_broken = is_break(pace, gap_s, BREAK_S)
+    is_broken = is_break(period, gap_s, BREAK_S)
     is_changed = any_ending = False
     for number in range(pumps.shape[0]):
         pump = pumps[number]
@@ -144,22 +139,21 @@ def note_running(table: Table, pumps: Any, pace: Any, time_ns: int, gap_s: float
 
 
 @compiled
-def steady_rows(pumps: Any) -> int:
+def count_steady(pumps: Any) -> int:
     """Number of steady samples in all open runs."""
-    rows = 0
+    count = 0
     for number in range(pumps.shape[0]):
-        rows += pumps[number]["samples"]
-    return rows
+        count += pumps[number]["samples"]
+    return count
 
 
 @compiled
-def drop_ended(pumps: Any, rows: Floats, time_ns: int) -> None:
+def drop_ended(pumps: Any, steady_samples: Any, time_ns: int) -> None:
     """Close the runs that end, and begin the next part of those that go on."""
     kept = 0
-    for row in range(steady_rows(pumps)):
-        if not pumps[int(rows[row, 0])]["is_ending"]:
-            for column in range(COLUMNS):
-                rows[kept, column] = rows[row, column]
+    for at in range(count_steady(pumps)):
+        if not pumps[int(steady_samples[at]["pump"])]["is_ending"]:
+            steady_samples[kept] = steady_samples[at]
             kept += 1
     for number in range(pumps.shape[0]):
         pump = pumps[number]
@@ -170,7 +164,7 @@ def drop_ended(pumps: Any, rows: Floats, time_ns: int) -> None:
 
 
 @compiled
-def _note_duty(table: Table, pumps: Any, frame: Floats) -> None:
+def _note_duty(table: Records, pumps: Any, frame: Floats) -> None:
     """Flows by the datasheet; worked out anew only when a speed has changed."""
     is_new = False
     for number in range(pumps.shape[0]):
@@ -183,8 +177,8 @@ def _note_duty(table: Table, pumps: Any, frame: Floats) -> None:
 
 
 @compiled
-def _collect(table: Table, pumps: Any, number: int, time_ns: int, frame: Floats, rows: Floats, row: int) -> bool:
-    """Take the frame into the open run of a pump; whether it is steady, and so has become this row."""
+def _collect(table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, steady: Any) -> bool:
+    """Take the frame into the open run of a pump; whether it is steady, and so has become this record."""
     pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
     flow_m3h, head_m = frame[at + FLOW], frame[at + HEAD]
     for bit, value in enumerate((frame[at + FREQUENCY], flow_m3h, head_m, frame[LEVEL], frame[at + POWER])):
@@ -207,23 +201,23 @@ def _collect(table: Table, pumps: Any, number: int, time_ns: int, frame: Floats,
                 total_m3h += frame[FIRST_PUMP + PUMP_VALUES * other + FLOW]
         if math.isnan(total_m3h):
             return False
-    rows[row, 0] = number
-    rows[row, 1] = (time_ns - pump["part_ns"]) / NS_PER_S
-    rows[row, 2] = flow_m3h
-    rows[row, 3] = head_m
-    rows[row, 4] = speed_ratio
-    rows[row, 5] = total_m3h
-    rows[row, 6] = frame[LEVEL]
-    rows[row, 7] = frame[at + POWER]
-    rows[row, 8] = pump["duty_m3h"] / speed_ratio
-    rows[row, 9] = duty_total_m3h
+    steady["pump"] = number
+    steady["time_s"] = (time_ns - pump["part_ns"]) / NS_PER_S
+    steady["flow_m3h"] = flow_m3h
+    steady["head_m"] = head_m
+    steady["speed_ratio"] = speed_ratio
+    steady["total_m3h"] = total_m3h
+    steady["level_m"] = frame[LEVEL]
+    steady["power_kw"] = frame[at + POWER]
+    steady["duty_m3h"] = pump["duty_m3h"] / speed_ratio
+    steady["duty_total_m3h"] = duty_total_m3h
     return True
 
 
 @compiled
-def collect(table: Table, pumps: Any, time_ns: int, frame: Floats, rows: Floats) -> bool:
+def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, steady_samples: Any) -> bool:
     """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind."""
-    row = steady_rows(pumps)
+    at = count_steady(pumps)
     any_blind = False
     for number in range(pumps.shape[0]):
         pump = pumps[number]
@@ -237,37 +231,12 @@ def collect(table: Table, pumps: Any, time_ns: int, frame: Floats, rows: Floats)
             pump["steady_from_ns"] = time_ns + WARM_UP_NS
             pump["speed_ratio"] = math.nan
         pump["last_ns"] = time_ns
-        if _collect(table, pumps, number, time_ns, frame, rows, row):
+        if _collect(table, pumps, number, time_ns, frame, steady_samples[at]):
             pump["is_steady"] = 1
             pump["samples"] += 1
-            row += 1
+            at += 1
         if not pump["is_reported_blind"] and time_ns - pump["start_ns"] >= BLIND_NS:
             pump["is_reported_blind"] = 1
             pump["is_blind"] = pump["seen"] & NEEDED_BITS != NEEDED_BITS
             any_blind = any_blind or pump["is_blind"] != 0
     return any_blind
-
-
-@compiled
-def average(table: Table, pump: int, rows: Floats, samples: int, means: Floats) -> None:
-    """Set the means of each segment of so many samples: both residuals, then as in `Segments`."""
-    own = table[pump]
-    for segment in range(means.shape[1]):
-        means[:, segment] = 0.0
-        for at in range(segment * samples, (segment + 1) * samples):
-            flow_m3h, head_m, speed_ratio, total_m3h = rows[at, 2], rows[at, 3], rows[at, 4], rows[at, 5]
-            pump_m, system_m = distances(
-                *(flow_m3h, head_m, speed_ratio, total_m3h, own["c0"], own["c1"], own["c2"]),
-                *(own["static_head_m"], own["friction_h2_m5"]),
-            )
-            is_closed = total_m3h < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
-            means[0, segment] += pump_m
-            means[1, segment] += 0.0 if is_closed else system_m
-            means[2, segment] += flow_m3h / speed_ratio
-            means[3, segment] += total_m3h
-            means[4, segment] += rows[at, 8]
-            means[5, segment] += rows[at, 9]
-            means[6, segment] += rows[at, 6]
-            means[7, segment] += speed_ratio
-        for mean in range(SEGMENT_MEANS):
-            means[mean, segment] /= samples

@@ -19,7 +19,7 @@ PUMP_ABOVE = 0.6
 """The paper's fixed limits; the learnt ones never lie inside them."""
 
 
-class IndexLimits:
+class ControlLimits:
     """Limits of the attribution index of one pump, and what the index says of a run.
 
     The index is that of the way from the learnt operating point to the segments of a run: the tangent residuals

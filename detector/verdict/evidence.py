@@ -1,5 +1,6 @@
 """The figures in a verdict: both methods of the paper, and what the verdict rests on."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.observation import COMPONENTS, Observation
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.bootstrap import block_bootstrap_interval
-from wetwell.detector.statistics.curve_drift import pump_curve_f_test, system_curve_f_test
+from wetwell.detector.statistics.curve_drift import CurveFTests, pump_curve_f_test, system_curve_f_test
 from wetwell.detector.statistics.f_test import FTest
 from wetwell.detector.statistics.tangent import attribution_index, tangent_residuals
 from wetwell.protocols.arrays import Floats
@@ -70,6 +71,15 @@ def shift_evidence(observation: Observation) -> dict[str, Any]:
         "shift_m": {name: round(float(known[name][0]), 4) for name in ("pump", "system")},
         "shift_sigmas": {name: round(float(sigmas), 2) for name, (_, sigmas) in known.items()},
         "signals": signals,
+    }
+
+
+def rolling_evidence(tests: CurveFTests, strongest_log_p: Mapping[str, float]) -> dict[str, Any]:
+    """Both F-tests over the last steady samples, and the least log p of each since the verdict before."""
+    return {
+        "pump": f_test_figures(tests.pump),
+        "system": f_test_figures(tests.system),
+        "strongest_log_p": strongest_log_p,
     }
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.protocols.messages.messages import State
 from wetwell.protocols.station.station_file import NonNegative, Table
 
@@ -42,7 +43,6 @@ _CURED: Mapping[str, frozenset[State]] = {
     "pull the pump and flush the main": frozenset({"pump_fault", "system_fault", "pump_and_system_fault"}),
     "check the meter": frozenset({"sensor_fault"}),
 }
-_FAULTS: tuple[State, ...] = ("pump_fault", "system_fault", "pump_and_system_fault")
 
 
 def expected_costs(probability: Mapping[State, float], wasted_kwh_per_day: float, costs: Costs) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def expected_costs(probability: Mapping[State, float], wasted_kwh_per_day: float
     left = costs.failure_share * costs.call_out + energy
     expected = {}
     for act, cured in _CURED.items():
-        uncured = sum(probability.get(state, 0.0) for state in _FAULTS if state not in cured)
+        uncured = sum(probability.get(state, 0.0) for state in FAULT_STATES if state not in cured)
         blind = 0.0 if act == "check the meter" else probability.get("sensor_fault", 0.0) * costs.pull_pump
         expected[act] = round(crews[act] + uncured * left + blind, 1)
     ordered = dict(sorted(expected.items(), key=lambda item: item[1]))

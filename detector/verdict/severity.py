@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.baseline.model import Curve
+from wetwell.detector.curves.datasheet import Curve
 from wetwell.protocols.arrays import Floats
 
 SIGMAS_95 = 1.96

@@ -15,13 +15,14 @@ from pydantic import TypeAdapter
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.backtest import Outcome, outcome, summary
 from wetwell.detector.evaluation.methods import DETECTORS, detector_class
-from wetwell.detector.evaluation.scores import LEARNING_S, in_order_of_time, without_truth
+from wetwell.detector.evaluation.scores import in_order_of_time, without_truth
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.recordings.recording import Recording, read_recording
 from wetwell.protocols.station.station_file import Station, load_station
+from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.dataset import MANIFEST, read_manifest
 from wetwell.services.batch.journal import Journal, fingerprint, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
@@ -298,7 +299,7 @@ def verdicts_on(
     for block in blocks(without_truth(recording), datasheet.pumps):
         for name, judge_one in judges.items():
             started_s = time.perf_counter()
-            verdicts[name].extend(judge_one.take(block))
+            verdicts[name].extend(judge_one.update_block(block))
             spent_s[name] += time.perf_counter() - started_s
     for name, judge_one in judges.items():
         verdicts[name].extend(judge_one.finish())

@@ -83,5 +83,5 @@ def _verdicts(detector: Detector, recording: Recording, pumps: int) -> Iterator[
         transient=True,
     )
     for block in taken:
-        yield from detector.take(block)
+        yield from detector.update_block(block)
     yield from detector.finish()

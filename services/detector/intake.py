@@ -95,7 +95,7 @@ class Intake:
                 if judge in self._behind:
                     self._behind[judge].extend(payloads, kind)
                     continue
-                judged += judge.take_payloads(payloads, kind)
+                judged += judge.handle_payloads(payloads, kind)
                 if judged >= SLICE:
                     judged = 0
                     await asyncio.sleep(0)
@@ -103,7 +103,7 @@ class Intake:
     async def _obey(self) -> None:
         while True:
             for key, payload in await self._orders.receive():
-                self._obeying[key].take_order(payload)
+                self._obeying[key].handle_order(payload)
 
     async def _catch_up(self, judge: StationDetector, turn: asyncio.Semaphore) -> None:
         """Take what was missed, then what came meanwhile.
@@ -119,7 +119,7 @@ class Intake:
             async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
                 if _place(last, waiting.samples()):
                     break
-                await judge.take(samples)
+                await judge.handle_missed(samples)
                 last = samples[-1].time, samples[-1].seq
             await _take(judge, waiting, _place(last, waiting.samples()))
             self._passed_over += self._behind.pop(judge).dropped
@@ -131,7 +131,7 @@ async def _take(judge: StationDetector, waiting: Waiting, place: int) -> None:
     while waiting.messages:
         message = judge.decoded(*waiting.messages.popleft())
         samples = [] if message is None else samples_of(message)
-        judge.take_samples(samples[place:])
+        judge.handle_samples(samples[place:])
         place = max(place - len(samples), 0)
         judged += len(samples)
         if judged >= SLICE and waiting.messages:

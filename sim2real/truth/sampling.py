@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.sim2real.truth.case import Deviation, FaultKind, TrueInflow, TruthCase, TruthFault
 from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.kernel import LEVEL
@@ -164,8 +165,6 @@ HIGH_WATER_M = 1.0
 """So far over the last start level the wet well may fill; it spills at three times that. [m]"""
 RELIEF = 0.85
 _TRIES = 8
-LEARNING_S = 21_600.0
-"""No fault begins in the first six hours, in which a detector may learn. [s]"""
 _SENSED: tuple[AnalogueQuantity, ...] = ("level_m", *PUMP_METERS)
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.runs.run import SEGMENT_SAMPLES, Run, Segments
+from wetwell.detector.runs.run import Run, Segments
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.scenario import Scenario

@@ -1,6 +1,6 @@
 """Other detectors, to hold ours against: the paper's two as written, their best plain reading, and outside ones.
 
-Each is one small class with `take` and `finish` as `wetwell.detector.detector.Detector` has them. Those on
+Each is one small class with `update_block` and `finish` as `wetwell.detector.detector.Detector` has them. Those on
 statsmodels and river need the extra `baselines` (`pip install wetwell[baselines]`) and are loaded only when asked
 for.
 """
@@ -18,7 +18,7 @@ from wetwell.protocols.messages.messages import Verdict
 class StreamDetector(Protocol):
     """What judges the samples of one station."""
 
-    def take(self, block: Block) -> list[Verdict]:
+    def update_block(self, block: Block) -> list[Verdict]:
         """Verdicts that a block of samples brings."""
 
     def finish(self) -> tuple[Verdict, ...]:

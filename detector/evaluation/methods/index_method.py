@@ -10,16 +10,10 @@ from wetwell.detector.evaluation.methods.run_detector import RunDetector
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.bootstrap import block_bootstrap_interval
 from wetwell.detector.statistics.tangent import attribution_index
+from wetwell.detector.verdict.control_limits import OUTER_SHARE, PUMP_ABOVE, RUNS, SYSTEM_BELOW
+from wetwell.detector.verdict.evidence import CONFIDENCE, RESAMPLES
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.messages import State
-
-RUNS = 50
-"""Normal runs that the limits rest on."""
-OUTER_SHARE = 0.05
-SYSTEM_BELOW = 0.4
-PUMP_ABOVE = 0.6
-RESAMPLES = 500
-CONFIDENCE = 0.95
 
 
 class IndexMethod(RunDetector):

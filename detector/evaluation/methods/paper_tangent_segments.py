@@ -4,8 +4,9 @@ import numpy as np
 
 from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.evaluation.methods.index_method import IndexMethod
-from wetwell.detector.runs.run import SEGMENT_SAMPLES, Run
+from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.tangent import normalise, pump_slope, segment_means, system_slope
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.arrays import Floats
 
 

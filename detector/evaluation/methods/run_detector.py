@@ -2,19 +2,17 @@
 
 from abc import ABC, abstractmethod
 
+from wetwell.detector.baseline.model import MIN_RUNS, MIN_SEGMENTS
 from wetwell.detector.curves.datasheet import Datasheet
-from wetwell.detector.runs.run import NEEDED, SEGMENT_SAMPLES, Run
+from wetwell.detector.runs.run import Run
 from wetwell.detector.runs.run_tracker import RunTracker
 from wetwell.detector.stream.block import Block
-from wetwell.detector.stream.gate import Gate
+from wetwell.detector.stream.loop import Stop
+from wetwell.detector.stream.run_state import NEEDED
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.messages.messages import State, Verdict
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 
-LEARNING_S = 6.0 * 3600.0
-MIN_RUNS = 4
-"""Least number of runs that a pump is learnt from."""
-MIN_SEGMENTS = 2
-"""A shorter run is not learnt from."""
 ALPHA = 1e-3
 """Share of healthy runs in which one test may reject, for the methods of which nobody has said another."""
 
@@ -36,21 +34,18 @@ class RunDetector(ABC):
     def __init__(self, station: str, datasheet: Datasheet) -> None:
         self._station = station
         self._datasheet = datasheet
-        self._gate = Gate(datasheet)
         self._runs = RunTracker(datasheet)
         self._learning: list[list[Run] | None] = [[] for _ in range(datasheet.pumps)]
         self._begin_ns: int | None = None
 
-    def take(self, block: Block) -> list[Verdict]:
+    def update_block(self, block: Block) -> list[Verdict]:
         """Verdicts that a block of samples brings."""
-        verdicts = []
-        for row in range(len(block.time_ns)):
-            frame = self._gate.update_row(block, row)
-            if frame is None:
-                continue
-            if self._begin_ns is None:
-                self._begin_ns = frame.time_ns
-            verdicts += [self._judge(run, frame.time_ns) for run in self._runs.update(frame)]
+        if self._begin_ns is None and len(block.time_ns):
+            self._begin_ns = int(block.time_ns[0])
+        verdicts = list[Verdict]()
+        for stop in self._runs.stops(block):
+            if stop == Stop.RUNS_ENDED:
+                verdicts += [self._judge(run, self._runs.now_ns) for run in self._runs.ended_runs()]
         return verdicts
 
     def finish(self) -> tuple[Verdict, ...]:

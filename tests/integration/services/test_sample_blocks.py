@@ -155,7 +155,7 @@ def test_a_sample_that_cannot_be_judged_takes_none_of_its_block_along(alpha, sam
             verdicts = bus.subscribe(verdict_key("alpha"))
             judge = StationDetector(bus, alpha)
             monkeypatch.setattr(judge.detector, "_stopped", lambda _: 1 / 0)
-            judge.take_payloads(messages, kind)
+            judge.handle_payloads(messages, kind)
             told.append(asyncio.run(verdicts.receive()))
         figures = judge.figures()
         assert figures["failures"] > 0
@@ -169,7 +169,7 @@ def test_foreign_and_malformed_blocks_are_counted_and_left_out(alpha, samples):
     with MemoryBus() as bus:
         judge = StationDetector(bus, alpha)
         block = SampleBlock.of(samples[:5])
-        judge.take_payloads(
+        judge.handle_payloads(
             [b"{}", block.model_copy(update={"station": "beta"}).encode(), block.encode()], SampleBlock
         )
     assert {name: judge.figures()[name] for name in ("malformed", "foreign", "samples")} == {

@@ -85,7 +85,7 @@ def test_blocks_give_the_verdicts_and_the_state_of_single_samples(recordings, la
     one_by_one, in_blocks = (Detector(station.name, datasheet_of(station)) for _ in range(2))
     expected = [verdict.encode() for row in recording.rows() for verdict in one_by_one.update(row)]
     pieces = (piece for block in blocks(recording, len(station.pump)) for piece in cut(block, rng))
-    assert [verdict.encode() for piece in pieces for verdict in in_blocks.take(piece)] == expected
+    assert [verdict.encode() for piece in pieces for verdict in in_blocks.update_block(piece)] == expected
     assert len(expected) > 25
     assert in_blocks.counts == one_by_one.counts
     assert in_blocks.snapshot() == one_by_one.snapshot()
@@ -100,7 +100,7 @@ def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
     one_by_one, in_blocks = (Detector(station.name, datasheet_of(station)) for _ in range(2))
     expected = [verdict for row in recording.rows() for verdict in one_by_one.update(row)]
     pieces = (piece for block in blocks(recording, 3) for piece in cut(block, np.random.default_rng(every)))
-    told = [verdict.encode() for piece in pieces for verdict in in_blocks.take(piece)]
+    told = [verdict.encode() for piece in pieces for verdict in in_blocks.update_block(piece)]
     assert told == [verdict.encode() for verdict in expected]
     assert in_blocks.snapshot() == one_by_one.snapshot()
     assert any(verdict.evidence.get("abnormal") for verdict in expected if verdict.pump == 2)
@@ -110,6 +110,6 @@ def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
 def test_messages_give_the_verdicts_of_the_rows_that_they_were(recordings):
     recording, station = spoilt(recordings["alpha", "blocked"], np.random.default_rng(99)), stations()["alpha"]
     in_blocks, live = (Detector(station.name, datasheet_of(station)) for _ in range(2))
-    told = [verdict.encode() for block in blocks(recording, 3) for verdict in in_blocks.take(block)]
+    told = [verdict.encode() for block in blocks(recording, 3) for verdict in in_blocks.update_block(block)]
     assert [v.encode() for sample in recording.samples("alpha") for v in live.update(sample)] == told
     assert live.snapshot() == in_blocks.snapshot()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal, norm
 
 from wetwell.detector.inference.observation import Observation
-from wetwell.detector.inference.posterior import Scales, weigh
+from wetwell.detector.inference.posterior import Scales, posterior_of
 
 SIZES = (1.0, 10.0, 0.02)
 NAN = math.nan
@@ -103,7 +103,7 @@ scales = st.builds(
 @given(observations(), scales, st.lists(st.floats(0.001, 1.0), min_size=6, max_size=6))
 def test_probabilities_sum_to_one_and_are_those_of_scipy(observation, scales, weights):
     prior = np.array(weights) / sum(weights)
-    weighed = weigh(observation, scales, prior)
+    weighed = posterior_of(observation, scales, prior)
     assert weighed.probability.sum() == pytest.approx(1.0, abs=1e-12)
     probability, shift_m, deviation_m = by_scipy(observation, scales, prior)
     np.testing.assert_allclose(weighed.probability, probability, rtol=0.0, atol=1e-8)

@@ -103,9 +103,9 @@ def daemons(alpha, tmp_path_factory):
 @given(payload=PAYLOADS)
 def test_no_payload_brings_a_daemon_down(daemons, payload):
     judge, keeper, historian = daemons
-    judge.take_payloads([payload])
-    judge.take_payloads([payload], SampleBlock)
-    judge.take_order(payload)
+    judge.handle_payloads([payload])
+    judge.handle_payloads([payload], SampleBlock)
+    judge.handle_order(payload)
     for take in (keeper.take_sample, keeper.take_sample_block, keeper.take_verdict, keeper.take_status):
         take(payload)
     for kind in ("samples", "verdicts", "alarms"):
@@ -122,7 +122,7 @@ def test_no_payload_brings_a_daemon_down(daemons, payload):
 def test_after_all_of_them_good_samples_are_still_taken(daemons):
     judge, keeper, historian = daemons
     before = judge.figures().get("samples", 0.0)
-    judge.take_payloads([VALID[0]])
+    judge.handle_payloads([VALID[0]])
     keeper.take_sample(VALID[0])
     historian.take("samples", VALID[0])
     assert judge.figures()["samples"] == before + 1.0

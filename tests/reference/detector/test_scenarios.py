@@ -11,7 +11,7 @@ from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.evaluation.detections import detections, false_alarms
 from wetwell.detector.evaluation.scores import macro_f1, scored_runs
-from wetwell.detector.inference.posterior import FAULTS
+from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.surges import Surges
@@ -60,13 +60,13 @@ def test_the_blockage_of_pump_1_is_blamed_on_no_other_pump(seed):
     first_ns, last_ns = recording.time_ns[[33_600, 42_600]]
     others = [verdict for verdict in verdicts if verdict.pump != 1 and first_ns <= verdict.time <= last_ns]
     assert len(others) > 5
-    assert not [verdict for verdict in others if verdict.state in FAULTS]
+    assert not [verdict for verdict in others if verdict.state in FAULT_STATES]
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_two_days_without_fault_bring_no_alarm(seed):
     recording, verdicts = judged("nominal", seed)
-    assert not [verdict for verdict in verdicts if verdict.state in FAULTS]
+    assert not [verdict for verdict in verdicts if verdict.state in FAULT_STATES]
     assert false_alarms(verdicts, recording).station_days > 1.6
 
 

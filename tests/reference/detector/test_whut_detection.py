@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wetwell.detector.inference.posterior import FAULTS
+from wetwell.detector.inference.posterior import FAULT_STATES
 
 PATH = Path(__file__).parents[3] / "benchmarks" / "real_data.py"
 
@@ -20,4 +20,4 @@ def test_a_healthy_rig_is_not_blamed(real_data, pumps, learns_from):
     spec.loader.exec_module(benchmark)
     judged = benchmark.whut(real_data / "whut-pipeline", pumps, learns_from)
     assert len(judged) >= 2
-    assert not [verdict for verdict in judged if verdict.state in (*FAULTS, "sensor_fault", "learning")]
+    assert not [verdict for verdict in judged if verdict.state in (*FAULT_STATES, "sensor_fault", "learning")]

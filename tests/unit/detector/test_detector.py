@@ -7,12 +7,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.inference.posterior import FAULTS
+from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -48,7 +47,7 @@ def test_the_first_sample_gives_one_learning_verdict_a_pump(alpha, samples):
 
 
 def test_the_blocked_pump_is_told_and_no_other(verdicts):
-    told = {verdict.pump for verdict in verdicts if verdict.state in FAULTS}
+    told = {verdict.pump for verdict in verdicts if verdict.state in FAULT_STATES}
     assert told == {2}
     assert [verdict.state for verdict in verdicts if verdict.pump == 2][-1] == "pump_fault"
 
@@ -58,9 +57,9 @@ def test_every_verdict_is_complete_and_survives_the_wire(verdicts):
         assert sum(verdict.probability.values()) == pytest.approx(1.0)
         assert verdict.state in verdict.probability or verdict.state == "unknown"
         assert verdict.window[0] <= verdict.window[1] <= verdict.time
-        assert (verdict.onset is not None) is (verdict.state in FAULTS)
+        assert (verdict.onset is not None) is (verdict.state in FAULT_STATES)
         assert Verdict.decode(verdict.encode()) == verdict
-        if verdict.state in ("normal", *FAULTS):
+        if verdict.state in ("normal", *FAULT_STATES):
             assert {"steady_samples", "shift_m", "shift_sigmas", "f_test", "index"} <= verdict.evidence.keys()
 
 
@@ -137,7 +136,7 @@ def test_bursts_of_nan_crash_nothing_and_blame_nobody_else(alpha, samples):
         broken.append(sample.model_copy(update={"pumps": (nothing,) * 3, "level_m": math.nan}) if left else sample)
     told, detector = judged(alpha, broken)
     assert detector.counts["missing_values"] > 10_000
-    assert {verdict.pump for verdict in told if verdict.state in FAULTS} == {2}
+    assert {verdict.pump for verdict in told if verdict.state in FAULT_STATES} == {2}
     assert all(sum(verdict.probability.values()) == pytest.approx(1.0) for verdict in told)
 
 

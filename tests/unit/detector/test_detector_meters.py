@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.detector.inference.posterior import FAULTS
+from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.faults.telemetry.sensor_bias import SensorBias
@@ -21,7 +21,7 @@ def states(verdicts, pump):
 
 
 def no_fault(verdicts):
-    return not {verdict.state for verdict in verdicts} & set(FAULTS)
+    return not {verdict.state for verdict in verdicts} & set(FAULT_STATES)
 
 
 def test_a_healthy_station_stays_normal(judge_after_learning):
@@ -113,7 +113,7 @@ def test_a_lost_level_is_said_and_the_pumps_stay_normal(judge_after_learning):
 def test_a_blocked_pump_is_told_without_the_level(judge_after_learning):
     verdicts = judge_after_learning(Blockage(pump=2, speed_loss=0.15, shape="step", **ALWAYS), change=lose_level)
     assert states(verdicts, 2)[-1] == "pump_fault"
-    assert not {*states(verdicts, 1), *states(verdicts, 3)} & set(FAULTS)
+    assert not {*states(verdicts, 1), *states(verdicts, 3)} & set(FAULT_STATES)
 
 
 @pytest.mark.parametrize("quantity", ["flow_m3h", "head_m"])

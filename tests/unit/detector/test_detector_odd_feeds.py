@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.inference.posterior import FAULTS
+from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.protocols.messages.readings import PumpRow, Row
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -47,7 +47,7 @@ def test_noise_after_learning_without_any_crashes_nothing(alpha):
         return PumpRow(50.0, 200.0 + noise, 26.0 + noise, 15.0, True)
 
     verdicts = judged(alpha, then_noisy)
-    assert not [verdict for verdict in verdicts if verdict.state in FAULTS]
+    assert not [verdict for verdict in verdicts if verdict.state in FAULT_STATES]
 
 
 def test_a_standby_pump_does_not_hide_a_stuck_meter_of_another(alpha):

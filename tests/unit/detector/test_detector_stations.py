@@ -5,11 +5,10 @@ import copy
 import numpy as np
 import pytest
 
-from wetwell.detector.baseline.learning import LEARNING_S
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.inference.posterior import FAULTS
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.detector.inference.posterior import FAULT_STATES
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
@@ -30,7 +29,7 @@ def judged(station, recording):
 
 
 def false_ones(told, until_s):
-    alarms = (*FAULTS, "sensor_fault")
+    alarms = (*FAULT_STATES, "sensor_fault")
     return [verdict.state for second, verdict in told if second < until_s and verdict.state in alarms]
 
 
@@ -51,7 +50,7 @@ def test_a_station_at_varied_speed_has_a_quiet_day_and_then_its_blockage_is_told
     assert false_ones(told, DAY_S) == []
     assert share_of_normal(told, 12 * HOUR_S, DAY_S) > 0.95
     after = [verdict for second, verdict in told if second > DAY_S]
-    assert {verdict.pump for verdict in after if verdict.state in FAULTS} == {2}
+    assert {verdict.pump for verdict in after if verdict.state in FAULT_STATES} == {2}
     assert [verdict.state for verdict in after if verdict.pump == 2][-1] == "pump_fault"
 
 
@@ -78,7 +77,7 @@ def test_two_pumps_on_a_common_header_are_learnt_together_and_told_apart(alpha, 
     _, told = judged(station, recording)
     assert false_ones(told, 12 * HOUR_S) == []
     after = [verdict for second, verdict in told if second > 13 * HOUR_S]
-    assert {verdict.pump for verdict in after if verdict.state in FAULTS} == pumps
+    assert {verdict.pump for verdict in after if verdict.state in FAULT_STATES} == pumps
     for pump in pumps:
         states = [verdict.state for verdict in after if verdict.pump == pump]
         assert states.count(state) >= 0.7 * len(states)
@@ -109,13 +108,13 @@ def test_a_station_that_never_had_a_level_is_judged_without(alpha):
     _, told = judged(alpha, recording)
     assert false_ones(told, 8 * HOUR_S) == []
     after = [verdict for second, verdict in told if second > 8 * HOUR_S]
-    assert {verdict.pump for verdict in after if verdict.state in FAULTS} == {3}
+    assert {verdict.pump for verdict in after if verdict.state in FAULT_STATES} == {3}
     assert {verdict.state for verdict in after if verdict.pump != 3} == {"normal"}
 
 
 @pytest.fixture(scope="module")
 def now_ns(learnt):
-    return int(learnt._gate.state["time_ns"][0])
+    return learnt.seen_until_ns
 
 
 def test_a_pump_that_is_re_baselined_learns_anew_and_the_others_go_on(alpha, learnt, now_ns):
@@ -134,18 +133,18 @@ def test_a_pump_that_is_re_baselined_learns_anew_and_the_others_go_on(alpha, lea
     assert own[-1][1].evidence["baseline"] == 2
     back = detector.revert(1, now_ns + 25_000 * NS_PER_S)
     assert (back.pump, back.state) == (2, "unknown")
-    assert detector._pumps[1].known.version == 1
+    assert detector._judges[1].memory.reference.version == 1
 
 
 def test_what_was_put_aside_can_be_taken_back_before_anything_new_is_learnt(learnt, now_ns):
     detector = copy.deepcopy(learnt)
-    before = detector._pumps[0].known
+    before = detector._judges[0].memory.reference
     assert detector.revert(0, now_ns).evidence["reason"] == "no baseline was put aside"
-    assert detector._pumps[0].known is before
+    assert detector._judges[0].memory.reference is before
     detector.rebaseline(0, now_ns)
     verdict = detector.revert(0, now_ns)
     assert verdict.evidence["reason"] == "baseline taken back by an operator"
-    assert detector._pumps[0].known is before
+    assert detector._judges[0].memory.reference is before
 
 
 def test_a_repaired_pump_is_healthy_again_once_it_is_learnt_anew(alpha):

@@ -8,8 +8,9 @@ import tomli_w
 
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.dataset import check_dataset, plan_of
-from wetwell.simulator.dataset import LEARNING_S, MAX_PUMPS, item_of, kinds_of, labels
+from wetwell.simulator.dataset import MAX_PUMPS, item_of, kinds_of, labels
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import PumpFault, SensorFault
 from wetwell.simulator.scenario import Scenario

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from wetwell.detector.baseline.learning import DAY_S, LEARNING_S, Learning, objection, sibling_objection
+from wetwell.detector.baseline.learning import DAY_S, Learning, sibling_rejection, stationarity_rejection
 from wetwell.detector.baseline.model import MIN_RUNS
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.detector import Detector
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.services.stations import find_scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -154,24 +154,24 @@ def test_an_objection_looks_at_deviations_and_not_at_residuals(learnt):
     learning = learnt(lambda end_s: (0.0, 5.0 * end_s / LEARNING_S), until_s=LEARNING_S)
     runs = learning.runs(LEARNING_S, LEARNING_S)
     baseline = baseline_of(learnt(healthy, until_s=LEARNING_S), LEARNING_S)[0]
-    assert objection(np.zeros((len(runs), 2)), baseline, runs, CURVE[0]) is None
+    assert stationarity_rejection(np.zeros((len(runs), 2)), baseline, runs, CURVE[0]) is None
     rising = np.column_stack([np.zeros(len(runs)), np.linspace(0.0, 5.0, len(runs))])
-    assert objection(rising, baseline, runs, CURVE[0]).startswith("the system curve moved by +2.")
+    assert stationarity_rejection(rising, baseline, runs, CURVE[0]).startswith("the system curve moved by +2.")
 
 
 @pytest.mark.parametrize("gap_m", [-3.75, 3.85])
 def test_a_pump_that_differs_from_its_siblings_is_refused(gap_m):
-    message = sibling_objection(0, [gap_m, 0.0, 0.1], [CURVE] * 3)
+    message = sibling_rejection(0, [gap_m, 0.0, 0.1], [CURVE] * 3)
     assert message.startswith(f"its curve lies {gap_m - 0.05:+.1f} m from that of its siblings")
-    assert sibling_objection(1, [gap_m, 0.0, 0.1], [CURVE] * 3) is None
+    assert sibling_rejection(1, [gap_m, 0.0, 0.1], [CURVE] * 3) is None
 
 
 def test_only_pumps_of_the_same_curve_that_are_known_are_siblings():
     other = (40.0, 0.0, -2e-4)
-    assert sibling_objection(0, [-9.0, 0.0], [CURVE, other]) is None
-    assert sibling_objection(0, [-9.0, None], [CURVE, CURVE]) is None
-    assert sibling_objection(0, [None, 0.0], [CURVE, CURVE]) is None
-    assert sibling_objection(0, [-3.5, 0.0], [CURVE, CURVE]) is None
+    assert sibling_rejection(0, [-9.0, 0.0], [CURVE, other]) is None
+    assert sibling_rejection(0, [-9.0, None], [CURVE, CURVE]) is None
+    assert sibling_rejection(0, [None, 0.0], [CURVE, CURVE]) is None
+    assert sibling_rejection(0, [-3.5, 0.0], [CURVE, CURVE]) is None
 
 
 def test_the_papers_blockage_within_learning_is_never_learnt(alpha):

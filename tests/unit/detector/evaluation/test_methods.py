@@ -102,5 +102,5 @@ def test_the_six_hours_are_those_of_the_stamps(alpha, recording):
     quick_ns = recording.time_ns[0] + (recording.time_ns - recording.time_ns[0]) // 10
     quick = type(recording)(time_ns=quick_ns, columns=recording.columns)
     detector = detector_class("always_normal")(alpha.name, datasheet_of(alpha))
-    states = {verdict.state for block in blocks(quick, quick.pumps) for verdict in detector.take(block)}
+    states = {verdict.state for block in blocks(quick, quick.pumps) for verdict in detector.update_block(block)}
     assert states == {"learning"}

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from wetwell.detector.inference.decision import decide
-from wetwell.detector.inference.posterior import Weighed
+from wetwell.detector.inference.posterior import Posterior
 
 HEAD_M = 25.0
 
 
-def weighed(probability, *, shift_m=(-2.0, 2.0), tolerance_m=(0.15, 0.5), flow_error=0.0, head_error_m=0.0):
-    return Weighed(
+def posterior(probability, *, shift_m=(-2.0, 2.0), tolerance_m=(0.15, 0.5), flow_error=0.0, head_error_m=0.0):
+    return Posterior(
         probability=np.array(probability),
         shift_m=np.array(shift_m),
         deviation_m=np.full(2, 0.1),
@@ -23,7 +23,7 @@ def weighed(probability, *, shift_m=(-2.0, 2.0), tolerance_m=(0.15, 0.5), flow_e
 
 
 def told(probability, **keywords):
-    return decide(weighed(probability, **keywords), HEAD_M)
+    return decide(posterior(probability, **keywords), HEAD_M)
 
 
 @pytest.mark.parametrize(

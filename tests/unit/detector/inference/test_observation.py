@@ -1,24 +1,16 @@
 """What a run shows against its baseline, with the error that it may have."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from wetwell.detector.baseline.healthy_reference import Check, HealthyReference
 from wetwell.detector.baseline.model import learn
 from wetwell.detector.curves.residuals import level_residuals
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction, head_sensor_direction
-from wetwell.detector.inference.observation import (
-    CHECK_FLOOR,
-    DRAWDOWN,
-    POWER,
-    PUMP,
-    SYSTEM,
-    Check,
-    learn_check,
-    log_power,
-    observe,
-)
+from wetwell.detector.inference.observation import DRAWDOWN, POWER, PUMP, SYSTEM, observe
 
 CURVE = (36.0, -0.02333, -1.3333e-4)
 FRICTION_H2_M5 = 6.0e-4
@@ -34,8 +26,11 @@ def baseline(segments_of):
     return learn(runs, CURVE, FRICTION_H2_M5)
 
 
-def seen(run, baseline, drawdown=(NAN, NO_CHECK), power=NO_CHECK):
-    return observe(run, baseline, CURVE, FRICTION_H2_M5, drawdown=drawdown, power=power)
+def seen(run, baseline, drawdown=NO_CHECK, power=NO_CHECK):
+    reference = HealthyReference(
+        version=1, learnt_ns=0, baseline=baseline, drawdown=drawdown, power=power, noise=np.full(2, NAN)
+    )
+    return observe(run, reference, CURVE, FRICTION_H2_M5)
 
 
 def test_the_shift_is_counted_from_the_baseline_and_the_longer_part_of_a_run_tells_it(run_of, segments_of, baseline):
@@ -118,34 +113,10 @@ def test_the_directions_of_the_meters_are_those_of_the_residuals(speed_ratio):
 
 
 def test_drawdown_and_power_are_counted_from_health(run_of, segments_of, baseline):
-    run = run_of(segments_of([[0.2, -0.1]] * 10), power_kw=12.0)
-    found = seen(
-        run, baseline, (0.25, Check(mean=0.1, variance=0.02**2)), Check(mean=math.log(10.0), variance=0.01**2)
-    )
+    run = replace(run_of(segments_of([[0.2, -0.1]] * 10), power_kw=12.0), log_ratio=0.25)
+    found = seen(run, baseline, Check(mean=0.1, variance=0.02**2), Check(mean=math.log(10.0), variance=0.01**2))
     assert found.mean[DRAWDOWN] == pytest.approx(0.15)
     assert found.sigmas[DRAWDOWN] == pytest.approx(7.5)
     assert found.mean[POWER] == pytest.approx(math.log(1.2))
     assert found.flow_meter[DRAWDOWN] == 1.0
     assert found.head_sensor[DRAWDOWN] == found.head_sensor[POWER] == found.flow_meter[POWER] == 0.0
-
-
-def test_a_check_is_learnt_from_the_middle_of_healthy_runs():
-    rng = np.random.default_rng(3)
-    values = [*(0.1 + 0.05 * rng.normal(size=200)), NAN, 9.0, -9.0]
-    check = learn_check(values)
-    assert check.mean == pytest.approx(0.1, abs=0.02)
-    assert math.sqrt(check.variance) == pytest.approx(0.05, rel=0.2)
-    assert math.sqrt(learn_check([0.1] * 50).variance) == pytest.approx(CHECK_FLOOR, rel=0.02)
-    for few in ([], [0.1] * 3, [NAN] * 50):
-        assert math.isnan(learn_check(few).mean)
-
-
-def test_the_power_is_taken_to_nominal_speed(run_of, segments_of):
-    datasheet, slow = (
-        run_of(segments_of(np.zeros((4, 2)), speed_ratio=speed), power_kw=15.0 * speed**2) for speed in (1.0, 0.8)
-    )
-    assert log_power(datasheet) == pytest.approx(math.log(15.0))
-    assert log_power(slow) == pytest.approx(math.log(15.0))
-    assert math.isnan(log_power(run_of(segments_of(np.zeros((4, 2))))))
-    mostly = np.where(np.arange(100) < 40, 15.0, NAN)
-    assert math.isnan(log_power(run_of(segments_of(np.zeros((4, 2))), power_kw=mostly)))

@@ -15,14 +15,14 @@ from wetwell.detector.inference.posterior import (
     PUMP_FAULT,
     SYSTEM_FAULT,
     Scales,
-    weigh,
+    posterior_of,
 )
-from wetwell.detector.inference.prior import PumpBelief, SystemBelief, joint_prior
+from wetwell.detector.inference.prior import PumpPrior, SystemPrior, joint_prior
 
 CURVE = (36.0, -0.02333, -1.3333e-4)
 FRICTION_H2_M5 = 6.0e-4
 SCALES = Scales(pump_m=5.4, system_m=8.2, head_m=3.6)
-PRIOR = joint_prior(PumpBelief(), SystemBelief())
+PRIOR = joint_prior(PumpPrior(), SystemPrior())
 FLOW_DIRECTION = flow_meter_direction(200.0, 200.0, 200.0, CURVE, FRICTION_H2_M5)
 NAN = math.nan
 
@@ -38,7 +38,7 @@ def seen(shift_m, *, drawdown=NAN, power=NAN, deviation_m=(0.08, 0.09), slope_m=
 
 
 def probability(*arguments, **keywords):
-    return weigh(seen(*arguments, **keywords), SCALES, PRIOR).probability
+    return posterior_of(seen(*arguments, **keywords), SCALES, PRIOR).probability
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_the_curve_that_moved_is_the_one_at_fault(shift_m, hypothesis):
 
 @pytest.mark.parametrize("error", [-0.15, -0.06, 0.06, 0.15])
 def test_a_flow_meter_with_the_drawdown_against_it_is_the_one_that_is_wrong(error):
-    weighed = weigh(seen(error * FLOW_DIRECTION, drawdown=error, power=0.0), SCALES, PRIOR)
+    weighed = posterior_of(seen(error * FLOW_DIRECTION, drawdown=error, power=0.0), SCALES, PRIOR)
     assert weighed.probability[FLOW_METER] > 0.99
     assert weighed.flow_error == pytest.approx(error, abs=0.01)
     assert abs(weighed.flow_error - error) < 2.5 * weighed.flow_deviation < 0.025
@@ -60,7 +60,7 @@ def test_a_flow_meter_with_the_drawdown_against_it_is_the_one_that_is_wrong(erro
 
 @pytest.mark.parametrize("error_m", [-3.0, -1.0, 1.0, 3.0])
 def test_a_head_sensor_with_drawdown_and_power_in_order_is_the_one_that_is_wrong(error_m):
-    weighed = weigh(seen((error_m, error_m), drawdown=0.0, power=0.0), SCALES, PRIOR)
+    weighed = posterior_of(seen((error_m, error_m), drawdown=0.0, power=0.0), SCALES, PRIOR)
     assert weighed.probability[HEAD_SENSOR] > 0.9
     assert weighed.head_error_m == pytest.approx(error_m, abs=0.1)
     assert abs(weighed.head_error_m - error_m) < 2.5 * weighed.head_deviation_m < 0.5
@@ -84,11 +84,11 @@ def test_the_power_alone_is_no_fault():
 
 def test_a_component_that_is_not_known_is_left_out():
     unknown = seen((-0.3, 0.1))
-    assert np.isfinite(weigh(unknown, SCALES, PRIOR).probability).all()
+    assert np.isfinite(posterior_of(unknown, SCALES, PRIOR).probability).all()
     vague = seen((-0.3, 0.1), drawdown=0.0, power=0.0)
     vague.covariance[2, 2] = vague.covariance[3, 3] = 1e12
     np.testing.assert_allclose(
-        weigh(unknown, SCALES, PRIOR).probability, weigh(vague, SCALES, PRIOR).probability, atol=1e-6
+        posterior_of(unknown, SCALES, PRIOR).probability, posterior_of(vague, SCALES, PRIOR).probability, atol=1e-6
     )
 
 
@@ -120,6 +120,8 @@ def test_a_flow_meter_is_believed_to_one_percent_unless_the_drawdown_watches_it(
     observation = seen((0.0, 1.5))
     for deviation in (NAN, 0.02):
         observation.covariance[DRAWDOWN, DRAWDOWN] = deviation**2
-        np.testing.assert_allclose(weigh(observation, SCALES, PRIOR).tolerance_m, np.abs(0.01 * FLOW_DIRECTION))
+        np.testing.assert_allclose(
+            posterior_of(observation, SCALES, PRIOR).tolerance_m, np.abs(0.01 * FLOW_DIRECTION)
+        )
     observation.covariance[DRAWDOWN, DRAWDOWN] = 0.005**2
-    assert weigh(observation, SCALES, PRIOR).tolerance_m.tolist() == [0.0, 0.0], "learnt, not seen in this run"
+    assert posterior_of(observation, SCALES, PRIOR).tolerance_m.tolist() == [0.0, 0.0], "learnt, not seen in this run"

@@ -1,6 +1,7 @@
-"""Cutting a stream of frames into pump runs and their steady segments."""
+"""Cutting a stream of samples into pump runs and their steady segments."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -8,16 +9,36 @@ from scipy.optimize import brentq
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.runs.run_tracker import RunTracker
-from wetwell.detector.stream.gate import Frame, PumpFrame
+from wetwell.detector.stream.block import Block
+from wetwell.detector.stream.loop import Stop
 from wetwell.protocols.timestamps import NS_PER_S
 
 NAN = math.nan
-OFF = PumpFrame(0.0, 0.0, 0.0, 0.0, False)
-ON = PumpFrame(50.0, 200.0, 26.0, 15.0, True)
 
 
-def frame(second, *pumps, gap_s=1.0, level_m=1.0):
-    return Frame(second * NS_PER_S, gap_s, level_m, NAN, pumps + (OFF,) * (3 - len(pumps)))
+class Reading(NamedTuple):
+    """Values of a pump in the order of a block."""
+
+    frequency_hz: float
+    flow_m3h: float
+    head_m: float
+    power_kw: float
+    running: float
+
+
+OFF = Reading(0.0, 0.0, 0.0, 0.0, 0.0)
+ON = Reading(50.0, 200.0, 26.0, 15.0, 1.0)
+
+
+def sample(second, *pumps, level_m=1.0):
+    """A block of one sample."""
+    values = [level_m, NAN, *(value for pump in pumps + (OFF,) * (3 - len(pumps)) for value in pump)]
+    return Block(np.array([second * NS_PER_S]), np.array([second]), np.array([values]), 3, False)
+
+
+def ended(tracker, block):
+    """Runs that a block ends."""
+    return [run for stop in tracker.stops(block) if stop == Stop.RUNS_ENDED for run in tracker.ended_runs()]
 
 
 @pytest.fixture
@@ -33,7 +54,7 @@ def common_tracker(alpha):
 
 def feed(tracker, seconds, *pumps, level_m=1.0):
     """Runs that end while these seconds pass."""
-    return [run for second in seconds for run in tracker.update(frame(second, *pumps, level_m=level_m))]
+    return [run for second in seconds for run in ended(tracker, sample(second, *pumps, level_m=level_m))]
 
 
 def test_a_run_goes_from_start_to_stop_and_is_steady_after_30_s(tracker):
@@ -50,7 +71,7 @@ def test_a_run_goes_from_start_to_stop_and_is_steady_after_30_s(tracker):
 def test_segments_are_means_of_25_residuals(tracker, alpha):
     flows = 200.0 + np.random.default_rng(0).normal(size=100)
     for second, flow in enumerate(flows):
-        tracker.update(frame(second, ON._replace(flow_m3h=float(flow))))
+        ended(tracker, sample(second, ON._replace(flow_m3h=float(flow))))
     (run,) = tracker.finish()
     c0, c1, c2 = alpha.pump[0].coefficients
     steady = flows[30:]
@@ -111,31 +132,31 @@ def test_a_step_of_the_speed_has_to_settle_for_ten_seconds(tracker, step_hz, is_
 def test_a_speed_that_goes_on_drifting_settles_again_and_again(tracker):
     feed(tracker, range(60), ON)
     for second in range(60, 120):
-        tracker.update(frame(second, ON._replace(frequency_hz=50.0 - 0.5 * (second - 59))))
+        ended(tracker, sample(second, ON._replace(frequency_hz=50.0 - 0.5 * (second - 59))))
     (run,) = tracker.finish()
     assert run.time_s.max() < 63.0, "after two steps of half a hertz the third has moved on by more than 2 %"
 
 
 def test_a_break_of_the_stream_ends_a_run_and_the_next_settles_anew(tracker):
     feed(tracker, range(100), ON)
-    assert tracker.update(frame(160, ON, gap_s=60.0)) == []
-    (run,) = tracker.update(frame(221, ON, gap_s=61.0))
-    assert run.window_ns == (0, 160 * NS_PER_S)
-    feed(tracker, range(222, 300), ON)
+    assert ended(tracker, sample(159, ON)) == []
+    (run,) = ended(tracker, sample(220, ON))
+    assert run.window_ns == (0, 159 * NS_PER_S)
+    feed(tracker, range(221, 300), ON)
     (after,) = tracker.finish()
-    assert after.window_ns == (221 * NS_PER_S, 299 * NS_PER_S)
+    assert after.window_ns == (220 * NS_PER_S, 299 * NS_PER_S)
     assert after.time_s[0] == 30.0
 
 
 def test_a_long_run_is_told_in_parts_of_half_an_hour(tracker):
-    ended = feed(tracker, range(4000), ON)
-    ended += tracker.finish()
-    assert [run.window_ns for run in ended] == [
+    parts = feed(tracker, range(4000), ON)
+    parts += tracker.finish()
+    assert [run.window_ns for run in parts] == [
         (0, 1799 * NS_PER_S),
         (1800 * NS_PER_S, 3599 * NS_PER_S),
         (3600 * NS_PER_S, 3999 * NS_PER_S),
     ]
-    assert [len(run.time_s) for run in ended] == [1770, 1800, 400]
+    assert [len(run.time_s) for run in parts] == [1770, 1800, 400]
 
 
 def test_a_common_header_carries_the_flow_of_all_running_pumps(common_tracker):
@@ -162,8 +183,9 @@ def test_a_signal_that_never_came_is_named(tracker, name):
 def test_a_run_that_lacks_a_needed_signal_is_told_once_after_a_minute(tracker):
     blind, told = ON._replace(head_m=NAN), []
     for second in range(100):
-        tracker.update(frame(second, blind, ON))
-        told += [(second, run.pump, run.missing) for run in tracker.newly_blind_runs()]
+        for stop in tracker.stops(sample(second, blind, ON)):
+            if stop == Stop.RUN_BLIND:
+                told += [(second, run.pump, run.missing) for run in tracker.newly_blind_runs()]
     assert told == [(60, 0, {"head_m"})]
 
 
@@ -178,29 +200,31 @@ def test_a_signal_that_came_at_times_is_not_missing(tracker):
 @pytest.mark.parametrize(
     ("on", "off"),
     [
-        (PumpFrame(50.0, NAN, NAN, NAN, None), PumpFrame(0.0, NAN, NAN, NAN, None)),
-        (PumpFrame(NAN, 200.0, NAN, NAN, None), PumpFrame(NAN, 1.0, NAN, NAN, None)),
+        (Reading(50.0, NAN, NAN, NAN, NAN), Reading(0.0, NAN, NAN, NAN, NAN)),
+        (Reading(NAN, 200.0, NAN, NAN, NAN), Reading(NAN, 1.0, NAN, NAN, NAN)),
     ],
 )
 def test_running_is_taken_from_frequency_or_flow_where_nobody_says_it(tracker, on, off):
     assert feed(tracker, range(10), off) == []
     feed(tracker, range(10, 60), on)
-    feed(tracker, range(60, 65), PumpFrame(NAN, NAN, NAN, NAN, None))
+    feed(tracker, range(60, 65), Reading(NAN, NAN, NAN, NAN, NAN))
     (run,) = feed(tracker, [65], off)
     assert run.window_ns == (10 * NS_PER_S, 64 * NS_PER_S)
 
 
 def test_the_flag_has_the_last_word_on_running(tracker):
-    assert feed(tracker, range(60), ON._replace(running=False)) == []
+    assert feed(tracker, range(60), ON._replace(running=0.0)) == []
     assert tracker.finish() == []
 
 
 def test_the_last_segments_of_an_open_run_are_given_each_time_one_is_full(tracker):
     looks = {}
+    tracker.set_learning(0, is_learning=False)
     for second in range(200):
-        tracker.update(frame(second, ON))
-        if filled := tracker.full_segments(0):
-            looks[second] = filled, tracker.last_segments(0, min(filled, 3))
+        for stop in tracker.stops(sample(second, ON)):
+            assert (stop, tracker.full_pumps()) == (Stop.SEGMENT_FULL, [0])
+            filled = len(tracker.last_segments(0, 99).segments)
+            looks[second] = filled, tracker.last_segments(0, 3)
     assert {second: filled for second, (filled, _) in looks.items()} == {54 + 25 * n: n + 1 for n in range(6)}
     assert looks[154][1].window_ns == (80 * NS_PER_S, 154 * NS_PER_S)
     assert [len(run.segments) for _, run in looks.values()] == [1, 2, 3, 3, 3, 3]
@@ -217,16 +241,13 @@ def test_a_closed_check_valve_says_nothing_of_the_main(tracker):
 @pytest.mark.parametrize(("period_s", "samples"), [(1, 25), (2, 12), (5, 5), (10, 2), (30, 1), (60, 1)])
 def test_a_slow_feed_has_shorter_segments(tracker, period_s, samples):
     for second in range(0, 1800, period_s):
-        assert not tracker.update(frame(second, ON, gap_s=float(period_s)))
-    (run,) = tracker.update(frame(1800, gap_s=float(period_s)))
+        assert not ended(tracker, sample(second, ON))
+    (run,) = ended(tracker, sample(1800))
     assert run.segments.samples == samples
     assert len(run.segments) == len(run.time_s) // samples
     assert run.time_s[0] == max(30, period_s)
 
 
 def test_a_slow_feed_breaks_only_where_more_than_one_sample_is_lacking(tracker):
-    seconds = [0, 61, 122, 244, 305, 488]
-    ended = []
-    for before, second in zip([-61, *seconds], seconds, strict=False):
-        ended.append(len(tracker.update(frame(second, ON, gap_s=float(second - before)))))
-    assert ended[2:] == [0, 0, 0, 1], "the feed's pace is 61 s; 122 s lack one sample, 183 s lack two"
+    counts = [len(ended(tracker, sample(second, ON))) for second in (-61, 0, 61, 122, 244, 305, 488)]
+    assert counts[3:] == [0, 0, 0, 1], "the feed's period is 61 s; 122 s lack one sample, 183 s lack two"

@@ -70,7 +70,7 @@ def test_what_was_learnt_is_taken_over(data, upgraded):
 
 
 def test_it_goes_on_without_learning_again(alpha, upgraded):
-    verdicts = [verdict for block in rest(alpha) for verdict in upgraded.take(block)]
+    verdicts = [verdict for block in rest(alpha) for verdict in upgraded.update_block(block)]
     assert {verdict.pump for verdict in verdicts} == {1, 2, 3}
     assert all(verdict.evidence.get("reason") != "begins" for verdict in verdicts)
     assert all((verdict.state == "learning") is (verdict.pump == 2) for verdict in verdicts)
@@ -82,7 +82,7 @@ def test_it_goes_on_without_learning_again(alpha, upgraded):
 
 def test_a_fault_that_was_told_stands(alpha, data, upgraded):
     assert [pump["state"] for pump in stored_pumps(data)] == ["pump_fault", "learning", "normal"]
-    first = next(verdict for block in rest(alpha) for verdict in upgraded.take(block) if verdict.pump == 1)
+    first = next(verdict for block in rest(alpha) for verdict in upgraded.update_block(block) if verdict.pump == 1)
     assert first.state == "pump_fault"
     assert first.onset == stored_pumps(data)[0]["onset_ns"]
 
@@ -104,4 +104,6 @@ def test_it_is_kept_in_the_new_form(alpha, upgraded):
 def test_how_long_readings_repeated_themselves_is_taken_over(data, upgraded):
     state = dict(json.loads(data.split(b"\n")[1])["dict"])
     stored = dict(state["_repeats"]["object"][1]["longest_ns"]["dict"])
-    assert sorted(np.unique(upgraded._meters["longest_ns"]).tolist()) == sorted({0, *stored.values()})
+    assert sorted(np.unique(upgraded._runs.state.stuck_sensors["longest_ns"]).tolist()) == sorted(
+        {0, *stored.values()}
+    )

@@ -1,18 +1,28 @@
 """Metered flow against what leaves the wet well, on level traces of which the truth is known."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from wetwell.detector.stream.drawdown import DEAD_RATIO, draw_down, new_phases
-from wetwell.detector.stream.gate import Frame, PumpFrame
-from wetwell.detector.stream.run_state import PUMP, new_pace, note_gap
+from wetwell.detector.stream.run_state import PUMP_STATE, new_sampling_period, note_gap
 from wetwell.protocols.timestamps import NS_PER_S
 
 AREA_M2 = 8.0
 NAN = math.nan
 FLOW_M3H = 200.0
+
+
+class Frame(NamedTuple):
+    """A sample that has passed the gate."""
+
+    time_ns: int
+    gap_s: float
+    level_m: float
+    inflow_m3h: float
+    flows_m3h: tuple[float, ...]
 
 
 def trace(*phases, inflow_m3h=lambda _second: 60.0, ratio=1.0, is_inflow_measured=False, rng=None, gap_at=None):
@@ -23,14 +33,11 @@ def trace(*phases, inflow_m3h=lambda _second: 60.0, ratio=1.0, is_inflow_measure
         for _ in range(seconds):
             inflow = inflow_m3h(second)
             level_m += (inflow - sum(running) * FLOW_M3H) / 3600.0 / AREA_M2
-            pumps = tuple(
-                PumpFrame(50.0 * on, ratio * FLOW_M3H * on * (1.0 + 0.01 * rng.normal()), 26.0 * on, NAN, bool(on))
-                for on in running
-            )
+            flows_m3h = tuple(ratio * FLOW_M3H * on * (1.0 + 0.01 * rng.normal()) for on in running)
             gap_s = 60.0 if second == gap_at else 1.0
             measured = inflow * (1.0 + 0.01 * rng.normal()) if is_inflow_measured else NAN
             yield (
-                Frame(second * NS_PER_S, gap_s, level_m + 0.002 * rng.normal(), measured, pumps),
+                Frame(second * NS_PER_S, gap_s, level_m + 0.002 * rng.normal(), measured, flows_m3h),
                 tuple(map(bool, running)),
             )
             second += 1
@@ -40,12 +47,14 @@ IDLE, ONE, TWO = (0, 0), (1, 0), (1, 1)
 
 
 def told_of_both(frames, *, area_m2=AREA_M2):
-    phases, pumps, pace = new_phases(), np.zeros(2, dtype=PUMP), new_pace()
+    phases, pumps, period = new_phases(), np.zeros(2, dtype=PUMP_STATE), new_sampling_period()
     pumps["log_ratio"] = NAN
     for frame, running in frames:
         pumps["is_running"] = running
-        draw_down(phases, area_m2, pace[0], frame.time_ns, frame.gap_s, np.array(frame.values()), pumps)
-        note_gap(pace[0], frame.gap_s)
+        flows = (value for flow_m3h in frame.flows_m3h for value in (NAN, flow_m3h, NAN, NAN, NAN))
+        values = np.array([frame.level_m, frame.inflow_m3h, *flows])
+        draw_down(phases, area_m2, period[0], frame.time_ns, frame.gap_s, values, pumps)
+        note_gap(period[0], frame.gap_s)
     return pumps["log_ratio"].tolist()
 
 

@@ -1,14 +1,26 @@
 """The gate: what it marks, drops, counts and follows."""
 
 import math
+from collections import Counter
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wetwell.detector.curves.datasheet import datasheet_of
-from wetwell.detector.stream.gate import CONFIRMATIONS, RESENT_SAMPLES, Gate
+from wetwell.detector.stream.block import LiveBlock
+from wetwell.detector.stream.gate import (
+    CONFIRMATIONS,
+    RESENT_SAMPLES,
+    gate_counts,
+    gate_ranges,
+    let_through,
+    new_gate,
+)
 from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.quantities import FIRST_PUMP, PUMP_VALUES
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 
 START_S = 1_700_000_000
@@ -25,6 +37,50 @@ def sample(second, *, seq=None, level_m=1.0, pumps=(GOOD,) * 3, quality="good"):
         pumps=pumps,
         quality=quality,
     )
+
+
+class PumpFrame(NamedTuple):
+    """What is known of one pump in one second; NaN is "no value", None is "not said"."""
+
+    frequency_hz: float
+    flow_m3h: float
+    head_m: float
+    power_kw: float
+    running: bool | None
+
+
+class Frame(NamedTuple):
+    """A sample that has passed the gate."""
+
+    time_ns: int
+    gap_s: float
+    level_m: float
+    pumps: tuple[PumpFrame, ...]
+
+
+class Gate:
+    """The compiled gate, a sample at a time."""
+
+    def __init__(self, datasheet):
+        self.state, self.ranges = new_gate(), gate_ranges(datasheet)
+        self.values = np.full(FIRST_PUMP + PUMP_VALUES * datasheet.pumps, math.nan)
+        self.live = LiveBlock(datasheet.pumps)
+
+    @property
+    def counts(self):
+        return Counter(gate_counts(self.state))
+
+    def update(self, sent):
+        """Frame of a sample, or None where it is dropped."""
+        block = self.live.fill(sent)
+        told = block.time_ns[0], block.seq[0], block.values[0], block.pumps, block.is_bad
+        if not let_through(self.state[0], self.ranges, *told, self.values):
+            return None
+        pumps = (
+            PumpFrame(*readings, None if math.isnan(running) else running > 0.0)
+            for *readings, running in self.values[FIRST_PUMP:].reshape(-1, PUMP_VALUES).tolist()
+        )
+        return Frame(int(block.time_ns[0]), float(self.state["gap_s"][0]), float(self.values[0]), tuple(pumps))
 
 
 @pytest.fixture

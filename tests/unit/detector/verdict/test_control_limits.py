@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wetwell.detector.baseline.model import learn
-from wetwell.detector.verdict.control_limits import RUNS, IndexLimits
+from wetwell.detector.verdict.control_limits import RUNS, ControlLimits
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +15,7 @@ def baseline(segments_of):
 
 
 def test_limits_are_the_papers_until_healthy_runs_say_more(baseline, segments_of):
-    limits = IndexLimits()
+    limits = ControlLimits()
     assert limits.limits() == (0.4, 0.6)
     rng = np.random.default_rng(1)
     for _ in range(RUNS):
@@ -26,7 +26,7 @@ def test_limits_are_the_papers_until_healthy_runs_say_more(baseline, segments_of
 
 
 def test_limits_follow_the_last_normal_runs_only(baseline, segments_of):
-    limits = IndexLimits()
+    limits = ControlLimits()
     for size in (0.1, 10.0):
         for _ in range(RUNS):
             limits.add(segments_of(baseline.offset_m + np.array([[size, 1.0]] * 4)), baseline)
@@ -37,6 +37,6 @@ def test_limits_follow_the_last_normal_runs_only(baseline, segments_of):
 def test_the_index_tells_a_pump_from_the_system(baseline, segments_of, shift, said):
     rng = np.random.default_rng(2)
     segments = baseline.offset_m + shift + rng.normal(0.0, 0.05, (10, 2))
-    figures = IndexLimits().figures(segments_of(segments), baseline, rng)
+    figures = ControlLimits().figures(segments_of(segments), baseline, rng)
     assert figures["says"] == said
     assert figures["interval"][0] <= figures["value"] <= figures["interval"][1]

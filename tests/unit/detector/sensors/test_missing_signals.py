@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from wetwell.detector.stream.gate import Frame, PumpFrame
-from wetwell.detector.stream.missing_signals import REFERENCE_SEGMENTS, BlindWatch, gather, new_blinds
-from wetwell.detector.stream.run_state import PUMP
+from wetwell.detector.sensors.missing_signals import REFERENCE_SEGMENTS, MissingSignals
+from wetwell.detector.stream.missing_signals import gather_segments, new_missing_signals
+from wetwell.detector.stream.run_state import PUMP_STATE
 from wetwell.protocols.timestamps import NS_PER_S
 
 NAN = math.nan
@@ -15,17 +15,21 @@ WARM_UP_S = 30
 LEARNT_S = WARM_UP_S + 25 * REFERENCE_SEGMENTS
 
 
+def frame_of(*pumps):
+    """Values of a sample without level and inflow."""
+    return np.array([NAN, NAN, *(value for pump in pumps for value in pump)])
+
+
 def told(flows_m3h, *, running=None, period_s=1):
     """(second, evidence) of each change, for one flow a sample; `running` is the number of pumps on."""
-    watch, blinds, pumps, changes = BlindWatch(), new_blinds(2), np.zeros(2, dtype=PUMP), []
+    watch, gathered, pumps, changes = MissingSignals(), new_missing_signals(2), np.zeros(2, dtype=PUMP_STATE), []
     pumps["is_learning"] = 1
     for number, flow_m3h in enumerate(flows_m3h):
         on = 1 if running is None else running[number]
         pumps["is_running"] = (1, on == 2)
-        readings = tuple(PumpFrame(NAN, flow_m3h, NAN, NAN, is_on) for is_on in (True, on == 2))
-        frame = Frame(number * period_s * NS_PER_S, float(period_s), NAN, NAN, readings)
-        gather(blinds, frame.time_ns, frame.gap_s, np.array(frame.values()), pumps)
-        if blinds["is_full"][0] and watch.take(blinds[0]):
+        frame = frame_of((NAN, flow_m3h, NAN, NAN, 1.0), (NAN, flow_m3h, NAN, NAN, float(on == 2)))
+        gather_segments(gathered, number * period_s * NS_PER_S, float(period_s), frame, pumps)
+        if gathered["is_full"][0] and watch.update(gathered[0]):
             changes.append((number * period_s, watch.evidence(on)))
     return changes, watch
 
@@ -81,22 +85,25 @@ def test_a_slow_feed_is_watched_too(period_s):
 
 @pytest.mark.parametrize("name", ["is_running", "is_learning"])
 def test_a_pump_that_stands_or_that_can_be_judged_is_left_alone(name):
-    blinds, pumps = new_blinds(1), np.ones(1, dtype=PUMP)
+    gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     pumps[name] = 0
-    values = np.array(Frame(0, 1.0, NAN, NAN, (PumpFrame(NAN, 100.0, NAN, NAN, True),)).values())
-    assert not any(gather(blinds, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
+    values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
+    assert not any(gather_segments(gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
 
 
 def test_a_pump_that_shows_everything_is_left_alone():
-    blinds, pumps = new_blinds(1), np.ones(1, dtype=PUMP)
-    values = np.array(Frame(0, 1.0, NAN, NAN, (PumpFrame(50.0, 100.0, 26.0, NAN, True),)).values())
-    assert not any(gather(blinds, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
+    gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
+    values = frame_of((50.0, 100.0, 26.0, NAN, 1.0))
+    assert not any(gather_segments(gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
 
 
 def test_a_clock_that_is_set_begins_a_segment_anew():
-    blinds, pumps = new_blinds(1), np.ones(1, dtype=PUMP)
-    values = np.array(Frame(0, 1.0, NAN, NAN, (PumpFrame(NAN, 100.0, NAN, NAN, True),)).values())
-    begun = [gather(blinds, (10_000 + second) * NS_PER_S, 1.0, values, pumps) for second in range(50)]
-    set_back = [gather(blinds, second * NS_PER_S, 1.0 if second else math.inf, values, pumps) for second in range(55)]
+    gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
+    values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
+    begun = [gather_segments(gathered, (10_000 + second) * NS_PER_S, 1.0, values, pumps) for second in range(50)]
+    set_back = [
+        gather_segments(gathered, second * NS_PER_S, 1.0 if second else math.inf, values, pumps)
+        for second in range(55)
+    ]
     assert sum(begun) == 0
     assert np.flatnonzero(set_back).tolist() == [54], "30 s to settle, then 25 samples"
