@@ -2,10 +2,10 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.alarm import Alarm, RuleName
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.delay import Delay
-from wetwell.services.alarms.rules import Rule, RuleName, alarm_id
+from wetwell.services.alarms.rules import Rule, alarm_id
 from wetwell.services.alarms.status import AlarmStatus, with_condition
 
 CHANGES = 100

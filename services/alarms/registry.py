@@ -5,10 +5,10 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
+from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, RuleName
 from wetwell.services.alarms.rates import AlarmRates
 from wetwell.services.alarms.record import AlarmRecord
-from wetwell.services.alarms.rules import RULES, Rule, RuleName, alarm_id, parse_alarm_id
+from wetwell.services.alarms.rules import RULES, Rule, alarm_id, parse_alarm_id
 from wetwell.services.alarms.status import ActRefusedError, AlarmStatus, back, is_shelf_over, with_act
 
 ANSWERS = 200

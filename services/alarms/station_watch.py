@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.messages.alarm import RuleName
 from wetwell.protocols.messages.messages import Sample, Status, Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.registry import AlarmRegistry
-from wetwell.services.alarms.rules import VERDICT_RULES, RuleName, verdict_advice, verdict_text
+from wetwell.services.alarms.rules import VERDICT_RULES, verdict_advice, verdict_text
 
 KNOWN_VERDICTS = 200
 """Times of verdicts of a pump that are remembered, more than a publisher keeps for late joiners."""

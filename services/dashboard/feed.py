@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 FRAME_S = 0.25
 FRAMES_A_SECOND = 4
-VERDICT_HISTORY = 60
+SHOWN_VERDICTS = 60
 FIRST_S = 2.0
 
 T = TypeVar("T")
@@ -48,7 +48,7 @@ class Feed:
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
             (bus.subscribe(sample_key("*"), capacity=100_000, recover=False), view.take_sample),
             (bus.subscribe(sample_block_key("*"), capacity=100_000, recover=False), view.take_sample_block),
-            (bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY), view.take_verdict),
+            (bus.subscribe(verdict_key("*"), history=SHOWN_VERDICTS), view.take_verdict),
             (bus.subscribe(model_key("*"), history=1), view.take_model),
             (bus.subscribe(alarm_key("*"), history=1), view.take_alarm),
             (bus.subscribe(status_key("*", "*"), history=1), view.take_status),

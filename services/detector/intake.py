@@ -23,7 +23,7 @@ KEPT_S = 2.0
 """Time in which what publishers keep comes, even if some of it is lost on the way once."""
 CATCH_UPS = 8
 """Stations that ask the historian at the same time."""
-SLICE = 500
+SAMPLES_AT_ONCE = 500
 """Samples that are judged before the other tasks have their turn."""
 
 
@@ -96,7 +96,7 @@ class Intake:
                     self._behind[judge].extend(payloads, kind)
                     continue
                 judged += judge.take_payloads(payloads, kind)
-                if judged >= SLICE:
+                if judged >= SAMPLES_AT_ONCE:
                     judged = 0
                     await asyncio.sleep(0)
 
@@ -134,7 +134,7 @@ async def _take(judge: StationDetector, waiting: Waiting, place: int) -> None:
         judge.take_samples(samples[place:])
         place = max(place - len(samples), 0)
         judged += len(samples)
-        if judged >= SLICE and waiting.messages:
+        if judged >= SAMPLES_AT_ONCE and waiting.messages:
             judged = 0
             await asyncio.sleep(0)
 

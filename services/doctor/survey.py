@@ -27,7 +27,7 @@ from wetwell.services.runtime.clock import now_ns
 
 T = TypeVar("T")
 
-ANSWER_S = 3.0
+SURVEY_ANSWER_S = 3.0
 HOUR_NS = 3600 * NS_PER_S
 
 
@@ -90,7 +90,7 @@ async def listen(bus: Bus, seconds: float) -> Survey:
         asyncio.create_task(_each(bus.watch(alive_key("*", "*")), take_presence)),
     ]
     asked_ns = now_ns()
-    asking = asyncio.create_task(bus.ask(sample_block_key("*"), timeout_s=ANSWER_S))
+    asking = asyncio.create_task(bus.ask(sample_block_key("*"), timeout_s=SURVEY_ANSWER_S))
     await asyncio.sleep(seconds)
     for task in tasks:
         task.cancel()
@@ -102,12 +102,12 @@ async def listen(bus: Bus, seconds: float) -> Survey:
 
 
 async def _ask(bus: Bus, survey: Survey) -> None:
-    survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=ANSWER_S))
+    survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=SURVEY_ANSWER_S))
     for station in sorted(survey.stations):
         last = survey.last_sample(station)
         last_ns = now_ns() if last is None else last.time
         query = HistoryQuery(kind="samples", start=last_ns - HOUR_NS, end=last_ns, points=10)
-        history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S))
+        history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=SURVEY_ANSWER_S))
         if history is not None:
             survey.histories[station] = history
 

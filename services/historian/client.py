@@ -10,7 +10,7 @@ from wetwell.protocols.timestamps import NS_PER_S, from_iso
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.settings import Settings
 
-ANSWER_S = 20.0
+HISTORY_ANSWER_S = 20.0
 
 
 async def ask_history(
@@ -28,12 +28,12 @@ async def ask_history(
     Raises
     ------
     LinkError
-        If none answers within `ANSWER_S`.
+        If none answers within `HISTORY_ANSWER_S`.
     ConfigError
         If it answers with an error.
     """
     try:
-        async with asyncio.timeout(ANSWER_S):
+        async with asyncio.timeout(HISTORY_ANSWER_S):
             with await connect(settings) as bus:
                 start_ns, end_ns = span
                 if last_s is not None:
@@ -42,7 +42,9 @@ async def ask_history(
                 query = HistoryQuery(kind=kind, start=start_ns, end=end_ns, points=points, raw=raw)
                 return await asked(bus, station, query)
     except TimeoutError as error:
-        raise LinkError(f"no historian answered on {settings.zenoh.endpoint} within {ANSWER_S:g} s") from error
+        raise LinkError(
+            f"no historian answered on {settings.zenoh.endpoint} within {HISTORY_ANSWER_S:g} s"
+        ) from error
 
 
 async def asked(bus: Bus, station: str, query: HistoryQuery) -> History:
@@ -54,7 +56,7 @@ async def asked(bus: Bus, station: str, query: HistoryQuery) -> History:
         If it answers with an error.
     """
     while True:
-        answers = await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S)
+        answers = await bus.ask(history_key(station), query.encode(), timeout_s=HISTORY_ANSWER_S)
         if answers:
             history = History.decode(answers[0])
             if history.error:

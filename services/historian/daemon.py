@@ -21,7 +21,7 @@ ALARM_HISTORY = 1
 CAPACITY = 1_000_000
 """Most messages of one kind that wait to be taken: after a start a thousand publishers send what they hold."""
 
-SLICE = 1_000
+PAYLOADS_AT_ONCE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
 
 
@@ -78,7 +78,7 @@ async def _take(historian: Historian, kind: PayloadKind, subscription: Subscript
     while True:
         for number, payload in enumerate(await subscription.receive(), start=1):
             historian.take(kind, payload)
-            if number % SLICE == 0:
+            if number % PAYLOADS_AT_ONCE == 0:
                 await asyncio.sleep(0)
 
 
