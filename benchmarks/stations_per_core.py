@@ -96,7 +96,7 @@ def detector(folder: Path, load: list[Played], gather: int) -> float:
         def judge() -> None:
             for number in range(len(messages[0])):
                 for one, payloads in zip(judges, messages, strict=True):
-                    one.take_payloads([payloads[number]], kind)
+                    one.handle_payloads([payloads[number]], kind)
 
         cpu_s = spent(judge)
     return 1e6 * cpu_s / (STATIONS * SECONDS)
@@ -119,7 +119,7 @@ def historian(folder: Path, load: list[Played], gather: int) -> float:
 
         def keep(payloads: list[bytes] = payloads) -> None:
             for payload in payloads:
-                keeper.take("samples" if gather == 1 else "blocks", payload)
+                keeper.handle("samples" if gather == 1 else "blocks", payload)
             keeper.commit(0)
 
         cpu_s += spent(keep)

@@ -19,7 +19,7 @@ class ModelPublisher:
         self._told: dict[int, Verdict] = {}
         self._publish(now_ns())
 
-    def take(self, verdict: Verdict) -> None:
+    def update(self, verdict: Verdict) -> None:
         """Publish what this verdict changes, if anything."""
         if "shift_m" in verdict.evidence:
             self._told[verdict.pump] = verdict

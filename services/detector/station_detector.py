@@ -77,7 +77,7 @@ class StationDetector:
             for verdict in told.verdicts:
                 self._publish(verdict)
 
-    def take_payloads(self, payloads: Iterable[bytes], kind: type[SampleMessage] = Sample) -> int:
+    def handle_payloads(self, payloads: Iterable[bytes], kind: type[SampleMessage] = Sample) -> int:
         """Judge what has come from the bus; how many samples. What is not of its kind is counted and left out."""
         samples = 0
         self._quarantine.enter(self.station)
@@ -92,14 +92,14 @@ class StationDetector:
         self._quarantine.leave()
         return samples
 
-    async def take(self, samples: Iterable[Sample]) -> None:
+    async def judge_in_turns(self, samples: Iterable[Sample]) -> None:
         """Judge samples that come another way, such as from the historian."""
         left = iter(samples)
         while batch := list(islice(left, 100)):
-            self.take_samples(batch)
+            self.judge(batch)
             await asyncio.sleep(0)
 
-    def take_samples(self, samples: Iterable[Sample]) -> None:
+    def judge(self, samples: Iterable[Sample]) -> None:
         """Judge samples."""
         self._quarantine.enter(self.station)
         for sample in samples:
@@ -167,7 +167,7 @@ class StationDetector:
         for verdict in verdicts:
             self._publish(verdict)
 
-    def take_order(self, payload: bytes) -> None:
+    def handle_order(self, payload: bytes) -> None:
         """Carry out an order, once; one that is none is counted and left out."""
         try:
             order = Order.decode(payload)
@@ -195,7 +195,7 @@ class StationDetector:
     def _publish(self, verdict: Verdict) -> None:
         self._counts["verdicts"] += 1
         self._publishers[verdict.pump - 1].put(verdict.encode())
-        self._model.take(verdict)
+        self._model.update(verdict)
         last = self._last.get(verdict.pump)
         if last is None or last.state != verdict.state:
             log.info("station '%s' pump %d: %s", self.station, verdict.pump, verdict.state)

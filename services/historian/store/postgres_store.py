@@ -149,7 +149,7 @@ class PostgresStore:
                 day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
             parts.append(day.over(start_ns, span_ns))
         minutes = self._minutes(station, start_ns, end_ns)
-        parts.append(minutes.take(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
+        parts.append(minutes.select(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
         return joined(parts).over(start_ns, span_ns)
 
     def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:

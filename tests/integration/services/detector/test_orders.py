@@ -83,7 +83,7 @@ def test_a_late_writer_does_not_put_an_older_state_over_a_newer_one(alpha, paylo
         checkpoint = Checkpoint(tmp_path, "alpha")
         judge = StationDetector(bus, alpha, checkpoint=checkpoint)
         older = checkpoint.encode(judge.detector, Told({}))
-        judge.take_payloads(payloads)
+        judge.handle_payloads(payloads)
         judge.keep()
         checkpoint.write(*older)
         assert StationDetector(bus, alpha, checkpoint=checkpoint).detector.snapshot() == judge.detector.snapshot()
@@ -100,7 +100,7 @@ def test_an_order_that_was_answered_is_known_after_a_kill(alpha, payloads, tmp_p
     async def orders_before_and_after_a_kill() -> tuple[Verdict, Verdict, int]:
         with MemoryBus() as bus:
             first = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
-            await first.take(Sample.decode(payload) for payload in payloads)
+            await first.judge_in_turns(Sample.decode(payload) for payload in payloads)
             obeying = asyncio.create_task(Intake(bus, [first]).run())
             answer = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()

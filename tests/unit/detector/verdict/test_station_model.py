@@ -77,9 +77,9 @@ def test_the_model_is_published_at_the_beginning_and_when_a_run_was_judged(
     first = bus.get(model_key("alpha"))
     assert json.loads(first)["pumps"][0]["learnt_pump"] is None
     verdicts = judge_after_learning(seconds=1_500)
-    publisher.take(verdicts[0].model_copy(update={"evidence": {"reason": "begins"}}))
+    publisher.update(verdicts[0].model_copy(update={"evidence": {"reason": "begins"}}))
     assert bus.get(model_key("alpha")) is first
     publisher = ModelPublisher(bus, alpha, learnt)
-    publisher.take(next(verdict for verdict in verdicts if "shift_m" in verdict.evidence))
+    publisher.update(next(verdict for verdict in verdicts if "shift_m" in verdict.evidence))
     pumps = json.loads(bus.get(model_key("alpha")))["pumps"]
     assert sum(pump["now_pump"] is not None for pump in pumps) == 1
