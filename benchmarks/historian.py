@@ -92,7 +92,7 @@ def site(store: FolderStore, minute: Recording, *, in_blocks: bool) -> dict[str,
     take_s, commit_s, walls_s = 0.0, 0.0, []
     written = written_bytes()
     for payloads in seconds:
-        take_s += spent(lambda payloads=payloads: [historian.take(kind, payload) for payload in payloads])[1]
+        take_s += spent(lambda payloads=payloads: [historian.handle(kind, payload) for payload in payloads])[1]
         wall_s, cpu_s = spent(lambda: historian.commit(0))
         commit_s += cpu_s
         walls_s.append(wall_s)

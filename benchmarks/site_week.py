@@ -43,7 +43,7 @@ class Week:
         files = [plant.station for plant in self._plants]
         bus, self._clock = MemoryBus(), Now(0, 0.0)
         self._historian = Historian(FolderStore(folder / "history"))
-        self._keeper = AlarmService(bus, AlarmSettings(state_dir=folder / "alarms"), files, lambda: self._clock)
+        self._service = AlarmService(bus, AlarmSettings(state_dir=folder / "alarms"), files, lambda: self._clock)
         self._judges = [
             StationDetector(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
         ]
@@ -57,10 +57,10 @@ class Week:
         """Memory of the process in MB and objects of Python, at the end of each hour."""
         tasks = [
             asyncio.create_task(self._intake.run()),
-            asyncio.create_task(self._feed(self._samples, self._take_sample)),
-            asyncio.create_task(self._feed(self._verdicts, self._take_verdict)),
+            asyncio.create_task(self._feed(self._samples, self._handle_sample)),
+            asyncio.create_task(self._feed(self._verdicts, self._handle_verdict)),
             asyncio.create_task(
-                self._feed(self._alarms, lambda payload: self._historian.take("alarms", payload)),
+                self._feed(self._alarms, lambda payload: self._historian.handle("alarms", payload)),
             ),
         ]
         hours = []
@@ -90,28 +90,28 @@ class Week:
                 or min(judge.figures().get("samples", 0.0) for judge in self._judges) < HOUR_S * hour + end
             ):
                 await asyncio.sleep(0)
-            self._keeper.look()
+            self._service.look()
             self._historian.commit(self._clock.wall_ns)
         while self._historian.maintain(self._clock.wall_ns):
             pass
         for judge in self._judges:
             judge.keep()
-        self._keeper.save()
+        self._service.save()
 
-    async def _feed(self, inbox: Subscription[bytes], take: Callable[[bytes], None]) -> None:
+    async def _feed(self, inbox: Subscription[bytes], handle: Callable[[bytes], None]) -> None:
         while True:
             for payload in await inbox.receive():
-                take(payload)
-            self._keeper.commit()
+                handle(payload)
+            self._service.commit()
 
-    def _take_sample(self, payload: bytes) -> None:
-        self._historian.take("samples", payload)
-        self._keeper.take_sample(payload)
+    def _handle_sample(self, payload: bytes) -> None:
+        self._historian.handle("samples", payload)
+        self._service.handle_sample(payload)
         self._kept += 1
 
-    def _take_verdict(self, payload: bytes) -> None:
-        self._historian.take("verdicts", payload)
-        self._keeper.take_verdict(payload)
+    def _handle_verdict(self, payload: bytes) -> None:
+        self._historian.handle("verdicts", payload)
+        self._service.handle_verdict(payload)
 
 
 def memory_mb() -> float:

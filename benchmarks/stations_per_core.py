@@ -119,7 +119,7 @@ def historian(folder: Path, load: list[Played], gather: int) -> float:
 
         def keep(payloads: list[bytes] = payloads) -> None:
             for payload in payloads:
-                keeper.take("samples" if gather == 1 else "blocks", payload)
+                keeper.handle("samples" if gather == 1 else "blocks", payload)
             keeper.commit(0)
 
         cpu_s += spent(keep)

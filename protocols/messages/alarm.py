@@ -23,6 +23,23 @@ Act = Literal["acknowledge", "shelve", "unshelve", "out_of_service", "in_service
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
+RuleName = Literal[
+    "pump_fault",
+    "system_fault",
+    "pump_and_system_fault",
+    "sensor_fault",
+    "level_high",
+    "overflow_risk",
+    "samples_stale",
+    "plc_stopped",
+    "plc_lost",
+    "detector_silent",
+    "gateway_silent",
+    "historian_silent",
+    "bus_lost",
+]
+"""Kinds of alarms."""
+
 
 class Alarm(Message):
     """An alarm after its last change. `id` names the condition, such as `pump2.pump_fault`, and stays the same."""

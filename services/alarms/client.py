@@ -1,6 +1,5 @@
 """Questions to the alarms daemon, over the bus like those of any other client."""
 
-import asyncio
 import uuid
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
@@ -9,9 +8,9 @@ from pydantic import ValidationError
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alarm_report_key
-from wetwell.protocols.errors import ConfigError, LinkError, first_fault
+from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmReport
-from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.client import ask_service, first_answer
 from wetwell.services.runtime.settings import Settings
 
 T = TypeVar("T")
@@ -29,12 +28,7 @@ async def ask_alarms(settings: Settings, question: Callable[[Bus], Awaitable[T]]
     LinkError
         If nobody answers within `ANSWER_S`.
     """
-    try:
-        async with asyncio.timeout(ANSWER_S):
-            with await connect(settings) as bus:
-                return await question(bus)
-    except TimeoutError as error:
-        raise LinkError(f"no alarms daemon answered on {settings.zenoh.endpoint} within {ANSWER_S:g} s") from error
+    return await ask_service(settings, question, "no alarms daemon", ANSWER_S)
 
 
 async def list_alarms(bus: Bus, station: str = "*") -> list[Alarm]:
@@ -48,18 +42,12 @@ async def list_alarms(bus: Bus, station: str = "*") -> list[Alarm]:
 
 async def report(bus: Bus) -> AlarmReport:
     """Rates, chattering and stale alarms of the site."""
-    while True:
-        for payload in await bus.ask(alarm_report_key(), timeout_s=TRY_S):
-            return AlarmReport.decode(payload)
-        await asyncio.sleep(0.1)
+    return AlarmReport.decode(await first_answer(bus, alarm_report_key(), timeout_s=TRY_S))
 
 
 async def send_act(bus: Bus, act: AlarmAct) -> AlarmAnswer:
     """Ask for an act until it is answered; by its id it is carried out once."""
-    while True:
-        for payload in await bus.ask(alarm_act_key(act.station), act.encode(), timeout_s=TRY_S):
-            return AlarmAnswer.decode(payload)
-        await asyncio.sleep(0.1)
+    return AlarmAnswer.decode(await first_answer(bus, alarm_act_key(act.station), act.encode(), timeout_s=TRY_S))
 
 
 def new_act(station: str, alarm: str, act: str, by: str, minutes: float | None, reason: str) -> AlarmAct:

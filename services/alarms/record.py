@@ -2,10 +2,10 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.alarm import Alarm, RuleName
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.delay import Delay
-from wetwell.services.alarms.rules import Rule, RuleName, alarm_id
+from wetwell.services.alarms.rules import Rule, alarm_id
 from wetwell.services.alarms.status import AlarmStatus, with_condition
 
 CHANGES = 100
@@ -14,14 +14,17 @@ HOUR_NS = 3600 * NS_PER_S
 
 
 class AlarmRecord(BaseModel):
-    """An alarm: how it stands, its delays, its words, and when its condition changed within the last hour."""
+    """An alarm: how it stands, its delays, its words, and when its condition changed within the last hour.
 
-    model_config = ConfigDict(extra="forbid")
+    On disk its status is called standing.
+    """
+
+    model_config = ConfigDict(extra="forbid", serialize_by_alias=True)
 
     station: str
     rule: RuleName
     pump: int | None = None
-    standing: AlarmStatus = AlarmStatus()
+    status: AlarmStatus = Field(default=AlarmStatus(), alias="standing")
     delay: Delay = Field(default_factory=Delay)
     text: str = ""
     advice: str = ""
@@ -36,10 +39,10 @@ class AlarmRecord(BaseModel):
     def observe(self, wanted: bool, time_ns: int, rule: Rule) -> bool:
         """Take a look at the condition; whether the alarm has changed by it."""
         is_active = self.delay.update(wanted, time_ns, rule.on_delay_s, rule.off_delay_s)
-        before = self.standing
+        before = self.status
         if is_active == before.is_active:
             return False
-        self.standing = with_condition(before, is_active=is_active, time_ns=time_ns)
+        self.status = with_condition(before, is_active=is_active, time_ns=time_ns)
         self.changes_ns = [*(at for at in self.changes_ns if 0 <= time_ns - at < HOUR_NS), time_ns][-CHANGES:]
         self.touch(time_ns)
         return True
@@ -54,21 +57,21 @@ class AlarmRecord(BaseModel):
 
     def message(self, rule: Rule) -> Alarm:
         """The alarm as others see it."""
-        standing = self.standing
+        status = self.status
         return Alarm(
             id=self.id,
             time=self.time_ns,
             station=self.station,
             pump=self.pump,
             priority=rule.priority,
-            state=standing.state,
-            is_active=standing.is_active,
+            state=status.state,
+            is_active=status.is_active,
             text=self.text or rule.text,
             advice=self.advice or rule.advice,
-            raised=standing.raised_ns,
-            returned=standing.returned_ns,
-            acknowledged=standing.acknowledged_ns,
-            by=standing.by,
-            until=standing.until_ns,
-            reason=standing.reason,
+            raised=status.raised_ns,
+            returned=status.returned_ns,
+            acknowledged=status.acknowledged_ns,
+            by=status.by,
+            until=status.until_ns,
+            reason=status.reason,
         )

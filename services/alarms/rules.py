@@ -2,26 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
-from wetwell.protocols.messages.alarm import Priority
+from wetwell.protocols.messages.alarm import Priority, RuleName
 from wetwell.protocols.messages.messages import Verdict
-
-RuleName = Literal[
-    "pump_fault",
-    "system_fault",
-    "pump_and_system_fault",
-    "sensor_fault",
-    "level_high",
-    "overflow_risk",
-    "samples_stale",
-    "plc_stopped",
-    "plc_lost",
-    "detector_silent",
-    "gateway_silent",
-    "historian_silent",
-    "bus_lost",
-]
 
 
 @dataclass(frozen=True)

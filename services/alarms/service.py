@@ -50,30 +50,30 @@ class AlarmService:
         self._file = StateFile(settings.state_dir)
         self._limits = {station.name: limits_of(settings, station) for station in stations}
         rules = {name: change.model_dump(exclude_none=True) for name, change in settings.rules.items()}
-        self.book = AlarmRegistry(changed_rules(rules))
+        self.registry = AlarmRegistry(changed_rules(rules))
         self.stations: dict[str, StationWatch] = {}
         self._restore(self._file.load() or SiteState())
         for station in stations:
             self._watch(station.name).has_samples = True  # it is missed from the beginning
         self._watch(SITE)
 
-    def take_sample(self, payload: bytes) -> None:
+    def handle_sample(self, payload: bytes) -> None:
         """Look at a sample."""
-        self._take_samples(self._decoded(Sample, payload))
+        self._handle_samples(self._decoded(Sample, payload))
 
-    def take_sample_block(self, payload: bytes) -> None:
+    def handle_sample_block(self, payload: bytes) -> None:
         """Look at many samples of a station."""
-        self._take_samples(self._decoded(SampleBlock, payload))
+        self._handle_samples(self._decoded(SampleBlock, payload))
 
-    def _take_samples(self, message: SampleMessage | None) -> None:
+    def _handle_samples(self, message: SampleMessage | None) -> None:
         if message is None or (watch := self._named(message.station)) is None:
             return
         limits = self._limits.get(message.station) or limits_of(self._settings, None)
         for sample in samples_of(message):
-            is_new = watch.take_sample(sample, self._now(), self.book, limits)
+            is_new = watch.handle_sample(sample, self._now(), self.registry, limits)
             self._counts["samples" if is_new else "doubled"] += 1
 
-    def take_verdict(self, payload: bytes) -> None:
+    def handle_verdict(self, payload: bytes) -> None:
         """Look at a verdict."""
         verdict = self._decoded(Verdict, payload)
         if verdict is None or (watch := self._named(verdict.station)) is None:
@@ -81,23 +81,23 @@ class AlarmService:
         if verdict.pump > MAX_PUMPS:
             self._counts["foreign"] += 1
             return
-        is_new = watch.take_verdict(verdict, self._now(), self.book)
+        is_new = watch.handle_verdict(verdict, self._now(), self.registry)
         self._counts["verdicts" if is_new else "doubled"] += 1
 
-    def take_status(self, payload: bytes) -> None:
+    def handle_status(self, payload: bytes) -> None:
         """Look at the health figures of a gateway."""
         status = self._decoded(Status, payload)
         if status is not None and status.service == "gateway" and (watch := self._named(status.station)) is not None:
-            watch.take_status(status, self._now(), self.book, self._settings.heartbeat_after_s)
+            watch.handle_status(status, self._now(), self.registry, self._settings.heartbeat_after_s)
 
-    def take_presence(self, presence: Presence) -> None:
+    def handle_presence(self, presence: Presence) -> None:
         """Note that a service has come or gone."""
         _, station, _, service = presence.key.split("/", 3)
         watch = self.stations[SITE] if station == SITE else self._named(station)
         if watch is not None:
-            watch.take_presence(service, is_alive=presence.is_alive, now=self._now())
+            watch.handle_presence(service, is_alive=presence.is_alive, now=self._now())
 
-    def take_act(self, request: Request) -> None:
+    def handle_act(self, request: Request) -> None:
         """Carry out an act of an operator and answer it."""
         try:
             act = AlarmAct.decode(request.payload)
@@ -115,56 +115,56 @@ class AlarmService:
 
     def carry_out(self, act: AlarmAct) -> AlarmAnswer:
         """Carry out an act, once for each `id`, after it was written into the audit."""
-        earlier = self.book.answered(act)
+        earlier = self.registry.answered(act)
         if earlier is not None:
             return earlier
         now = self._now()
         if act.station not in self.stations:
             return AlarmAnswer(id=act.id, is_done=False, reason=f"station '{act.station}' is not known")
         try:
-            entry, after = self.book.after(act, now.wall_ns)
+            record, after = self.registry.after(act, now.wall_ns)
         except ActRefusedError as error:
             self._write_down(now, act, refused=str(error))
-            return self.book.remember(AlarmAnswer(id=act.id, is_done=False, reason=str(error)))
-        if not self._write_down(now, act, before=entry.standing.state, after=after.state):
+            return self.registry.remember(AlarmAnswer(id=act.id, is_done=False, reason=str(error)))
+        if not self._write_down(now, act, before=record.status.state, after=after.state):
             return AlarmAnswer(id=act.id, is_done=False, reason="the audit cannot be written, so nothing was done")
         self._counts["acts"] += 1
         time_ns = self._clock_ns(act.station, now)
-        return self.book.carry_out(act, entry, after, time_ns, now.wall_ns)
+        return self.registry.carry_out(act, record, after, time_ns, now.wall_ns)
 
     def look(self) -> None:
         """Once a second: what does not come any more, shelves that end, floods."""
         now, settings = self._now(), self._settings
-        for entry, standing in self.book.shelves_over(now.wall_ns):
-            self._take_back(entry, standing, now)
+        for record, status in self.registry.ended_shelves(now.wall_ns):
+            self._unshelve(record, status, now)
         if self._bus.is_connected:
             if self._lost_s is not None:
                 self._lost_s = None
                 for watch in self.stations.values():
                     watch.begin_again(now)
             for watch in self.stations.values():
-                watch.look(now, self.book, settings.stale_after_s, settings.silent_after_s)
+                watch.look(now, self.registry, settings.stale_after_s, settings.silent_after_s)
         elif self._lost_s is None:
             self._lost_s = now.steady_s
         is_lost = self._lost_s is not None and now.steady_s - self._lost_s > settings.silent_after_s
-        self.book.observe(SITE, "bus_lost", is_lost, now.wall_ns, now.wall_ns)
-        if self.book.rates.look(now.wall_ns):
-            log.warning("alarm flood has %s", "begun" if self.book.rates.is_flood else "ended")
+        self.registry.observe(SITE, "bus_lost", is_lost, now.wall_ns, now.wall_ns)
+        if self.registry.rates.look(now.wall_ns):
+            log.warning("alarm flood has %s", "begun" if self.registry.rates.is_flood else "ended")
         self.commit()
 
     def commit(self) -> None:
         """Keep what has changed, then publish it."""
-        if not self.book.changed:
+        if not self.registry.changed:
             return
         self.save()
-        changed, self.book.changed = self.book.changed, []
+        changed, self.registry.changed = self.registry.changed, []
         for alarm in changed:
             log.info("station '%s': alarm %s is %s: %s", alarm.station, alarm.id, alarm.state, alarm.text)
             self._publish(alarm)
 
     def publish_all(self) -> None:
         """Publish every alarm as it stands, after a restart."""
-        for alarm in self.book.alarms():
+        for alarm in self.registry.alarms():
             self._publish(alarm)
 
     def save(self) -> None:
@@ -180,7 +180,7 @@ class AlarmService:
             )
             for name, watch in self.stations.items()
         }
-        self._file.save(SiteState(book=self.book.state(), stations=stations))
+        self._file.save(SiteState(book=self.registry.state(), stations=stations))
 
     def report(self) -> AlarmReport:
         """Rates, chattering and stale alarms."""
@@ -189,15 +189,15 @@ class AlarmService:
         transitions = self._settings.chattering_transitions
         return AlarmReport(
             time=now.wall_ns,
-            rates=self.book.rates.figures(now.wall_ns),
+            rates=self.registry.rates.figures(now.wall_ns),
             standing=dict(self._standing()),
             chattering=tuple(
-                AlarmFigure(station=entry.station, alarm=entry.id, transitions=count)
-                for entry, count in self.book.chattering(clocks_ns, transitions)
+                AlarmFigure(station=record.station, alarm=record.id, transitions=count)
+                for record, count in self.registry.chattering(clocks_ns, transitions)
             ),
             stale=tuple(
-                AlarmFigure(station=entry.station, alarm=entry.id, raised=entry.standing.raised_ns)
-                for entry in self.book.stale(clocks_ns)
+                AlarmFigure(station=record.station, alarm=record.id, raised=record.status.raised_ns)
+                for record in self.registry.stale(clocks_ns)
             ),
         )
 
@@ -207,7 +207,7 @@ class AlarmService:
         return {name: float(count) for name, count in self._counts.items()} | {
             **report.rates,
             "stations": float(len(self.stations) - 1),
-            "standing": float(sum(entry.standing.is_active for entry in self.book.entries.values())),
+            "standing": float(sum(record.status.is_active for record in self.registry.records.values())),
             "unacknowledged": float(report.standing.get("unacknowledged", 0) + report.standing.get("returned", 0)),
             "chattering": float(len(report.chattering)),
             "stale": float(len(report.stale)),
@@ -215,7 +215,7 @@ class AlarmService:
         }
 
     def _standing(self) -> Counter[AlarmState]:
-        return Counter(entry.standing.state for entry in self.book.entries.values())
+        return Counter(record.status.state for record in self.registry.records.values())
 
     def _publish(self, alarm: Alarm) -> None:
         name = (alarm.station, alarm.id)
@@ -223,13 +223,13 @@ class AlarmService:
             self._publishers[name] = self._bus.publisher(alarm_key(*name))
         self._publishers[name].put(alarm.encode())
 
-    def _take_back(self, entry: AlarmRecord, standing: AlarmStatus, now: Now) -> None:
-        act = {"station": entry.station, "alarm": entry.id, "act": "unshelve", "by": SHELF}
+    def _unshelve(self, record: AlarmRecord, status: AlarmStatus, now: Now) -> None:
+        act = {"station": record.station, "alarm": record.id, "act": "unshelve", "by": SHELF}
         try:
-            self._audit.write(now.wall_ns, **act, before=entry.standing.state, after=standing.state)
+            self._audit.write(now.wall_ns, **act, before=record.status.state, after=status.state)
         except RecordingError as error:  # the operator is called all the same
             log.warning("%s", error)
-        self.book.take_back(entry, standing, self._clock_ns(entry.station, now), now.wall_ns)
+        self.registry.unshelve(record, status, self._clock_ns(record.station, now), now.wall_ns)
 
     def _write_down(self, now: Now, act: AlarmAct, **outcome: str) -> bool:
         """Whether the act is in the audit."""
@@ -259,7 +259,7 @@ class AlarmService:
 
     def _restore(self, state: SiteState) -> None:
         now_s = self._now().steady_s
-        self.book.restore(state.book)
+        self.registry.restore(state.registry)
         for name, kept in state.stations.items():
             watch = self._watch(name)
             watch.time_ns, watch.seq = kept.time_ns, kept.seq

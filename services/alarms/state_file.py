@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError, first_fault
-from wetwell.services.alarms.registry import BookState
+from wetwell.services.alarms.registry import RegistryState
 from wetwell.services.runtime.state_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)
@@ -26,12 +26,12 @@ class StationState(BaseModel):
 
 
 class SiteState(BaseModel):
-    """All that is kept over a restart."""
+    """All that is kept over a restart; on disk the registry is called a book."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", serialize_by_alias=True)
 
     version: Literal["wetwell.alarm-state/1"] = "wetwell.alarm-state/1"
-    book: BookState = Field(default_factory=BookState)
+    registry: RegistryState = Field(default_factory=RegistryState, alias="book")
     stations: dict[str, StationState] = Field(default_factory=dict)
 
 

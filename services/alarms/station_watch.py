@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
+from wetwell.protocols.messages.alarm import RuleName
 from wetwell.protocols.messages.messages import Sample, Status, Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.registry import AlarmRegistry
-from wetwell.services.alarms.rules import VERDICT_RULES, RuleName, verdict_advice, verdict_text
+from wetwell.services.alarms.rules import VERDICT_RULES, verdict_advice, verdict_text
 
 KNOWN_VERDICTS = 200
 """Times of verdicts of a pump that are remembered, more than a publisher keeps for late joiners."""
@@ -90,7 +91,7 @@ class StationWatch:
             return now.wall_ns
         return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
 
-    def take_sample(self, sample: Sample, now: Now, book: AlarmRegistry, limits: Limits) -> bool:
+    def handle_sample(self, sample: Sample, now: Now, registry: AlarmRegistry, limits: Limits) -> bool:
         """Look at a sample; whether it was new."""
         if self.time_ns is not None and sample.time <= self.time_ns and sample.seq <= self.seq:
             self.older += 1
@@ -101,21 +102,27 @@ class StationWatch:
         self.has_samples = True
         level_m = sample.level_m
         if level_m is not None and math.isfinite(level_m) and sample.quality != "bad":
-            self._look_at_level("level_high", level_m, limits.high_m, limits.deadband_m, now, book)
-            self._look_at_level("overflow_risk", level_m, limits.overflow_m, limits.deadband_m, now, book)
-        book.carry_on(self.name, sample.time, now.wall_ns)
+            self._look_at_level("level_high", level_m, limits.high_m, limits.deadband_m, now, registry)
+            self._look_at_level("overflow_risk", level_m, limits.overflow_m, limits.deadband_m, now, registry)
+        registry.carry_on(self.name, sample.time, now.wall_ns)
         return True
 
     def _look_at_level(
-        self, rule: RuleName, level_m: float, limit_m: float | None, deadband_m: float, now: Now, book: AlarmRegistry
+        self,
+        rule: RuleName,
+        level_m: float,
+        limit_m: float | None,
+        deadband_m: float,
+        now: Now,
+        registry: AlarmRegistry,
     ) -> None:
         if limit_m is None or self.time_ns is None:
             return
-        least_m = limit_m - deadband_m if book.is_wanted(self.name, rule) else limit_m
-        text = f"{book.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m"
-        book.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
+        least_m = limit_m - deadband_m if registry.is_wanted(self.name, rule) else limit_m
+        text = f"{registry.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m"
+        registry.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
 
-    def take_verdict(self, verdict: Verdict, now: Now, book: AlarmRegistry) -> bool:
+    def handle_verdict(self, verdict: Verdict, now: Now, registry: AlarmRegistry) -> bool:
         """Look at a verdict; whether it was new. "unknown" leaves the alarms of the pump as they are."""
         is_start = now.steady_s - self.start_s < START_S
         if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time, is_start=is_start):
@@ -124,7 +131,7 @@ class StationWatch:
             return True
         for rule in VERDICT_RULES:
             is_there = verdict.state == rule
-            book.observe(
+            registry.observe(
                 self.name,
                 rule,
                 is_there,
@@ -132,7 +139,7 @@ class StationWatch:
                 now.wall_ns,
                 pump=verdict.pump,
                 text=verdict_text(verdict) if is_there else "",
-                advice=verdict_advice(verdict, book.rules[rule]) if is_there else "",
+                advice=verdict_advice(verdict, registry.rules[rule]) if is_there else "",
             )
         return True
 
@@ -141,31 +148,31 @@ class StationWatch:
         """Services whose absence is an alarm here, and which."""
         return SITE_SERVICES if self.name == SITE else STATION_SERVICES
 
-    def take_status(self, status: Status, now: Now, book: AlarmRegistry, heartbeat_after_s: float) -> None:
+    def handle_status(self, status: Status, now: Now, registry: AlarmRegistry, heartbeat_after_s: float) -> None:
         """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs."""
         time_ns, age_s = self.clock_ns(now), status.figures.get("heartbeat_age_s")
-        book.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
+        registry.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
         if age_s is not None and status.state == "running":
             text = f"heartbeat of the PLC stands still for {age_s:.0f} s"
-            book.observe(self.name, "plc_stopped", age_s >= heartbeat_after_s, time_ns, now.wall_ns, text=text)
+            registry.observe(self.name, "plc_stopped", age_s >= heartbeat_after_s, time_ns, now.wall_ns, text=text)
 
-    def take_presence(self, service: str, *, is_alive: bool, now: Now) -> None:
+    def handle_presence(self, service: str, *, is_alive: bool, now: Now) -> None:
         """Note that a service has come or gone."""
         if service in self.services:
             gone_s = self.gone_s.get(service)
             self.gone_s[service] = None if is_alive else now.steady_s if gone_s is None else gone_s
 
-    def look(self, now: Now, book: AlarmRegistry, stale_after_s: float, silent_after_s: float) -> None:
+    def look(self, now: Now, registry: AlarmRegistry, stale_after_s: float, silent_after_s: float) -> None:
         """Look for what does not come any more."""
         time_ns = self.clock_ns(now)
         if self.has_samples:
             self.gone_s.setdefault("detector", now.steady_s)
             age_s = now.steady_s - self.missed_s
             text = f"no samples for {age_s:.0f} s"
-            book.observe(self.name, "samples_stale", age_s > stale_after_s, time_ns, now.wall_ns, text=text)
+            registry.observe(self.name, "samples_stale", age_s > stale_after_s, time_ns, now.wall_ns, text=text)
         for service, gone_s in self.gone_s.items():
             is_silent = gone_s is not None and now.steady_s - gone_s > silent_after_s
-            book.observe(self.name, self.services[service], is_silent, time_ns, now.wall_ns)
+            registry.observe(self.name, self.services[service], is_silent, time_ns, now.wall_ns)
 
     def begin_again(self, now: Now) -> None:
         """Count silence from now on: until now it was that of the bus."""

@@ -1,4 +1,4 @@
-"""How an alarm stands: the states of ISA-18.2 and the ways between them. Pure; the clock is an argument."""
+"""The status of an alarm: the states of ISA-18.2 and the ways between them. Pure; the clock is an argument."""
 
 from dataclasses import dataclass, replace
 
@@ -31,50 +31,50 @@ class AlarmStatus:
     reason: str = ""
 
 
-def with_condition(standing: AlarmStatus, *, is_active: bool, time_ns: int) -> AlarmStatus:
-    """Standing after the condition has come or gone; the same if it has not changed."""
-    if is_active == standing.is_active:
-        return standing
-    if standing.state in SUPPRESSED:
+def with_condition(status: AlarmStatus, *, is_active: bool, time_ns: int) -> AlarmStatus:
+    """Status after the condition has come or gone; the same if it has not changed."""
+    if is_active == status.is_active:
+        return status
+    if status.state in SUPPRESSED:
         changed = {"raised_ns": time_ns, "returned_ns": None} if is_active else {"returned_ns": time_ns}
-        return replace(standing, is_active=is_active, **changed)
+        return replace(status, is_active=is_active, **changed)
     if is_active:
         return AlarmStatus("unacknowledged", is_active=True, raised_ns=time_ns)
-    state: AlarmState = "returned" if standing.state == "unacknowledged" else "normal"
-    return replace(standing, state=state, is_active=False, returned_ns=time_ns)
+    state: AlarmState = "returned" if status.state == "unacknowledged" else "normal"
+    return replace(status, state=state, is_active=False, returned_ns=time_ns)
 
 
-def with_act(standing: AlarmStatus, act: AlarmAct, now_ns: int) -> AlarmStatus:
-    """Standing after an act of an operator at this time of day.
+def with_act(status: AlarmStatus, act: AlarmAct, now_ns: int) -> AlarmStatus:
+    """Status after an act of an operator at this time of day.
 
     Raises
     ------
     ActRefusedError
         If the state does not allow it.
     """
-    state = standing.state
+    state = status.state
     match act.act:
         case "acknowledge" if state in ("unacknowledged", "returned"):
             after: AlarmState = "acknowledged" if state == "unacknowledged" else "normal"
-            return replace(standing, state=after, acknowledged_ns=now_ns, by=act.by, reason=act.reason)
+            return replace(status, state=after, acknowledged_ns=now_ns, by=act.by, reason=act.reason)
         case "shelve" if state != "out_of_service" and act.minutes is not None:
             until_ns = now_ns + round(act.minutes * NS_PER_MIN)
-            return replace(standing, state="shelved", until_ns=until_ns, by=act.by, reason=act.reason)
+            return replace(status, state="shelved", until_ns=until_ns, by=act.by, reason=act.reason)
         case "out_of_service" if state != "out_of_service":
-            return replace(standing, state="out_of_service", until_ns=None, by=act.by, reason=act.reason)
+            return replace(status, state="out_of_service", until_ns=None, by=act.by, reason=act.reason)
         case "unshelve" if state == "shelved":
-            return back(standing, act.by, act.reason)
+            return back(status, act.by, act.reason)
         case "in_service" if state == "out_of_service":
-            return back(standing, act.by, act.reason)
+            return back(status, act.by, act.reason)
     raise ActRefusedError(f"{act.act}: the alarm is {state}")
 
 
-def back(standing: AlarmStatus, by: str, reason: str = "") -> AlarmStatus:
-    """Standing after a suppression: the operator is called anew if the condition is there."""
-    state: AlarmState = "unacknowledged" if standing.is_active else "normal"
-    return replace(standing, state=state, acknowledged_ns=None, by=by, until_ns=None, reason=reason)
+def back(status: AlarmStatus, by: str, reason: str = "") -> AlarmStatus:
+    """Status after a suppression: the operator is called anew if the condition is there."""
+    state: AlarmState = "unacknowledged" if status.is_active else "normal"
+    return replace(status, state=state, acknowledged_ns=None, by=by, until_ns=None, reason=reason)
 
 
-def is_shelf_over(standing: AlarmStatus, now_ns: int) -> bool:
+def is_shelf_over(status: AlarmStatus, now_ns: int) -> bool:
     """Whether the alarm is on a shelf whose end has come."""
-    return standing.state == "shelved" and standing.until_ns is not None and now_ns >= standing.until_ns
+    return status.state == "shelved" and status.until_ns is not None and now_ns >= status.until_ns

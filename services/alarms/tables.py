@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from wetwell.protocols.messages.alarm import Alarm, AlarmReport
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.terminal import as_lines
+from wetwell.services.reports.tables import as_lines
 
 TARGETS: Mapping[str, str] = {
     "alarms_10min": "1 wanted, 2 at most in the long run, 10 at most ever",

@@ -30,8 +30,8 @@ from wetwell.services.reports.backtest_page import backtest_page
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-SCHEMA = "wetwell.backtest/1"
-JOURNAL = "backtest.part.jsonl"
+BACKTEST_SCHEMA = "wetwell.backtest/1"
+BACKTEST_JOURNAL = "backtest.part.jsonl"
 OUTCOMES = TypeAdapter(dict[str, Outcome], config={"ser_json_inf_nan": "constants"})
 
 
@@ -205,7 +205,7 @@ def run_backtest(
             journal.add({"key": keys[left[place]], "outcomes": OUTCOMES.dump_python(judged, mode="json")})
     refuse_if_all(list(failures.values()), len(sources))
     return {
-        "schema": SCHEMA,
+        "schema": BACKTEST_SCHEMA,
         "version": version("wetwell"),
         "learning_h": learning_s / 3600.0,
         "recordings": [sources[number].name for number in sorted(done)],
@@ -233,7 +233,7 @@ def write_backtest(
     WetwellError
         If no recording can be scored.
     """
-    with open_journal(folder / JOURNAL, "backtest") as journal:
+    with open_journal(folder / BACKTEST_JOURNAL, "backtest") as journal:
         result = run_backtest(sources, detectors, workers, learning_s, scheduler=scheduler, journal=journal)
         for name, text in (
             ("backtest.json", json.dumps(result, indent=2, allow_nan=False) + "\n"),
@@ -242,7 +242,7 @@ def write_backtest(
             with atomic_file(folder / name) as file:
                 file.write(text.encode())
         if not result["failed"]:
-            (folder / JOURNAL).unlink()
+            (folder / BACKTEST_JOURNAL).unlink()
     return result
 
 

@@ -25,9 +25,9 @@ from wetwell.services.batch.recordings import write_simulated
 from wetwell.simulator.dataset import Item, item_of, labels
 from wetwell.simulator.simulation import Simulation
 
-SCHEMA = "wetwell.dataset/1"
+DATASET_SCHEMA = "wetwell.dataset/1"
 MANIFEST = "manifest.json"
-JOURNAL = "manifest.part.jsonl"
+DATASET_JOURNAL = "manifest.part.jsonl"
 FILES = ("file", "station_file", "scenario_file")
 
 Form = Literal["parquet", "csv.gz"]
@@ -57,7 +57,7 @@ class Plan:
     def header(self) -> dict[str, Any]:
         """The plan as the manifest says it, without the count."""
         return {
-            "schema": SCHEMA,
+            "schema": DATASET_SCHEMA,
             "version": version("wetwell"),
             "seed": self.seed,
             "length_s": self.length_s,
@@ -86,7 +86,7 @@ def make_dataset(plan: Plan, folder: Path, workers: int, scheduler: str | None =
     KeyboardInterrupt
         On Ctrl-C; what is whole stays.
     """
-    with open_journal(folder / JOURNAL, "dataset") as journal:
+    with open_journal(folder / DATASET_JOURNAL, "dataset") as journal:
         known = _known_entries(plan, folder, journal)
         for half in folder.glob(".*.part"):
             half.unlink(missing_ok=True)
@@ -113,7 +113,7 @@ def make_dataset(plan: Plan, folder: Path, workers: int, scheduler: str | None =
             manifest = plan.header | {"count": plan.count, "classes": classes, "items": items}
             with atomic_file(folder / MANIFEST) as file:
                 file.write(json.dumps(manifest, indent=1).encode() + b"\n")
-            (folder / JOURNAL).unlink()
+            (folder / DATASET_JOURNAL).unlink()
     return {
         "dataset": str(folder),
         "items": len(items),
@@ -147,7 +147,7 @@ def check_dataset(folder: Path) -> dict[str, object]:
                 elif _sha256(path) != item["sha256"][key]:
                     faults.append(f"{path}: is not what the manifest says, its SHA-256 differs")
     except (KeyError, TypeError) as error:
-        raise RecordingError(f"{folder / MANIFEST}: is not a manifest of '{SCHEMA}': {error}") from error
+        raise RecordingError(f"{folder / MANIFEST}: is not a manifest of '{DATASET_SCHEMA}': {error}") from error
     if faults:
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         raise RecordingError(f"{faults[0]}{more}")
@@ -186,10 +186,10 @@ def read_manifest(path: Path) -> dict[str, Any]:
         raise RecordingError(f"{path}: is not JSON: {error}") from error
     if (
         not isinstance(manifest, dict)
-        or manifest.get("schema") != SCHEMA
+        or manifest.get("schema") != DATASET_SCHEMA
         or not isinstance(manifest.get("items"), list)
     ):
-        raise RecordingError(f"{path}: is not a manifest of '{SCHEMA}'")
+        raise RecordingError(f"{path}: is not a manifest of '{DATASET_SCHEMA}'")
     return manifest
 
 

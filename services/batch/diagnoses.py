@@ -17,9 +17,9 @@ from wetwell.services.batch.journal import Journal, fingerprint, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.stations import find_station
 
-SCHEMA = "wetwell.diagnoses/1"
+DIAGNOSES_SCHEMA = "wetwell.diagnoses/1"
 RESULT = "diagnoses.json"
-JOURNAL = "diagnoses.part.jsonl"
+DIAGNOSES_JOURNAL = "diagnoses.part.jsonl"
 COLUMNS = ("station_file", "recording")
 SUFFIXES = {".csv", ".gz", ".parquet"}
 
@@ -95,7 +95,7 @@ def diagnose_all(
     """
     out = out.absolute()
     keys = {case.name: case.identity(only, without) for case in cases}
-    with open_journal(out / JOURNAL, "batch of diagnoses") as journal:
+    with open_journal(out / DIAGNOSES_JOURNAL, "batch of diagnoses") as journal:
         told = {line["row"]["name"]: line["row"] for line in _kept(journal, keys, out)}
         failures = {case.name: case.station for case in cases if isinstance(case.station, Failure)}
         left = [case for case in cases if case.name not in told and case.name not in failures]
@@ -110,7 +110,7 @@ def diagnose_all(
         names = [case.name for case in cases]
         refuse_if_all([failures[name] for name in names if name in failures], len(names))
         result = {
-            "schema": SCHEMA,
+            "schema": DIAGNOSES_SCHEMA,
             "version": version("wetwell"),
             "diagnoses": [told[name] for name in names if name in told],
             "failed": [{"name": name, "error": failures[name].error} for name in names if name in failures],
@@ -118,7 +118,7 @@ def diagnose_all(
         with atomic_file(out / RESULT) as file:
             file.write(json.dumps(result, indent=1).encode() + b"\n")
         if not failures:
-            (out / JOURNAL).unlink()
+            (out / DIAGNOSES_JOURNAL).unlink()
     return result
 
 

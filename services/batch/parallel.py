@@ -21,7 +21,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _AHEAD = 4  # tasks in the queue for each worker
-LOOK_S = 0.5
+WATCH_S = 0.5
 """How often Ctrl-C is looked for while nothing gets done."""
 
 
@@ -133,7 +133,7 @@ def _until_killed(
                         return [*waiting.values(), (number, task)]
             if not waiting:
                 return []
-            for future in wait(waiting, LOOK_S, return_when=FIRST_COMPLETED).done:
+            for future in wait(waiting, WATCH_S, return_when=FIRST_COMPLETED).done:
                 try:
                     result = future.result()
                 except BrokenProcessPool:

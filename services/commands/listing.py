@@ -67,7 +67,7 @@ def modbus_map(
 @app.command()
 def effects(*, as_json: JsonOption = False) -> None:
     """List the effects that a station file may name, with their parameters."""
-    from wetwell.services.reports.terminal import effect_lines
+    from wetwell.services.reports.part_tables import effect_lines
     from wetwell.simulator.effects import effect_table
 
     table = effect_table()

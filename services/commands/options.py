@@ -162,8 +162,8 @@ def run(settings: Settings, daemon: Coroutine[Any, Any, None]) -> None:
 
 def print_result(result: dict[str, object], *, as_json: bool) -> None:
     """Print a result, for people or as JSON."""
-    from wetwell.services.reports.terminal import as_json as to_json
-    from wetwell.services.reports.terminal import as_lines
+    from wetwell.services.reports.tables import as_json as to_json
+    from wetwell.services.reports.tables import as_lines
 
     typer.echo(to_json(result) if as_json else as_lines(result))
 

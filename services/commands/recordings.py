@@ -153,6 +153,6 @@ def kpi(recording: RecordingOption, as_json: JsonOption = False) -> None:
     """Print energy, starts, run time and volume of a recording, by day and in total."""
     from wetwell.protocols.recordings.kpi import kpis
     from wetwell.protocols.recordings.recording import read_recording
-    from wetwell.services.reports.terminal import kpi_table
+    from wetwell.services.reports.tables import kpi_table
 
     print_result(kpi_table(kpis(read_recording(recording)), with_hours=as_json), as_json=as_json)

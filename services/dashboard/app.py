@@ -31,7 +31,7 @@ class AppState:
     """What the answers are made from; without a bus nothing can be asked."""
 
     view: SiteView
-    hub: EventStreams
+    streams: EventStreams
     reports: Path | None = None
     bus: Bus | None = None
 
@@ -48,9 +48,9 @@ class AppState:
         return self.bus
 
 
-def dashboard_app(desk: AppState, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
-    """Web application over a desk, behind a `Guard`."""
-    pages, answers, login = _Pages(), _Answers(desk), Login(tokens_file)
+def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
+    """Web application over a state, behind a `Guard`."""
+    pages, answers, login = _Pages(), _Answers(app_state), Login(tokens_file)
     shells = ("/", "/station/{station}", "/alarms", "/reports", "/health")
     return Starlette(
         routes=[
@@ -97,43 +97,43 @@ class _Pages:
 class _Answers:
     """What is known and what can be asked."""
 
-    def __init__(self, desk: AppState) -> None:
-        self._desk = desk
+    def __init__(self, app_state: AppState) -> None:
+        self._state = app_state
 
     async def events(self, request: Request) -> Response:
         return StreamingResponse(
-            self._desk.hub.listen(request.query_params.get("station", "")),
+            self._state.streams.listen(request.query_params.get("station", "")),
             media_type="text/event-stream",
             headers={"cache-control": "no-store", "x-accel-buffering": "no"},
         )
 
     async def stations(self, request: Request) -> Response:
-        return _json(request, self._desk.view.site_state())
+        return _json(request, self._state.view.site_state())
 
     async def station(self, request: Request) -> Response:
-        return _json(request, self._desk.view.station_state(request.path_params["station"]))
+        return _json(request, self._state.view.station_state(request.path_params["station"]))
 
     async def alarms(self, request: Request) -> Response:
-        return _json(request, self._desk.view.alarms())
+        return _json(request, self._state.view.alarms())
 
     async def health(self, request: Request) -> Response:
-        bus = self._desk.bus
-        services = self._desk.view.health(asyncio.get_running_loop().time())
+        bus = self._state.bus
+        services = self._state.view.health(asyncio.get_running_loop().time())
         return _json(request, json.dumps({"connected": bus is not None and bus.is_connected, "services": services}))
 
     async def act(self, request: Request) -> Response:
         holder = holder_in(request)
         by = None if holder is None else holder.name
-        answer = await act_on_alarm(self._desk.asked(), request.path_params["station"], await request.body(), by)
+        answer = await act_on_alarm(self._state.asked(), request.path_params["station"], await request.body(), by)
         return JSONResponse(answer)
 
     async def history(self, request: Request) -> Response:
-        answer = await history(self._desk.asked(), request.path_params["station"], request.query_params)
+        answer = await history(self._state.asked(), request.path_params["station"], request.query_params)
         return _json(request, answer.encode().decode())
 
     async def recording(self, request: Request) -> Response:
         name = request.path_params["station"]
-        pieces = recording_pieces(self._desk.asked(), name, request.query_params)
+        pieces = recording_pieces(self._state.asked(), name, request.query_params)
         first = await anext(pieces)  # what is wrong is told before the file begins
 
         async def content() -> AsyncIterator[str]:
@@ -145,10 +145,10 @@ class _Answers:
         return StreamingResponse(content(), media_type="text/csv; charset=utf-8", headers=headers)
 
     async def reports(self, request: Request) -> Response:
-        return _json(request, json.dumps(report_names(self._desk.reports)))
+        return _json(request, json.dumps(report_names(self._state.reports)))
 
     async def report(self, request: Request) -> Response:
-        path = find_report(self._desk.reports, request.path_params["name"])
+        path = find_report(self._state.reports, request.path_params["name"])
         content = await asyncio.to_thread(path.read_bytes)
         return Response(content, media_type="text/html; charset=utf-8", headers={"cache-control": "no-cache"})
 

@@ -30,13 +30,13 @@ class ChartBackfill:
     ----------
     bus : Bus
     view : SiteView
-    hub : EventStreams
+    streams : EventStreams
     """
 
-    def __init__(self, bus: Bus, view: SiteView, hub: EventStreams) -> None:
+    def __init__(self, bus: Bus, view: SiteView, streams: EventStreams) -> None:
         self._bus = bus
         self._view = view
-        self._hub = hub
+        self._streams = streams
         self._ready_s = asyncio.get_running_loop().time() + SETTLED_S
         self._asked: dict[str, tuple[int, float]] = {}
         self._at_once = asyncio.Semaphore(AT_ONCE)
@@ -45,7 +45,7 @@ class ChartBackfill:
         """Stations that are looked at whose past has to be asked for now; each is told once."""
         if now_s < self._ready_s:
             return []
-        return [name for name in self._hub.topics if self._is_wanted(name, now_s)]
+        return [name for name in self._streams.topics if self._is_wanted(name, now_s)]
 
     def _is_wanted(self, name: str, now_s: float) -> bool:
         station = self._view.stations.get(name)
@@ -65,8 +65,8 @@ class ChartBackfill:
             rows = await self._rows(name, first_ns, station.room)
         if rows is None:
             self._asked[name] = (first_ns, asyncio.get_running_loop().time() + AGAIN_S)
-        elif rows and station.take_past(rows, first_ns):
-            self._hub.resync(name)
+        elif rows and station.prepend(rows, first_ns):
+            self._streams.resync(name)
 
     async def _rows(self, name: str, end_ns: int, most: int) -> list[str] | None:
         """Rows before a time, oldest first; None if no historian has told."""

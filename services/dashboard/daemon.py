@@ -11,7 +11,7 @@ from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.exposure import check_exposure, is_loopback
 
@@ -36,19 +36,18 @@ async def serve_dashboard(settings: Settings) -> None:
         insecure=settings.security.insecure,
     )
     listener = open_socket(settings.dashboard.host, settings.dashboard.port)
-    async with stop_event() as stop:
-        await until(stop, asyncio.create_task(_run(settings, listener), name="dashboard.run"))
+    await run_until_stopped(_run(settings, listener), "dashboard.run")
 
 
 async def _run(settings: Settings, listener: socket.socket) -> None:
     tokens_file = settings.security.tokens_file
-    desk = AppState(SiteView(settings.dashboard.stale_s), EventStreams(), settings.dashboard.reports)
+    app_state = AppState(SiteView(settings.dashboard.stale_s), EventStreams(), settings.dashboard.reports)
     is_local = tokens_file is None and is_loopback(settings.dashboard.host)
-    app = dashboard_app(desk, tokens_file, is_local=is_local)
-    async with web_server(app, listener, desk.hub):
+    app = dashboard_app(app_state, tokens_file, is_local=is_local)
+    async with web_server(app, listener, app_state.streams):
         log.info("page on http://%s:%d", *listener.getsockname()[:2])
         with await connect(settings) as bus:
-            feed, desk.bus = Feed(bus, desk.view, desk.hub), bus
+            feed, app_state.bus = Feed(bus, app_state.view, app_state.streams), bus
             async with asyncio.TaskGroup() as group:
                 group.create_task(
                     report_health(bus, SITE, "dashboard", settings.health.period_s, feed.figures),

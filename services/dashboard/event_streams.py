@@ -75,7 +75,7 @@ class EventStreams:
         return tuple(self._clients)
 
     async def listen(self, topic: str) -> AsyncIterator[bytes]:
-        """Events of a topic for one browser, until it goes or the hub closes."""
+        """Events of a topic for one browser, until it goes or all are closed."""
         client = Client()
         if self.is_closed:
             return

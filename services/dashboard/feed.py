@@ -1,4 +1,4 @@
-"""From the bus to the browsers: payloads into the site's state, its frames into the hub."""
+"""From the bus to the browsers: payloads into the site's state, its frames into the event streams."""
 
 import asyncio
 import logging
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 FRAME_S = 0.25
 FRAMES_A_SECOND = 4
-VERDICT_HISTORY = 60
+SHOWN_VERDICTS = 60
 FIRST_S = 2.0
 
 T = TypeVar("T")
@@ -37,21 +37,21 @@ class Feed:
     ----------
     bus : Bus
     view : SiteView
-    hub : EventStreams
+    streams : EventStreams
     """
 
-    def __init__(self, bus: Bus, view: SiteView, hub: EventStreams) -> None:
+    def __init__(self, bus: Bus, view: SiteView, streams: EventStreams) -> None:
         self._view = view
-        self._hub = hub
+        self._streams = streams
         self._bus = bus
-        self._past = ChartBackfill(bus, view, hub)
+        self._backfill = ChartBackfill(bus, view, streams)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
-            (bus.subscribe(sample_key("*"), capacity=100_000, recover=False), view.take_sample),
-            (bus.subscribe(sample_block_key("*"), capacity=100_000, recover=False), view.take_sample_block),
-            (bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY), view.take_verdict),
-            (bus.subscribe(model_key("*"), history=1), view.take_model),
-            (bus.subscribe(alarm_key("*"), history=1), view.take_alarm),
-            (bus.subscribe(status_key("*", "*"), history=1), view.take_status),
+            (bus.subscribe(sample_key("*"), capacity=100_000, recover=False), view.handle_sample),
+            (bus.subscribe(sample_block_key("*"), capacity=100_000, recover=False), view.handle_sample_block),
+            (bus.subscribe(verdict_key("*"), history=SHOWN_VERDICTS), view.handle_verdict),
+            (bus.subscribe(model_key("*"), history=1), view.handle_model),
+            (bus.subscribe(alarm_key("*"), history=1), view.handle_alarm),
+            (bus.subscribe(status_key("*", "*"), history=1), view.handle_status),
         ]
         self._presence = bus.watch(alive_key("*", "*"))
 
@@ -61,13 +61,13 @@ class Feed:
             self._bus.ask(sample_key("*"), timeout_s=FIRST_S), self._bus.ask(sample_block_key("*"), timeout_s=FIRST_S)
         )
         for payload in samples:
-            self._view.take_sample(payload)
+            self._view.handle_sample(payload)
         for payload in blocks:
-            self._view.take_sample_block(payload)
+            self._view.handle_sample_block(payload)
         async with asyncio.TaskGroup() as group:
-            for subscription, take in self._messages:
-                group.create_task(_take(subscription, take))
-            group.create_task(_take(self._presence, self._view.take_presence))
+            for subscription, handle in self._messages:
+                group.create_task(_each(subscription, handle))
+            group.create_task(_each(self._presence, self._view.handle_presence))
             group.create_task(self._send(group))
 
     async def _send(self, group: asyncio.TaskGroup) -> None:
@@ -75,28 +75,28 @@ class Feed:
         loop = asyncio.get_running_loop()
         async for _ in ticks(FRAME_S, asyncio.Event()):
             for name, frame in self._view.advance(loop.time()).items():
-                self._hub.send(name, frame)
-            for name in self._past.wanted(loop.time()):
-                group.create_task(self._past.fill(name), name=f"dashboard.past.{name}")
+                self._streams.send(name, frame)
+            for name in self._backfill.wanted(loop.time()):
+                group.create_task(self._backfill.fill(name), name=f"dashboard.past.{name}")
             number += 1
             if number % FRAMES_A_SECOND == 0:
                 frame_or_none = self._view.site_frame()
                 if frame_or_none is not None:
-                    self._hub.send("", frame_or_none)
+                    self._streams.send("", frame_or_none)
 
     def figures(self) -> dict[str, float]:
         """Health figures."""
         return {
             "stations": float(len(self._view.stations)),
-            "clients": float(self._hub.clients),
+            "clients": float(self._streams.clients),
             "malformed": float(self._view.counts["malformed"]),
             "dropped": float(sum(subscription.dropped for subscription, _ in self._messages)),
         }
 
 
-async def _take(subscription: Subscription[T], take: Callable[[T], None]) -> None:
+async def _each(subscription: Subscription[T], handle: Callable[[T], None]) -> None:
     """Take in batches: to wake the loop for every message costs more than the message."""
     while True:
         for item in await subscription.receive():
-            take(item)
+            handle(item)
         await asyncio.sleep(FRAME_S / 2.0)

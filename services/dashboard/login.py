@@ -9,7 +9,7 @@ from starlette.responses import JSONResponse, Response
 from wetwell.services.dashboard.guard import COOKIE
 from wetwell.services.security.tokens import Holder, holder_of
 
-KEPT_S = 30 * 24 * 3600
+COOKIE_S = 30 * 24 * 3600
 
 
 class Login:
@@ -34,7 +34,7 @@ class Login:
             answer.delete_cookie(COOKIE)
         else:
             secure = request.url.scheme == "https"
-            answer.set_cookie(COOKIE, token, max_age=KEPT_S, httponly=True, samesite="strict", secure=secure)
+            answer.set_cookie(COOKIE, token, max_age=COOKIE_S, httponly=True, samesite="strict", secure=secure)
         return answer
 
     def _told(self, holder: Holder | None) -> dict[str, object]:

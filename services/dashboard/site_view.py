@@ -42,46 +42,46 @@ class SiteView:
         self._with_live: dict[str, StationView] = {}
         self._changed: dict[str, StationView] = {}
 
-    def take_sample(self, payload: bytes) -> None:
+    def handle_sample(self, payload: bytes) -> None:
         """Take a sample."""
         sample = self._decoded(Sample, payload)
         if sample is not None:
-            self._take_samples(sample.station, [sample])
+            self._handle_samples(sample.station, [sample])
 
-    def take_sample_block(self, payload: bytes) -> None:
+    def handle_sample_block(self, payload: bytes) -> None:
         """Take many samples of a station; the block that came last is left out."""
         block = self._decoded(SampleBlock, payload)
         if block is None:
             return
         samples = block.samples()
         if not self._station(block.station).is_last(samples[-1]):
-            self._take_samples(block.station, samples)
+            self._handle_samples(block.station, samples)
 
-    def _take_samples(self, name: str, samples: list[Sample]) -> None:
+    def _handle_samples(self, name: str, samples: list[Sample]) -> None:
         station = self._station(name)
-        new = [sample for sample in samples if station.take_sample(sample, self._now_s)]
+        new = [sample for sample in samples if station.handle_sample(sample, self._now_s)]
         if new:
             self._with_news[name] = self._with_live[name] = station
 
-    def take_verdict(self, payload: bytes) -> None:
+    def handle_verdict(self, payload: bytes) -> None:
         """Take a verdict."""
         verdict = self._decoded(Verdict, payload)
         if verdict is not None:
-            self._change(verdict.station).take_verdict(verdict)
+            self._change(verdict.station).handle_verdict(verdict)
 
-    def take_model(self, payload: bytes) -> None:
+    def handle_model(self, payload: bytes) -> None:
         """Take the curves of a station."""
         model = self._decoded(Model, payload)
         if model is not None:
-            self._change(model.station).take_model(model)
+            self._change(model.station).handle_model(model)
 
-    def take_alarm(self, payload: bytes) -> None:
+    def handle_alarm(self, payload: bytes) -> None:
         """Take the last state of an alarm."""
         alarm = self._decoded(Alarm, payload)
         if alarm is not None:
-            self._change(alarm.station).take_alarm(alarm)
+            self._change(alarm.station).handle_alarm(alarm)
 
-    def take_status(self, payload: bytes) -> None:
+    def handle_status(self, payload: bytes) -> None:
         """Take the health figures of a service."""
         status = self._decoded(Status, payload)
         if status is None:
@@ -90,14 +90,14 @@ class SiteView:
         service["status"] = json.loads(status.encode())
         service["seen_s"] = self._now_s
         if status.station != SITE:
-            self._news(status.station).take_status(status)
+            self._news(status.station).handle_status(status)
 
-    def take_presence(self, presence: Presence) -> None:
+    def handle_presence(self, presence: Presence) -> None:
         """Take that a service has come or gone."""
         _, station, _, service = presence.key.split("/")
         self._service(station, service)["is_alive"] = presence.is_alive
         if station != SITE:
-            self._news(station).take_presence(service, is_alive=presence.is_alive)
+            self._news(station).handle_presence(service, is_alive=presence.is_alive)
 
     def advance(self, now_s: float) -> dict[str, str]:
         """Next frame of each station that has news, as JSON. [s]."""

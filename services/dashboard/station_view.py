@@ -76,7 +76,7 @@ class StationView:
         """Whether this is the last sample once more."""
         return self.sample is not None and (sample.time, sample.seq) == (self.sample.time, self.sample.seq)
 
-    def take_sample(self, sample: Sample, now_s: float) -> bool:
+    def handle_sample(self, sample: Sample, now_s: float) -> bool:
         """Take a sample that is not older than the last; whether it was one."""
         self.seen_s = now_s
         if self.sample is not None and sample.time <= self.sample.time:
@@ -101,14 +101,14 @@ class StationView:
         """How many samples fit before those that were heard."""
         return (self._rows.maxlen or 0) - len(self._rows)
 
-    def take_past(self, rows: list[str], first_ns: int) -> bool:
+    def prepend(self, rows: list[str], first_ns: int) -> bool:
         """Take rows from before `first_ns` as far as there is room; whether that still is the first sample."""
         if first_ns != self.first_ns:
             return False
         self._rows.extendleft(reversed(rows[max(0, len(rows) - self.room) :]))
         return True
 
-    def take_verdict(self, verdict: Verdict) -> None:
+    def handle_verdict(self, verdict: Verdict) -> None:
         """Take a verdict; one that came before is left out."""
         text = verdict.encode().decode()
         kept = self._verdicts.setdefault(verdict.pump, deque(maxlen=VERDICTS))
@@ -118,23 +118,23 @@ class StationView:
         self._states[verdict.pump] = verdict.state
         self._fresh.setdefault("verdicts", []).append(text)
 
-    def take_model(self, model: Model) -> None:
+    def handle_model(self, model: Model) -> None:
         """Take the curves."""
         self._model = model.encode().decode()
         self._levels = model.start_levels_m
         self._fresh["model"] = self._model
 
-    def take_alarm(self, alarm: Alarm) -> None:
+    def handle_alarm(self, alarm: Alarm) -> None:
         """Take the last state of an alarm."""
         self._alarms[alarm.id] = alarm
         self._fresh.setdefault("alarms", {})[alarm.id] = alarm.encode().decode()
 
-    def take_status(self, status: Status) -> None:
+    def handle_status(self, status: Status) -> None:
         """Take the health figures of a service."""
         self._statuses[status.service] = status.encode().decode()
         self._fresh.setdefault("statuses", {})[status.service] = self._statuses[status.service]
 
-    def take_presence(self, service: str, *, is_alive: bool) -> None:
+    def handle_presence(self, service: str, *, is_alive: bool) -> None:
         """Take that a service has come or gone."""
         (self._alive.add if is_alive else self._alive.discard)(service)
         self._fresh["alive"] = True

@@ -41,7 +41,7 @@ def open_socket(host: str, port: int) -> socket.socket:
 
 
 @contextlib.asynccontextmanager
-async def web_server(app: ASGIApp, listener: socket.socket, hub: EventStreams) -> AsyncIterator[None]:
+async def web_server(app: ASGIApp, listener: socket.socket, streams: EventStreams) -> AsyncIterator[None]:
     """Serve until the end of the block."""
     config = uvicorn.Config(
         app, log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=SHUTDOWN_S
@@ -51,6 +51,6 @@ async def web_server(app: ASGIApp, listener: socket.socket, hub: EventStreams) -
     try:
         yield
     finally:
-        hub.close()
+        streams.close()
         server.should_exit = True
         await serving

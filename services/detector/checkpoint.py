@@ -16,7 +16,7 @@ from wetwell.services.runtime.state_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)
 
-SCHEMA = "wetwell.detector-checkpoint/1"
+CHECKPOINT_SCHEMA = "wetwell.detector-checkpoint/1"
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Checkpoint:
         if self._path is None:
             return self._encoded, b""
         head = {
-            "schema": SCHEMA,
+            "schema": CHECKPOINT_SCHEMA,
             "answers": {name: answer.model_dump(mode="json") for name, answer in told.answers.items()},
             "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
         }
@@ -96,7 +96,7 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
     head, _, rest = data.partition(b"\n")
     try:
         header = json.loads(head)
-        if not isinstance(header, dict) or header.get("schema") != SCHEMA:
+        if not isinstance(header, dict) or header.get("schema") != CHECKPOINT_SCHEMA:
             return Told({}), data
         answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
         return Told(answers, [Verdict.model_validate(verdict) for verdict in header["verdicts"]]), rest

@@ -5,10 +5,9 @@ import uuid
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import order_key, verdict_key
-from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.messages import Order, Verdict
+from wetwell.services.runtime.client import ask_service
 from wetwell.services.runtime.clock import now_ns
-from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.settings import Settings
 
 ANSWER_S = 10.0
@@ -26,14 +25,8 @@ async def send_order(settings: Settings, station: str, pump: int, act: str, by: 
     order = Order.model_validate(
         {"id": uuid.uuid4().hex, "time": now_ns(), "station": station, "pump": pump, "act": act, "by": by}
     )
-    try:
-        async with asyncio.timeout(ANSWER_S):
-            with await connect(settings) as bus:
-                return await ordered(bus, order)
-    except TimeoutError as error:
-        raise LinkError(
-            f"station '{station}': no detector answered on {settings.zenoh.endpoint} within {ANSWER_S:g} s"
-        ) from error
+    silence = f"station '{station}': no detector"
+    return await ask_service(settings, lambda bus: ordered(bus, order), silence, ANSWER_S)
 
 
 async def ordered(bus: Bus, order: Order) -> Verdict:

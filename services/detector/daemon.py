@@ -17,7 +17,7 @@ from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.lifecycle import report_health, stop_event, ticks, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -25,20 +25,16 @@ log = logging.getLogger(__name__)
 
 async def serve_detector(settings: Settings, stations: Sequence[Station]) -> None:
     """Judge stations until stopped. A router that is away is waited for."""
-    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
-        running = asyncio.create_task(_run(settings, stations, stack), name="detector.run")
-        await until(stop, running)
+    await run_until_stopped(_run(settings, stations), "detector.run")
 
 
-async def _run(settings: Settings, stations: Sequence[Station], stack: contextlib.AsyncExitStack) -> None:
-    bus = stack.enter_context(await connect(settings))
-    await judge_all(settings, bus, stations, "detector", stack)
+async def _run(settings: Settings, stations: Sequence[Station]) -> None:
+    with await connect(settings) as bus:
+        await judge_all(settings, bus, stations, "detector")
 
 
-async def judge_all(
-    settings: Settings, bus: Bus, stations: Sequence[Station], name: str, stack: contextlib.AsyncExitStack
-) -> None:
-    """Judge stations for ever; what the stack holds afterwards saves their states.
+async def judge_all(settings: Settings, bus: Bus, stations: Sequence[Station], name: str) -> None:
+    """Judge stations for ever; their states are saved at the end.
 
     Parameters
     ----------
@@ -50,13 +46,11 @@ async def judge_all(
         Those that have brought the process down too often are left out, and told.
     name : str
         Of this group of stations, for the trace of a crash.
-    stack : contextlib.AsyncExitStack
-        Of the caller.
     """
     kept = settings.detector
     quarantine = Quarantine(kept.state_dir, name, kept.crash_tries, kept.crash_window_s)
-    stack.callback(quarantine.close)
-    async with asyncio.TaskGroup() as group:
+    async with contextlib.AsyncExitStack() as stack, asyncio.TaskGroup() as group:
+        stack.callback(quarantine.close)
         judges: list[StationDetector] = []
         for station in stations:
             if quarantine.holds(station.name):

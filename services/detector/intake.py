@@ -21,9 +21,9 @@ BEHIND = 10_000
 """Messages of one station that wait while it catches up."""
 KEPT_S = 2.0
 """Time in which what publishers keep comes, even if some of it is lost on the way once."""
-CATCH_UPS = 8
+BACKFILLS_AT_ONCE = 8
 """Stations that ask the historian at the same time."""
-SLICE = 500
+SAMPLES_AT_ONCE = 500
 """Samples that are judged before the other tasks have their turn."""
 
 
@@ -80,9 +80,9 @@ class Intake:
         async with asyncio.TaskGroup() as group:
             group.create_task(self._judge(), name="detector.samples")
             group.create_task(self._obey(), name="detector.orders")
-            turn = asyncio.Semaphore(CATCH_UPS)
+            turn = asyncio.Semaphore(BACKFILLS_AT_ONCE)
             for judge in list(self._behind):
-                group.create_task(self._catch_up(judge, turn), name=f"detector.missed.{judge.station}")
+                group.create_task(self._backfill(judge, turn), name=f"detector.missed.{judge.station}")
 
     async def _judge(self) -> None:
         while True:
@@ -96,7 +96,7 @@ class Intake:
                     self._behind[judge].extend(payloads, kind)
                     continue
                 judged += judge.handle_payloads(payloads, kind)
-                if judged >= SLICE:
+                if judged >= SAMPLES_AT_ONCE:
                     judged = 0
                     await asyncio.sleep(0)
 
@@ -105,7 +105,7 @@ class Intake:
             for key, payload in await self._orders.receive():
                 self._obeying[key].handle_order(payload)
 
-    async def _catch_up(self, judge: StationDetector, turn: asyncio.Semaphore) -> None:
+    async def _backfill(self, judge: StationDetector, turn: asyncio.Semaphore) -> None:
         """Take what was missed, then what came meanwhile.
 
         The bus keeps samples in the order in which they came, the historian in that of their stamps, which differs
@@ -119,22 +119,22 @@ class Intake:
             async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
                 if _place(last, waiting.samples()):
                     break
-                await judge.handle_missed(samples)
+                await judge.judge_in_turns(samples)
                 last = samples[-1].time, samples[-1].seq
-            await _take(judge, waiting, _place(last, waiting.samples()))
+            await _drain(judge, waiting, _place(last, waiting.samples()))
             self._passed_over += self._behind.pop(judge).dropped
 
 
-async def _take(judge: StationDetector, waiting: Waiting, place: int) -> None:
+async def _drain(judge: StationDetector, waiting: Waiting, place: int) -> None:
     """Judge what waits from a place on, and what comes meanwhile, until nothing waits."""
     judged = 0
     while waiting.messages:
         message = judge.decoded(*waiting.messages.popleft())
         samples = [] if message is None else samples_of(message)
-        judge.handle_samples(samples[place:])
+        judge.judge(samples[place:])
         place = max(place - len(samples), 0)
         judged += len(samples)
-        if judged >= SLICE and waiting.messages:
+        if judged >= SAMPLES_AT_ONCE and waiting.messages:
             judged = 0
             await asyncio.sleep(0)
 

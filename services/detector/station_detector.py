@@ -92,14 +92,14 @@ class StationDetector:
         self._quarantine.leave()
         return samples
 
-    async def handle_missed(self, samples: Iterable[Sample]) -> None:
+    async def judge_in_turns(self, samples: Iterable[Sample]) -> None:
         """Judge samples that come another way, such as from the historian."""
         left = iter(samples)
         while batch := list(islice(left, 100)):
-            self.handle_samples(batch)
+            self.judge(batch)
             await asyncio.sleep(0)
 
-    def handle_samples(self, samples: Iterable[Sample]) -> None:
+    def judge(self, samples: Iterable[Sample]) -> None:
         """Judge samples."""
         self._quarantine.enter(self.station)
         for sample in samples:

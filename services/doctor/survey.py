@@ -27,7 +27,7 @@ from wetwell.services.runtime.clock import now_ns
 
 T = TypeVar("T")
 
-ANSWER_S = 3.0
+SURVEY_ANSWER_S = 3.0
 HOUR_NS = 3600 * NS_PER_S
 
 
@@ -64,68 +64,68 @@ async def listen(bus: Bus, seconds: float) -> Survey:
     """Listen to a site for so long, then ask historian and alarms."""
     survey = Survey(seconds)
 
-    def take_samples(message: SampleMessage) -> None:
+    def handle_samples(message: SampleMessage) -> None:
         survey.samples.setdefault(message.station, []).extend(_with_time(message, now_ns()))
 
-    def take_gathered(block: SampleBlock) -> None:
+    def handle_gathered(block: SampleBlock) -> None:
         survey.gathered[block.station] = _with_time(block, asked_ns)
 
-    def take_verdict(verdict: Verdict) -> None:
+    def handle_verdict(verdict: Verdict) -> None:
         last = survey.verdicts.get((verdict.station, verdict.pump))
         if last is None or verdict.time >= last.time:
             survey.verdicts[verdict.station, verdict.pump] = verdict
 
-    def take_status(status: Status) -> None:
+    def handle_status(status: Status) -> None:
         survey.statuses[status.station, status.service] = status
 
-    def take_presence(presence: Presence) -> None:
+    def handle_presence(presence: Presence) -> None:
         _, station, _, service = presence.key.split("/", 3)
         (survey.alive.add if presence.is_alive else survey.alive.discard)((station, service))
 
     tasks = [
-        asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, take_samples))),
-        asyncio.create_task(_each(bus.subscribe(sample_block_key("*")), _decoding(SampleBlock, take_samples))),
-        asyncio.create_task(_each(bus.subscribe(verdict_key("*"), history=1), _decoding(Verdict, take_verdict))),
-        asyncio.create_task(_each(bus.subscribe(status_key("*", "*"), history=1), _decoding(Status, take_status))),
-        asyncio.create_task(_each(bus.watch(alive_key("*", "*")), take_presence)),
+        asyncio.create_task(_each(bus.subscribe(sample_key("*")), _decoding(Sample, handle_samples))),
+        asyncio.create_task(_each(bus.subscribe(sample_block_key("*")), _decoding(SampleBlock, handle_samples))),
+        asyncio.create_task(_each(bus.subscribe(verdict_key("*"), history=1), _decoding(Verdict, handle_verdict))),
+        asyncio.create_task(_each(bus.subscribe(status_key("*", "*"), history=1), _decoding(Status, handle_status))),
+        asyncio.create_task(_each(bus.watch(alive_key("*", "*")), handle_presence)),
     ]
     asked_ns = now_ns()
-    asking = asyncio.create_task(bus.ask(sample_block_key("*"), timeout_s=ANSWER_S))
+    asking = asyncio.create_task(bus.ask(sample_block_key("*"), timeout_s=SURVEY_ANSWER_S))
     await asyncio.sleep(seconds)
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
     for payload in await asking:
-        _decoding(SampleBlock, take_gathered)(payload)
+        _decoding(SampleBlock, handle_gathered)(payload)
     await _ask(bus, survey)
     return survey
 
 
 async def _ask(bus: Bus, survey: Survey) -> None:
-    survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=ANSWER_S))
+    survey.report = _first(AlarmReport, await bus.ask(alarm_report_key(), timeout_s=SURVEY_ANSWER_S))
     for station in sorted(survey.stations):
         last = survey.last_sample(station)
         last_ns = now_ns() if last is None else last.time
         query = HistoryQuery(kind="samples", start=last_ns - HOUR_NS, end=last_ns, points=10)
-        history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S))
+        history = _first(History, await bus.ask(history_key(station), query.encode(), timeout_s=SURVEY_ANSWER_S))
         if history is not None:
             survey.histories[station] = history
 
 
-async def _each(subscription: Subscription[T], take: Callable[[T], None]) -> None:
+async def _each(subscription: Subscription[T], handle: Callable[[T], None]) -> None:
     while True:
         for message in await subscription.receive():
-            take(message)
+            handle(message)
 
 
 def _with_time(message: SampleMessage, heard_ns: int) -> list[tuple[int, Sample]]:
     return [(heard_ns, sample) for sample in samples_of(message)]
 
 
-def _decoding(message: type[M], take: Callable[[M], None]) -> Callable[[bytes], None]:
+def _decoding(message: type[M], handle: Callable[[M], None]) -> Callable[[bytes], None]:
     def decode(payload: bytes) -> None:
         with contextlib.suppress(MessageError):  # the daemons count what is no message
-            take(message.decode(payload))
+            handle(message.decode(payload))
 
     return decode
 

@@ -100,7 +100,7 @@ class Fleet:
 
     async def run(self) -> None:
         """Look around for ever."""
-        await self._take_up()
+        await self._adopt_shards()
         async with asyncio.TaskGroup() as group:
             group.create_task(
                 report_health(self._bus, SITE, "fleet", self._settings.health.period_s, self._figures),
@@ -116,7 +116,7 @@ class Fleet:
             self._tell(shard, ())
         await self._ended(list(self._futures.values()))
 
-    async def _take_up(self) -> None:
+    async def _adopt_shards(self) -> None:
         """Find the shards that an earlier controller has left behind."""
         for key in await self._client.run_on_scheduler(_keys):
             if match := KEY.fullmatch(key):

@@ -1,7 +1,6 @@
 """A shard of the fleet: a task of Dask that judges its stations until it is told to end."""
 
 import asyncio
-import contextlib
 import logging
 
 from distributed import secede
@@ -54,9 +53,8 @@ async def _work(settings: Settings, plan: Plan) -> int:
 
 async def _judge(settings: Settings, plan: Plan) -> None:
     """Judge with a connection of its own, which ends with the plan: what was subscribed goes with it."""
-    async with contextlib.AsyncExitStack() as stack:
-        bus = stack.enter_context(await connect(settings))
-        await judge_all(settings, bus, plan.stations, f"shard-{plan.shard}", stack)
+    with await connect(settings) as bus:
+        await judge_all(settings, bus, plan.stations, f"shard-{plan.shard}")
         await asyncio.Event().wait()  # a shard without stations
 
 

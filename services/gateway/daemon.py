@@ -11,7 +11,7 @@ from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.modbus.device_map import Plc
 from wetwell.services.gateway.poller import PlcPoller
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.sample_sender import SampleSender
 from wetwell.services.runtime.settings import Settings
 
@@ -22,15 +22,13 @@ SERVICE = "gateway"
 
 async def serve_gateway(settings: Settings, plcs: Sequence[Plc]) -> None:
     """Poll PLCs until stopped. A router or a PLC that is away is waited for."""
-    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
-        running = asyncio.create_task(_run(settings, plcs, stack), name="gateway.run")
-        await until(stop, running)
+    await run_until_stopped(_run(settings, plcs), "gateway.run")
 
 
-async def _run(settings: Settings, plcs: Sequence[Plc], stack: contextlib.AsyncExitStack) -> None:
-    bus = stack.enter_context(await connect(settings))
+async def _run(settings: Settings, plcs: Sequence[Plc]) -> None:
     longest_wait_s, gather_s = settings.gateway.longest_wait_s, settings.zenoh.gather_s
-    await poll_all(bus, plcs, settings.health.period_s, longest_wait_s, gather_s)
+    with await connect(settings) as bus:
+        await poll_all(bus, plcs, settings.health.period_s, longest_wait_s, gather_s)
 
 
 async def poll_all(

@@ -65,7 +65,7 @@ class StationFeed:
             self._away_since_s = now_s
             log.warning("station '%s': %s: %s", self._plc.station, self._plc.endpoint, error)
 
-    def take(self, poll: Poll, stamp_ns: int, latency_s: float, now_s: float) -> Sample | None:
+    def handle_poll(self, poll: Poll, stamp_ns: int, latency_s: float, now_s: float) -> Sample | None:
         """Sample of a poll that began at `stamp_ns` and took `latency_s`; None if it has no time."""
         self.counts["good_polls"] += 1
         self._latencies_s.append(latency_s)

@@ -89,7 +89,7 @@ class PlcPoller:
                 self._feed.fail(error, _now_s())
                 continue
             blocks = tuple(poll.blocks)
-            sample = self._feed.take(poll, stamp_ns, _now_s() - begin_s, _now_s())
+            sample = self._feed.handle_poll(poll, stamp_ns, _now_s() - begin_s, _now_s())
             if sample is not None:
                 self._publish(sample)
 

@@ -67,7 +67,7 @@ def _of_raw(store: Store, station: str, start_ns: int, end_ns: int, points: int)
         if sum(map(len, found)) > points:
             break
     every = merged(found)
-    samples = every.take(slice(0, points))
+    samples = every.select(slice(0, points))
     columns = {"seq": samples.seq.astype(float), "quality": samples.quality.astype(float)} | _by_name(samples)
     history = _columns(station, "samples", samples.time_ns, columns)
     return history.model_copy(update={"more": len(every) > points})

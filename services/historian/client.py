@@ -1,16 +1,14 @@
 """Questions to a running historian over the bus."""
 
-import asyncio
-
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import SITE, history_key
-from wetwell.protocols.errors import ConfigError, LinkError
+from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.history import History, HistoryQuery, Kind
 from wetwell.protocols.timestamps import NS_PER_S, from_iso
-from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.client import ask_service, first_answer
 from wetwell.services.runtime.settings import Settings
 
-ANSWER_S = 20.0
+HISTORY_ANSWER_S = 20.0
 
 
 async def ask_history(
@@ -28,21 +26,19 @@ async def ask_history(
     Raises
     ------
     LinkError
-        If none answers within `ANSWER_S`.
+        If none answers within `HISTORY_ANSWER_S`.
     ConfigError
         If it answers with an error.
     """
-    try:
-        async with asyncio.timeout(ANSWER_S):
-            with await connect(settings) as bus:
-                start_ns, end_ns = span
-                if last_s is not None:
-                    end_ns = (await _newest_ns(bus, station) // NS_PER_S + 1) * NS_PER_S
-                    start_ns = end_ns - round(last_s * NS_PER_S)
-                query = HistoryQuery(kind=kind, start=start_ns, end=end_ns, points=points, raw=raw)
-                return await asked(bus, station, query)
-    except TimeoutError as error:
-        raise LinkError(f"no historian answered on {settings.zenoh.endpoint} within {ANSWER_S:g} s") from error
+
+    async def question(bus: Bus) -> History:
+        start_ns, end_ns = span
+        if last_s is not None:
+            end_ns = (await _newest_ns(bus, station) // NS_PER_S + 1) * NS_PER_S
+            start_ns = end_ns - round(last_s * NS_PER_S)
+        return await asked(bus, station, HistoryQuery(kind=kind, start=start_ns, end=end_ns, points=points, raw=raw))
+
+    return await ask_service(settings, question, "no historian", HISTORY_ANSWER_S)
 
 
 async def asked(bus: Bus, station: str, query: HistoryQuery) -> History:
@@ -53,14 +49,12 @@ async def asked(bus: Bus, station: str, query: HistoryQuery) -> History:
     ConfigError
         If it answers with an error.
     """
-    while True:
-        answers = await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S)
-        if answers:
-            history = History.decode(answers[0])
-            if history.error:
-                raise ConfigError(history.error)
-            return history
-        await asyncio.sleep(0.1)
+    history = History.decode(
+        await first_answer(bus, history_key(station), query.encode(), timeout_s=HISTORY_ANSWER_S)
+    )
+    if history.error:
+        raise ConfigError(history.error)
+    return history
 
 
 async def _newest_ns(bus: Bus, station: str) -> int:

@@ -1,7 +1,6 @@
 """The historian daemon: bus, clock and threads around `Historian`."""
 
 import asyncio
-import contextlib
 import logging
 
 from wetwell.protocols.bus.interface import Bus, Request, Subscription
@@ -10,7 +9,7 @@ from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -21,18 +20,24 @@ ALARM_HISTORY = 1
 CAPACITY = 1_000_000
 """Most messages of one kind that wait to be taken: after a start a thousand publishers send what they hold."""
 
-SLICE = 1_000
+PAYLOADS_AT_ONCE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
 
 
 async def serve_historian(settings: Settings) -> None:
     """Keep history until stopped; what has come until then is kept. A router that is away is waited for."""
-    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
-        store = stack.enter_context(open_store(settings.historian))
+    await run_until_stopped(_run(settings), "historian.run")
+
+
+async def _run(settings: Settings) -> None:
+    periods_s = settings.historian.commit_s, settings.historian.maintain_s, settings.health.period_s
+    with open_store(settings.historian) as store:
         historian = Historian(store, spool_rows=settings.historian.spool_rows)
-        stack.callback(_finish, historian)
-        running = asyncio.create_task(_run(settings, historian, stack), name="historian.run")
-        await until(stop, running)
+        try:
+            with await connect(settings) as bus:
+                await keep(bus, historian, *periods_s)
+        finally:
+            _finish(historian)
 
 
 def _finish(historian: Historian) -> None:
@@ -44,11 +49,6 @@ def _finish(historian: Historian) -> None:
             "%d samples and messages could not be kept and are lost, but for what their publishers still have",
             waiting,
         )
-
-
-async def _run(settings: Settings, historian: Historian, stack: contextlib.AsyncExitStack) -> None:
-    bus = stack.enter_context(await connect(settings))
-    await keep(bus, historian, settings.historian.commit_s, settings.historian.maintain_s, settings.health.period_s)
 
 
 async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: float, health_s: float) -> None:
@@ -67,18 +67,18 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
 
     async with asyncio.TaskGroup() as group:
         for kind, subscription in subscriptions.items():
-            group.create_task(_take(historian, kind, subscription), name=f"historian.{kind}")
+            group.create_task(_handle(historian, kind, subscription), name=f"historian.{kind}")
         group.create_task(_commit(historian, commit_s), name="historian.commit")
         group.create_task(_maintain(historian, maintain_s), name="historian.maintain")
         group.create_task(_answer(historian, questions), name="historian.answer")
         group.create_task(report_health(bus, SITE, "historian", health_s, figures), name="historian.health")
 
 
-async def _take(historian: Historian, kind: PayloadKind, subscription: Subscription[bytes]) -> None:
+async def _handle(historian: Historian, kind: PayloadKind, subscription: Subscription[bytes]) -> None:
     while True:
         for number, payload in enumerate(await subscription.receive(), start=1):
-            historian.take(kind, payload)
-            if number % SLICE == 0:
+            historian.handle(kind, payload)
+            if number % PAYLOADS_AT_ONCE == 0:
                 await asyncio.sleep(0)
 
 

@@ -65,9 +65,9 @@ class Samples:
             return self
         order = np.lexsort((np.arange(len(self)), self.seq, self.time_ns))
         is_new = np.r_[True, _follows(self.time_ns[order], self.seq[order])] if len(self) else order > 0
-        return self.take(order[is_new])
+        return self.select(order[is_new])
 
-    def take(self, rows: npt.NDArray[np.intp] | Flags | slice) -> "Samples":
+    def select(self, rows: npt.NDArray[np.intp] | Flags | slice) -> "Samples":
         """Some of the rows."""
         return Samples(
             time_ns=self.time_ns[rows], seq=self.seq[rows], quality=self.quality[rows], values=self.values[rows]
@@ -76,7 +76,7 @@ class Samples:
     def between(self, start_ns: int, end_ns: int) -> "Samples":
         """Those from `start_ns` until before `end_ns`."""
         first, last = np.searchsorted(self.time_ns, [start_ns, end_ns])
-        return self.take(slice(first, last))
+        return self.select(slice(first, last))
 
     def padded(self, pumps: int) -> Floats:
         """(n, 2 + 5 pumps) values with room for more pumps."""

@@ -32,7 +32,7 @@ PayloadKind = Literal["samples", "blocks", "verdicts", "alarms"]
 class Historian:
     """Takes what the bus says, and keeps it in a store.
 
-    What `take` has got waits in memory. `commit` gives it to the store; what it returns as committed is acknowledged:
+    What was handled waits in memory. `commit` gives it to the store; what it returns as committed is acknowledged:
     it survives a crash. While the store refuses, up to `spool_rows` wait; then the oldest are given up and counted as
     `lost`. All is counted in samples, verdicts and alarms, whether samples come alone or in blocks.
 
@@ -44,7 +44,7 @@ class Historian:
 
     Notes
     -----
-    `take` may be called from one thread, the others from any.
+    `handle` may be called from one thread, the others from any.
     """
 
     def __init__(self, store: Store, *, spool_rows: int = 500_000) -> None:
@@ -59,8 +59,8 @@ class Historian:
         self._is_failing = False
         self._commits = threading.Lock()
 
-    def take(self, kind: PayloadKind, payload: bytes) -> None:
-        """Take one payload; what is not of its kind is counted as `malformed` and left out."""
+    def handle(self, kind: PayloadKind, payload: bytes) -> None:
+        """Handle one payload; what is not of its kind is counted as `malformed` and left out."""
         try:
             rows = _rows(kind, payload)
         except MessageError as error:
@@ -80,7 +80,7 @@ class Historian:
 
     def _commit(self, now_ns: int) -> int:
         acknowledged = 0
-        while rows := self._spool.take(MAX_BATCH):
+        while rows := self._spool.pop(MAX_BATCH):
             batch = Batch(
                 samples=[row for row in rows if isinstance(row, SampleRow)],
                 events=[row for row in rows if isinstance(row, EventRow)],

@@ -41,7 +41,7 @@ class Spool:
             self._rows.extendleft(reversed(rows))
             self._grow(rows)
 
-    def take(self, most: int) -> list[Row]:
+    def pop(self, most: int) -> list[Row]:
         """The oldest rows, until they are so many samples, verdicts and alarms or a row more; empty if none wait."""
         rows: list[Row] = []
         taken = 0

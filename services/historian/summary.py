@@ -95,7 +95,7 @@ class Summary:
             high=np.fmax.reduceat(self.high, firsts),
         )
 
-    def take(self, rows: npt.NDArray[np.intp] | Flags) -> "Summary":
+    def select(self, rows: npt.NDArray[np.intp] | Flags) -> "Summary":
         """Some of the spans."""
         return Summary(
             time_ns=self.time_ns[rows],
@@ -107,7 +107,7 @@ class Summary:
 
     def between(self, start_ns: int, end_ns: int) -> "Summary":
         """Those that begin from `start_ns` until before `end_ns`."""
-        return self.take((self.time_ns >= start_ns) & (self.time_ns < end_ns))
+        return self.select((self.time_ns >= start_ns) & (self.time_ns < end_ns))
 
     def columns(self) -> dict[str, Floats]:
         """Columns by name: `level_m`, `level_m_min`, `level_m_max`, and so on."""
@@ -146,4 +146,4 @@ def fuller(earlier: Summary, later: Summary) -> Summary:
     both = joined([later, earlier])
     order = np.lexsort((np.arange(len(both)), -both.count.sum(axis=1), both.time_ns))
     is_first = np.r_[True, np.diff(both.time_ns[order]) > 0]
-    return both.take(order[is_first])
+    return both.select(order[is_first])

@@ -32,7 +32,7 @@ def export_recording(store: Store, station: str, start_ns: int, end_ns: int, pat
     with recording_writer(path) as write:
         for block in blocks(store, station, start_ns, end_ns):
             is_first = np.r_[True, np.diff(block.time_ns) > 0]
-            write(block.take(is_first).recording(pumps))
+            write(block.select(is_first).recording(pumps))
             rows += int(is_first.sum())
     return rows
 
@@ -59,5 +59,5 @@ def import_recording(store: Store, station: str, path: Path) -> tuple[int, int]:
     for day_ns in np.unique(samples.time_ns // DAY_NS * DAY_NS).tolist():
         day = samples.between(day_ns, day_ns + DAY_NS)
         known = store.samples(station, day_ns, day_ns + DAY_NS)
-        new += store.write(Batch(samples=day.take(~np.isin(day.time_ns, known.time_ns)).rows(station)))
+        new += store.write(Batch(samples=day.select(~np.isin(day.time_ns, known.time_ns)).rows(station)))
     return len(recording), new

@@ -1,14 +1,14 @@
 """The replay daemon: a recording on the bus as if it were live."""
 
 import asyncio
-import contextlib
 import logging
 
+from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.runtime.clock import tick_period_s
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.lifecycle import report_health, stop_event, ticks, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.sample_sender import SampleSender
 from wetwell.services.runtime.settings import Settings
 
@@ -20,17 +20,21 @@ MAX_STEP_S = 60.0
 
 async def serve_replay(settings: Settings, recording: Recording, station: str, speed: float) -> None:
     """Publish the rows of a recording in the rhythm of their time stamps, then return."""
-    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
-        running = asyncio.create_task(_run(settings, recording, station, speed, stack), name="replay.run")
-        await until(stop, running)
+    await run_until_stopped(_run(settings, recording, station, speed), "replay.run")
 
 
-async def _run(
-    settings: Settings, recording: Recording, station: str, speed: float, stack: contextlib.AsyncExitStack
+async def _run(settings: Settings, recording: Recording, station: str, speed: float) -> None:
+    with await connect(settings) as bus:
+        sender = SampleSender(bus, station, settings.zenoh.gather_s)
+        try:
+            await _publish(settings, bus, sender, recording, station, speed)
+        finally:
+            sender.flush()
+
+
+async def _publish(
+    settings: Settings, bus: Bus, sender: SampleSender, recording: Recording, station: str, speed: float
 ) -> None:
-    bus = stack.enter_context(await connect(settings))
-    sender = SampleSender(bus, station, settings.zenoh.gather_s)
-    stack.callback(sender.flush)
     published = 0
     health = asyncio.create_task(
         report_health(

@@ -54,6 +54,30 @@ def part_lines(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def effect_lines(table: Sequence[Mapping[str, Any]]) -> str:
+    """Effects for people: name, component and purpose, then one line a parameter.
+
+    Examples
+    --------
+    >>> print(effect_lines([{"name": "motor_slip", "component": "drive", "summary": "Motors slip.",
+    ...     "parameters": [{"name": "slip", "unit": "1", "low": 0.0, "high": 0.15, "neutral": 0.0}]}]))
+    motor_slip (drive)
+      Motors slip.
+      slip: 0 to 0.15 [1]
+    """
+    lines = []
+    for row in table:
+        lines += [f"{row['name']} ({row['component']})", f"  {row['summary']}"]
+        for parameter in row["parameters"]:
+            allowed = f"{parameter['low']:g} to {parameter['high']:g}" if "low" in parameter else "any"
+            allowed = ", ".join(parameter["choices"]) if "choices" in parameter else allowed
+            unit = f" [{parameter['unit']}]" if "unit" in parameter else ""
+            value = parameter.get("default")
+            default = "" if value is None else f", default {value if isinstance(value, str) else format(value, 'g')}"
+            lines.append(f"  {parameter['name']}: {allowed}{unit}{default}")
+    return "\n".join(lines)
+
+
 def _default(field: FieldInfo) -> Any:
     if field.is_required():
         return None

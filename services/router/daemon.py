@@ -1,12 +1,11 @@
 """The router daemon: the meeting point of the bus, for sites that run no router of their own."""
 
-import asyncio
 import logging
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.bus.zenoh.router_log import relay_router_log
 from wetwell.services.runtime.connection import listen
-from wetwell.services.runtime.lifecycle import report_health, stop_event, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -23,8 +22,10 @@ async def serve_router(settings: Settings) -> None:
         If the endpoint cannot be opened.
     """
     relay_router_log()
-    async with stop_event() as stop:
-        with listen(settings) as bus:
-            log.info("router on %s", settings.zenoh.endpoint)
-            health = report_health(bus, SITE, "router", settings.health.period_s, dict)
-            await until(stop, asyncio.create_task(health, name="router.health"))
+    await run_until_stopped(_run(settings), "router.run")
+
+
+async def _run(settings: Settings) -> None:
+    with listen(settings) as bus:
+        log.info("router on %s", settings.zenoh.endpoint)
+        await report_health(bus, SITE, "router", settings.health.period_s, dict)

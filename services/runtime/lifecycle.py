@@ -6,7 +6,8 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
+from typing import Any
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import alive_key, status_key
@@ -79,6 +80,12 @@ async def until(stop: asyncio.Event, task: asyncio.Task[None]) -> None:
         await asyncio.gather(waiting, task, return_exceptions=True)
     if not task.cancelled() and (error := task.exception()) is not None:
         raise error
+
+
+async def run_until_stopped(work: Coroutine[Any, Any, None], name: str) -> None:
+    """Do the work of a daemon until it is stopped or the work ends; cancelled, it may still save what it holds."""
+    async with stop_event() as stop:
+        await until(stop, asyncio.create_task(work, name=name))
 
 
 def _running() -> tuple[ServiceState, str]:

@@ -11,11 +11,10 @@ from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDic
 
 from wetwell.detector.verdict.maintenance import Costs
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.messages.alarm import Priority
+from wetwell.protocols.messages.alarm import Priority, RuleName
 from wetwell.protocols.modbus.registers import WordOrder
 from wetwell.protocols.modbus.write_permission import LOOPBACK_WRITES
 from wetwell.protocols.station.station_file import Finite, NonNegative, Positive, Table, load_toml
-from wetwell.services.alarms.rules import RuleName
 
 Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
 

@@ -14,7 +14,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.protocols.tls import server_context
 from wetwell.services.runtime.clock import due_seconds, tick_period_s
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.lifecycle import report_health, stop_event, ticks, until
+from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.sample_sender import SampleSender
 from wetwell.services.runtime.settings import ModbusSettings, Settings
 from wetwell.services.security.exposure import is_loopback
@@ -37,43 +37,30 @@ async def serve_simulator(
     LinkError
         If the Modbus port cannot be opened. A router that is away is waited for.
     """
-    async with stop_event() as stop, contextlib.AsyncExitStack() as stack:
-        sinks: list[Sink] = []
-        if modbus:
-            sinks.append(await _modbus_sink(settings, simulation, stack))
-        running = asyncio.create_task(
-            _run(settings, simulation, speed, sinks, stack, zenoh=zenoh), name="simulator.run"
-        )
-        await until(stop, running)
-        log.info("stopped after %d s of station '%s'", simulation.seconds, simulation.station.name)
+    await run_until_stopped(_run(settings, simulation, speed, zenoh=zenoh, modbus=modbus), "simulator.run")
+    log.info("stopped after %d s of station '%s'", simulation.seconds, simulation.station.name)
 
 
-async def _run(
-    settings: Settings,
-    simulation: Simulation,
-    speed: float,
-    sinks: list[Sink],
-    stack: contextlib.AsyncExitStack,
-    *,
-    zenoh: bool,
-) -> None:
-    async with asyncio.TaskGroup() as group:
-        if zenoh:
-            bus = stack.enter_context(await connect(settings))
-            sender = SampleSender(bus, simulation.station.name, settings.zenoh.gather_s)
-            stack.callback(sender.flush)
-            sinks.append(_zenoh_sink(sender, simulation))
-            group.create_task(
-                report_health(
-                    bus,
-                    simulation.station.name,
-                    "simulator",
-                    settings.health.period_s,
-                    lambda: {"seconds": float(simulation.seconds), "speed": speed},
-                ),
-                name="simulator.health",
-            )
-        group.create_task(_live(simulation, speed, sinks), name="simulator.live")
+async def _run(settings: Settings, simulation: Simulation, speed: float, *, zenoh: bool, modbus: bool) -> None:
+    async with contextlib.AsyncExitStack() as stack:
+        sinks = [await _modbus_sink(settings, simulation, stack)] if modbus else []
+        async with asyncio.TaskGroup() as group:
+            if zenoh:
+                bus = stack.enter_context(await connect(settings))
+                sender = SampleSender(bus, simulation.station.name, settings.zenoh.gather_s)
+                stack.callback(sender.flush)
+                sinks.append(_zenoh_sink(sender, simulation))
+                group.create_task(
+                    report_health(
+                        bus,
+                        simulation.station.name,
+                        "simulator",
+                        settings.health.period_s,
+                        lambda: {"seconds": float(simulation.seconds), "speed": speed},
+                    ),
+                    name="simulator.health",
+                )
+            group.create_task(_live(simulation, speed, sinks), name="simulator.live")
 
 
 async def _live(simulation: Simulation, speed: float, sinks: list[Sink]) -> None:

@@ -12,7 +12,7 @@ from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
 
-SCHEMA = "wetwell.trial/2"
+TRIAL_SCHEMA = "wetwell.trial/2"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
 REPLAY = (sys.executable, "-m", "wetwell.services", "gap", "replay")
 
@@ -53,7 +53,7 @@ class TrialPlan:
     def header(self) -> dict[str, Any]:
         """What decides which case k is, and who diagnoses it."""
         return {
-            "schema": SCHEMA,
+            "schema": TRIAL_SCHEMA,
             "version": version("wetwell"),
             "seed": self.seed,
             "kinds": list(self.kinds),

@@ -21,10 +21,10 @@ def write(folder: Path, first: int) -> None:
     for begin in itertools.count(first, 20):
         samples = [sample(number) for number in range(begin, begin + 20)]
         if begin % 40 == 0:
-            historian.take("blocks", SampleBlock.of(samples).encode())
+            historian.handle("blocks", SampleBlock.of(samples).encode())
         else:
             for each in samples:
-                historian.take("samples", each.encode())
+                historian.handle("samples", each.encode())
         historian.commit(samples[-1].time)
         sys.stdout.write(f"{begin + 20}\n")
         sys.stdout.flush()

@@ -37,7 +37,7 @@ def sample(number: int, step_ns: int = NS_PER_S) -> Sample:
 
 def take(historian: Historian, numbers: range, step_ns: int = NS_PER_S) -> None:
     for number in numbers:
-        historian.take("samples", sample(number, step_ns).encode())
+        historian.handle("samples", sample(number, step_ns).encode())
 
 
 def kept(store: Store) -> list[int]:

@@ -42,8 +42,8 @@ def test_every_count_of_detector_and_alarms_has_its_meaning():
 
 
 def test_every_figure_of_alarms_has_its_meaning():
-    keeper = AlarmService(None, AlarmSettings(), (), lambda: Now(0, 0.0))
-    assert set(keeper.figures()) | {"dropped"} <= set(METRICS)
+    service = AlarmService(None, AlarmSettings(), (), lambda: Now(0, 0.0))
+    assert set(service.figures()) | {"dropped"} <= set(METRICS)
     assert set(TARGETS) <= set(METRICS)
 
 

@@ -150,8 +150,7 @@ class Site:
         await gateway_daemon.poll_all(bus, plcs, health_s=60.0 * self.period_s, longest_wait_s=30.0)
 
     async def _detect(self, bus: SimulatedBus) -> None:
-        async with contextlib.AsyncExitStack() as stack:
-            await judge_all(self.settings, bus, self.stations, "detector", stack)
+        await judge_all(self.settings, bus, self.stations, "detector")
 
     async def _keep(self, bus: SimulatedBus) -> None:
         store = self.kept()
@@ -164,8 +163,8 @@ class Site:
             store.close()
 
     async def _alarm(self, bus: SimulatedBus) -> None:
-        keeper = AlarmService(bus, self.settings.alarms, self.stations, alarms_daemon.clocks)
-        await alarms_daemon.keep(bus, keeper, health_period_s=60.0 * self.period_s)
+        service = AlarmService(bus, self.settings.alarms, self.stations, alarms_daemon.clocks)
+        await alarms_daemon.keep(bus, service, health_period_s=60.0 * self.period_s)
 
     async def _observe(self, bus: SimulatedBus) -> None:
         samples = bus.collect([sample_key(station.name) for station in self.stations], capacity=1_000_000)

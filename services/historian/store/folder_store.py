@@ -12,7 +12,15 @@ from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store.archive import Archive, Form
 from wetwell.services.historian.store.file_query import summary_of_files
-from wetwell.services.historian.store.interface import DAY_NS, Batch, EventKind, StationSpan, StoreError, day_of
+from wetwell.services.historian.store.interface import (
+    DAY_NS,
+    Batch,
+    EventKind,
+    StationSpan,
+    StoreError,
+    day_of,
+    maintain_one,
+)
 from wetwell.services.historian.store.live_database import LiveDatabase
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
@@ -159,13 +167,7 @@ class FolderStore:
 
     def maintain(self, now_ns: int) -> str | None:
         """Turn one day into a file, or one old file into minutes, or delete one that is too old."""
-        for span in self.stations():
-            newest_ns = day_of(min(span.last_ns, now_ns))
-            for step in (self._roll, self._downsample, self._delete_old):
-                done = step(span.station, newest_ns)
-                if done is not None:
-                    return done
-        return None
+        return maintain_one(self.stations(), now_ns, (self._roll, self._downsample, self._delete_old))
 
     def figures(self) -> dict[str, float]:
         """Size of the database, and what is free on its disk."""

@@ -1,6 +1,7 @@
 """What a store of the historian is: it keeps batches whole, and gives back what it has kept."""
 
-from collections.abc import Iterator, Sequence
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
@@ -37,6 +38,11 @@ class EventRow(NamedTuple):
     def last_ns(self) -> int:
         """Its time."""
         return self.time_ns
+
+    @property
+    def digest(self) -> bytes:
+        """Tells it from others of the same time."""
+        return hashlib.blake2b(self.payload, digest_size=8).digest()
 
 
 @dataclass
@@ -109,6 +115,19 @@ def blocks(store: Store, station: str, start_ns: int, end_ns: int) -> Iterator[S
     """Samples from `start_ns` until before `end_ns`, day by day."""
     for day_ns in store.days_ns(station, start_ns, end_ns):
         yield store.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS))
+
+
+def maintain_one(
+    spans: Iterable[StationSpan], now_ns: int, steps: Sequence[Callable[[str, int], str | None]]
+) -> str | None:
+    """Take the first step that has something to do; it gets a station and the beginning of its newest day."""
+    for span in spans:
+        newest_ns = day_of(min(span.last_ns, now_ns))
+        for step in steps:
+            done = step(span.station, newest_ns)
+            if done is not None:
+                return done
+    return None
 
 
 def day_of(time_ns: int) -> int:

@@ -12,7 +12,7 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 from wetwell.protocols.errors import ConfigError
 from wetwell.services.historian.store.interface import StoreError
 
-CONNECT_S = 5
+POSTGRES_CONNECT_S = 5
 LOCK = 0x77657477656C6C
 """Advisory lock that the one historian holds: "wetwell" in ASCII."""
 
@@ -119,7 +119,7 @@ class PostgresConnection:
 
     def _connect(self) -> psycopg.Connection[Any]:
         password = None if self._password_file is None else self._password_file.read_text().strip()
-        return psycopg.connect(make_conninfo(self._url, password=password), connect_timeout=CONNECT_S)
+        return psycopg.connect(make_conninfo(self._url, password=password), connect_timeout=POSTGRES_CONNECT_S)
 
     def _connect_writer(self) -> psycopg.Connection[Any]:
         database = self._connect()

@@ -1,6 +1,5 @@
 """The store of a PostgreSQL database, in the schema `wetwell`; for people with SQL its view `wetwell.samples`."""
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,15 @@ from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.rows import HOUR_NS, unpack
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.float_arrays import COPY_END, COPY_HEADER, copy_rows, from_postgres
-from wetwell.services.historian.store.interface import DAY_NS, Batch, EventKind, StationSpan, day_of, span_of
+from wetwell.services.historian.store.interface import (
+    DAY_NS,
+    Batch,
+    EventKind,
+    StationSpan,
+    day_of,
+    maintain_one,
+    span_of,
+)
 from wetwell.services.historian.store.postgres_connection import PostgresConnection
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
@@ -70,10 +77,7 @@ class PostgresStore:
             events.executemany(
                 "INSERT INTO wetwell.event (kind, station, time_ns, digest, payload) VALUES (%s, %s, %s, %s, %s) "
                 "ON CONFLICT DO NOTHING",
-                [
-                    (row.kind, ids[row.station], row.time_ns, _digest(row.payload), row.payload.decode())
-                    for row in batch.events
-                ],
+                [(row.kind, ids[row.station], row.time_ns, row.digest, row.payload.decode()) for row in batch.events],
             )
             database.cursor().executemany(
                 "UPDATE wetwell.station SET first_ns = least(first_ns, %(first)s), "
@@ -149,7 +153,7 @@ class PostgresStore:
                 day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
             parts.append(day.over(start_ns, span_ns))
         minutes = self._minutes(station, start_ns, end_ns)
-        parts.append(minutes.take(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
+        parts.append(minutes.select(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
         return joined(parts).over(start_ns, span_ns)
 
     def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:
@@ -182,13 +186,7 @@ class PostgresStore:
 
     def maintain(self, now_ns: int) -> str | None:
         """Sum up one complete day, or turn one old day into minutes, or delete what is too old."""
-        for span in self.stations():
-            newest_ns = day_of(min(span.last_ns, now_ns))
-            for step in (self._sum_up, self._downsample, self._delete_old):
-                done = step(span.station, newest_ns)
-                if done is not None:
-                    return done
-        return None
+        return maintain_one(self.stations(), now_ns, (self._sum_up, self._downsample, self._delete_old))
 
     def figures(self) -> dict[str, float]:
         """Whether it is connected."""
@@ -278,7 +276,3 @@ def _copy(database: psycopg.Connection[Any], batch: Batch, ids: dict[str, int]) 
     return database.execute(
         "INSERT INTO wetwell.sample SELECT * FROM incoming ORDER BY station, time_ns, seq ON CONFLICT DO NOTHING"
     ).rowcount
-
-
-def _digest(payload: bytes) -> bytes:
-    return hashlib.blake2b(payload, digest_size=8).digest()

@@ -181,24 +181,24 @@ def test_foreign_and_malformed_blocks_are_counted_and_left_out(alpha, samples):
 
 def test_alarms_and_page_know_from_blocks_what_they_know_from_samples(alpha, samples):
     high = [sample.model_copy(update={"level_m": 9.0}) for sample in samples[:200]]
-    keepers, views = [], []
-    for kind in ("take_sample", "take_sample_block"):
+    services, views = [], []
+    for kind in ("handle_sample", "handle_sample_block"):
         with MemoryBus() as bus:
-            keeper = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
+            service = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
             view = SiteView(stale_s=10.0)
             view.advance(0.0)
-            size = 10 if kind == "take_sample_block" else 1
-            messages = payloads(high, 10) if kind == "take_sample_block" else [sample.encode() for sample in high]
+            size = 10 if kind == "handle_sample_block" else 1
+            messages = payloads(high, 10) if kind == "handle_sample_block" else [sample.encode() for sample in high]
             for number, payload in enumerate(messages, start=1):
-                getattr(keeper, kind)(payload)
+                getattr(service, kind)(payload)
                 getattr(view, kind)(payload)
                 for quarter in range(4 * size):
                     view.advance(number * size + quarter / 4.0)
-            keepers.append(keeper)
+            services.append(service)
             views.append(view)
-    for keeper in keepers:
-        assert keeper.figures()["samples"] == 200.0
-        assert keeper.book.is_wanted("alpha", "level_high")
+    for service in services:
+        assert service.figures()["samples"] == 200.0
+        assert service.registry.is_wanted("alpha", "level_high")
     assert views[0].stations["alpha"].sample == views[1].stations["alpha"].sample == replace_none(high[-1])
     single, gathered = (json.loads(view.station_state("alpha"))["rows"] for view in views)
     assert len(single) == 200

@@ -94,24 +94,24 @@ def daemons(alpha, tmp_path_factory):
     store = FolderStore(tmp_path_factory.mktemp("history"), keep_live_days=1)
     with MemoryBus() as bus:
         judge = StationDetector(bus, alpha)
-        keeper = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
-        yield judge, keeper, Historian(store)
+        service = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, 0.0))
+        yield judge, service, Historian(store)
     store.close()
 
 
 @settings(max_examples=EXAMPLES)
 @given(payload=PAYLOADS)
 def test_no_payload_brings_a_daemon_down(daemons, payload):
-    judge, keeper, historian = daemons
+    judge, service, historian = daemons
     judge.handle_payloads([payload])
     judge.handle_payloads([payload], SampleBlock)
     judge.handle_order(payload)
-    for take in (keeper.take_sample, keeper.take_sample_block, keeper.take_verdict, keeper.take_status):
+    for take in (service.handle_sample, service.handle_sample_block, service.handle_verdict, service.handle_status):
         take(payload)
     for kind in ("samples", "verdicts", "alarms"):
-        historian.take(kind, payload)
+        historian.handle(kind, payload)
     act = Asked(alarm_act_key("alpha"), payload)
-    keeper.take_act(act)
+    service.handle_act(act)
     assert json.loads(act.answer)["schema"] == "wetwell.alarm-answer/1"
     assert json.loads(historian.answer("alpha", payload))["schema"] == "wetwell.history/1"
     with contextlib.suppress(MessageError):
@@ -120,10 +120,10 @@ def test_no_payload_brings_a_daemon_down(daemons, payload):
 
 
 def test_after_all_of_them_good_samples_are_still_taken(daemons):
-    judge, keeper, historian = daemons
+    judge, service, historian = daemons
     before = judge.figures().get("samples", 0.0)
     judge.handle_payloads([VALID[0]])
-    keeper.take_sample(VALID[0])
-    historian.take("samples", VALID[0])
+    service.handle_sample(VALID[0])
+    historian.handle("samples", VALID[0])
     assert judge.figures()["samples"] == before + 1.0
     assert historian.commit(0) > 0

@@ -1,4 +1,4 @@
-"""The keeper of alarms on a bus: from samples, verdicts and silence to alarms, acts and restarts."""
+"""The service of alarms on a bus: from samples, verdicts and silence to alarms, acts and restarts."""
 
 import asyncio
 import json
@@ -23,7 +23,7 @@ START_NS = from_iso("2026-01-01T00:00:00Z")
 
 
 class Site:
-    """A keeper whose clocks stand where the test puts them; it can be killed."""
+    """A service whose clocks stand where the test puts them; it can be killed."""
 
     def __init__(self, folder=None, stations=(), **settings) -> None:
         self.bus = MemoryBus()
@@ -35,7 +35,7 @@ class Site:
         self.start()
 
     def start(self) -> None:
-        self.keeper = AlarmService(self.bus, self.settings, self.stations, self.now)
+        self.service = AlarmService(self.bus, self.settings, self.stations, self.now)
         self._listener = self.bus.subscribe(alarm_key("*"))
 
     def now(self) -> Now:
@@ -52,7 +52,7 @@ class Site:
             pumps=(PumpReading(),),
             quality=quality,
         )
-        self.keeper.take_sample(sample.encode())
+        self.service.handle_sample(sample.encode())
         return self.news()
 
     def verdict(self, state, at_s=None, pump=2, **evidence) -> list[tuple[str, str]]:
@@ -66,22 +66,22 @@ class Site:
             evidence=evidence,
             window=(time_ns, time_ns),
         )
-        self.keeper.take_verdict(verdict.encode())
+        self.service.handle_verdict(verdict.encode())
         return self.news()
 
     def look(self, after_s=0.0) -> list[tuple[str, str]]:
         self.wall_s += after_s
-        self.keeper.look()
+        self.service.look()
         return self.news()
 
     def act(self, act, alarm="pump2.pump_fault", **fields) -> AlarmAnswer:
         base = {"id": f"act-{self.wall_s}", "station": "alpha", "alarm": alarm, "act": act, "by": "ann"}
-        answer = self.keeper.carry_out(AlarmAct.model_validate(base | fields))
-        self.keeper.commit()
+        answer = self.service.carry_out(AlarmAct.model_validate(base | fields))
+        self.service.commit()
         return answer
 
     def news(self) -> list[tuple[str, str]]:
-        self.keeper.commit()
+        self.service.commit()
         self.told, mailbox = [], self._listener
         while mailbox._messages:
             self.told.append(Alarm.decode(mailbox._messages.popleft()))
@@ -99,7 +99,7 @@ class Site:
             )
             for second in range(round(self.wall_s) - size + 1, round(self.wall_s) + 1)
         ]
-        self.keeper.take_sample_block(SampleBlock.of(samples).encode())
+        self.service.handle_sample_block(SampleBlock.of(samples).encode())
 
 
 @pytest.mark.parametrize("size", [1, 10, 60])
@@ -112,8 +112,8 @@ def test_delays_are_as_long_with_gathered_samples_as_with_single_ones(size):
         if second % size == 0:
             site.block(size)
         if second == 60:
-            site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
-            site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
+            site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+            site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
         if second >= 120 and second % 60 == 0:  # on a run that ended within the last block
             news |= {name: site.wall_s for name, _ in site.verdict("pump_fault", at_s=second - 25.0)}
         news |= {name: site.wall_s for name, _ in site.look()}
@@ -160,14 +160,14 @@ def test_evidence_of_a_foreign_sender_is_no_reason_to_stop():
     site = Site()
     assert site.verdict("pump_fault", 1, severity=[1], advice={"a": 1}) == [("pump2.pump_fault", "unacknowledged")]
     for payload in (b"", b"{}", b"\xff", b'{"schema": "wetwell.sample/1"}'):
-        site.keeper.take_sample(payload)
-        site.keeper.take_verdict(payload)
-        site.keeper.take_status(payload)
+        site.service.handle_sample(payload)
+        site.service.handle_verdict(payload)
+        site.service.handle_status(payload)
     site.sample(station="../x")
-    site.keeper.take_presence(Presence("wetwell/**/alive/x", is_alive=True))
+    site.service.handle_presence(Presence("wetwell/**/alive/x", is_alive=True))
     site.sample(station="_site")
-    assert site.keeper.figures()["malformed"] == 12.0
-    assert site.keeper.figures()["foreign"] == 3.0
+    assert site.service.figures()["malformed"] == 12.0
+    assert site.service.figures()["foreign"] == 3.0
 
 
 def test_the_last_year_of_time_stamps_is_no_reason_to_stop():
@@ -210,24 +210,24 @@ def test_a_delay_of_verdicts_runs_on_with_the_samples():
     assert site.verdict("pump_fault", 1) == []
     told = [news for at_s in range(2, 200) for news in site.sample(at_s=at_s)]
     assert told == [("pump2.pump_fault", "unacknowledged")]
-    assert site.keeper.book.entries["alpha", "pump2.pump_fault"].standing.raised_ns == START_NS + 121 * NS_PER_S
+    assert site.service.registry.records["alpha", "pump2.pump_fault"].status.raised_ns == START_NS + 121 * NS_PER_S
 
 
 def test_silence_is_told_and_an_end_of_it(alpha):
     site = Site(stations=[alpha])
-    site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
-    site.keeper.take_presence(Presence(alive_key("_site", "historian"), is_alive=True))
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+    site.service.handle_presence(Presence(alive_key("_site", "historian"), is_alive=True))
     assert site.look(60) == []
     assert site.look(1) == [("samples_stale", "unacknowledged")]
     assert site.told[0].text == "no samples for 61 s"
     site.sample()
     assert site.look() == [("samples_stale", "returned")]
-    site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
-    site.keeper.take_presence(Presence(alive_key("_site", "historian"), is_alive=False))
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
+    site.service.handle_presence(Presence(alive_key("_site", "historian"), is_alive=False))
     assert site.look(30) == []
     assert site.look(1) == [("detector_silent", "unacknowledged"), ("historian_silent", "unacknowledged")]
     assert [alarm.station for alarm in site.told] == ["alpha", "_site"]
-    site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
     assert site.look(1) == [("detector_silent", "returned")]
 
 
@@ -238,7 +238,7 @@ def test_a_stopped_plc_is_told_from_the_figures_of_the_gateway():
     def status(at_s, state="running", **figures):
         site.wall_s = at_s
         message = Status(time=0, station="alpha", service="gateway", state=state, figures=figures)
-        site.keeper.take_status(message.encode())
+        site.service.handle_status(message.encode())
         return site.news()
 
     assert status(1, heartbeat_age_s=29.0) == []
@@ -253,16 +253,16 @@ def test_a_stopped_plc_is_told_from_the_figures_of_the_gateway():
 def test_without_a_router_nobody_else_is_blamed():
     site = Site()
     site.sample()
-    site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
     type(site.bus).is_connected, before = property(lambda _: False), MemoryBus.__dict__["is_connected"]
     try:
         site.look()
-        site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
+        site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=False))
         assert site.look(600) == [("bus_lost", "unacknowledged")]
     finally:
         type(site.bus).is_connected = before
     assert site.look(1) == [("bus_lost", "returned")]
-    site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
     assert site.look(59) == []
 
 
@@ -270,7 +270,7 @@ def test_a_clock_of_the_day_that_is_set_raises_nothing():
     site = Site()
     site.sample()
     site.now = lambda: Now(START_NS + 3600 * NS_PER_S, 1.0)
-    site.keeper._now = site.now
+    site.service._now = site.now
     assert site.look() == []
 
 
@@ -331,7 +331,7 @@ def test_a_restart_raises_nothing_again_and_forgets_no_act(tmp_path):
     done = site.act("acknowledge", id="one")
     site.news()
     site.start()  # as after kill -9: nothing was saved since
-    assert {alarm.id: alarm.state for alarm in site.keeper.book.alarms()} == {
+    assert {alarm.id: alarm.state for alarm in site.service.registry.alarms()} == {
         "pump2.pump_fault": "acknowledged",
         "level_high": "unacknowledged",
     }
@@ -346,8 +346,8 @@ def test_a_restart_raises_nothing_again_and_forgets_no_act(tmp_path):
 def test_a_detector_that_does_not_come_back_with_us_is_missed(tmp_path):
     site = Site(tmp_path)
     site.sample()
-    site.keeper.take_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
-    site.keeper.save()
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+    site.service.save()
     site.start()
     assert site.look(30) == []
     assert ("detector_silent", "unacknowledged") in site.look(1)
@@ -360,7 +360,7 @@ def test_a_damaged_state_is_put_aside_and_told(damage, tmp_path, caplog):
     file = tmp_path / "alarms.json"
     file.write_text(damage(file.read_text()))
     site.start()
-    assert site.keeper.book.alarms() == []
+    assert site.service.registry.alarms() == []
     assert "kept as alarms.refused, the alarms begin anew" in caplog.text
     assert [path.name for path in tmp_path.iterdir()] == ["alarms.refused"]
 
@@ -369,11 +369,11 @@ def test_a_disk_that_refuses_is_told_and_the_alarm_is_shown_all_the_same(tmp_pat
     site = Site(tmp_path / "state")
     (tmp_path / "state").rmdir()
     assert site.verdict("pump_fault", 1) == [("pump2.pump_fault", "unacknowledged")]
-    assert site.keeper.figures()["disk_errors"] == 1.0
+    assert site.service.figures()["disk_errors"] == 1.0
     assert "alarms go on without" in caplog.text
     (tmp_path / "state").mkdir()
     site.verdict("normal", 2)
-    assert site.keeper.figures()["disk_errors"] == 0.0
+    assert site.service.figures()["disk_errors"] == 0.0
 
 
 def test_chattering_and_stale_alarms_are_on_their_lists():
@@ -381,16 +381,16 @@ def test_chattering_and_stale_alarms_are_on_their_lists():
     for number in range(12):
         site.verdict("pump_fault" if number % 2 == 0 else "normal", 60 * number)
     site.sample(at_s=60 * 12)
-    (chattering,) = site.keeper.report().chattering
+    (chattering,) = site.service.report().chattering
     assert (chattering.alarm, chattering.transitions) == ("pump2.pump_fault", 12)
     site.verdict("system_fault", 800, pump=1)
     site.sample(at_s=800 + 86_400)
-    assert site.keeper.report().stale == ()
+    assert site.service.report().stale == ()
     site.sample(at_s=801 + 86_400)
-    (stale,) = site.keeper.report().stale
+    (stale,) = site.service.report().stale
     assert (stale.alarm, stale.raised) == ("pump1.system_fault", START_NS + 800 * NS_PER_S)
-    assert site.keeper.report().chattering == ()
-    assert site.keeper.report().rates["alarms_day"] == 7.0
+    assert site.service.report().chattering == ()
+    assert site.service.report().rates["alarms_day"] == 7.0
 
 
 @dataclass
@@ -409,10 +409,10 @@ def test_an_act_is_refused_on_the_key_of_another_station():
     act = new_act("alpha", "pump2.pump_fault", "acknowledge", "ann", None, "")
     for key, done in (("wetwell/beta/alarm-act", False), (alarm_act_key("alpha"), True)):
         question = Question(key, act.encode())
-        site.keeper.take_act(question)
+        site.service.handle_act(question)
         assert question.answer.is_done is done
     nonsense = Question(alarm_act_key("alpha"), b"{}")
-    site.keeper.take_act(nonsense)
+    site.service.handle_act(nonsense)
     assert "missing" in nonsense.answer.reason
 
 
@@ -420,8 +420,8 @@ def test_over_a_bus_alarms_are_listed_acted_on_and_reported():
     async def day() -> None:
         with MemoryBus() as bus:
             loop = asyncio.get_running_loop()
-            keeper = AlarmService(bus, AlarmSettings(), (), lambda: Now(START_NS, loop.time()))
-            running = asyncio.create_task(keep(bus, keeper, 10.0))
+            service = AlarmService(bus, AlarmSettings(), (), lambda: Now(START_NS, loop.time()))
+            running = asyncio.create_task(keep(bus, service, 10.0))
             await asyncio.sleep(0)
             verdict = Verdict(
                 time=1, station="alpha", pump=1, state="system_fault", probability={}, evidence={}, window=(0, 1)
@@ -452,15 +452,15 @@ def test_over_a_bus_samples_come_gathered_too_those_that_were_sent_before_and_th
         with MemoryBus() as bus:
             publisher = bus.publisher(sample_block_key("alpha"), history=10)
             publisher.put(block(0, 1.0))
-            keeper = AlarmService(bus, AlarmSettings(high_level_m=2.0), (), lambda: Now(START_NS, 0.0))
-            running = asyncio.create_task(keep(bus, keeper, 10.0))
+            service = AlarmService(bus, AlarmSettings(high_level_m=2.0), (), lambda: Now(START_NS, 0.0))
+            running = asyncio.create_task(keep(bus, service, 10.0))
             await asyncio.sleep(0.01)
-            assert keeper.figures()["samples"] == 10.0
+            assert service.figures()["samples"] == 10.0
             assert await list_alarms(bus) == []
             for first in range(10, 200, 10):
                 publisher.put(block(first, 9.0))
             await asyncio.sleep(0.01)
-            assert keeper.figures()["samples"] == 200.0
+            assert service.figures()["samples"] == 200.0
             assert [alarm.id for alarm in await list_alarms(bus)] == ["level_high"]
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)

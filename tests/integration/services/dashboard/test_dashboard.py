@@ -28,17 +28,17 @@ from wetwell.services.security.tokens import new_token
 PAGE = "http://127.0.0.1:8080"
 
 
-def client_of(desk):
-    return httpx.AsyncClient(transport=httpx.ASGITransport(dashboard_app(desk)), base_url=PAGE)
+def client_of(app_state):
+    return httpx.AsyncClient(transport=httpx.ASGITransport(dashboard_app(app_state)), base_url=PAGE)
 
 
-def desk_with(bus=None, reports=None):
+def app_state_with(bus=None, reports=None):
     return AppState(SiteView(10.0), EventStreams(), reports, bus)
 
 
-def get(path, desk=None, **headers):
+def get(path, app_state=None, **headers):
     async def run():
-        async with client_of(desk or desk_with()) as client:
+        async with client_of(app_state or app_state_with()) as client:
             return await client.get(path, headers=headers)
 
     return asyncio.run(run())
@@ -64,7 +64,7 @@ def test_every_page_is_the_shell_without_inline_script_and_under_a_strict_policy
 
 def test_all_files_that_the_shell_names_are_there_and_kept_for_ever() -> None:
     async def run():
-        async with client_of(desk_with()) as client:
+        async with client_of(app_state_with()) as client:
             shell = (await client.get("/")).text
             names = {part.split('"')[0] for part in shell.split('="') if part.startswith("/static/")}
             assert len(names) > 20
@@ -99,9 +99,9 @@ def test_names_of_this_machine_are_heard(host) -> None:
     assert get("/api/stations", host=host).status_code == 200
 
 
-def acting(desk, body, **headers):
+def acting(app_state, body, **headers):
     async def run():
-        async with client_of(desk) as client:
+        async with client_of(app_state) as client:
             kind = {"content-type": "application/json"}
             return await client.post("/api/stations/alpha/alarm-act", content=body, headers=kind | headers)
 
@@ -122,7 +122,7 @@ ACT = AlarmAct(id="1", station="alpha", alarm="pump1.pump_fault", act="acknowled
     ],
 )
 def test_an_act_that_a_foreign_page_sends_is_refused(headers, status) -> None:
-    assert acting(desk_with(MemoryBus()), ACT.encode(), **headers).status_code == status
+    assert acting(app_state_with(MemoryBus()), ACT.encode(), **headers).status_code == status
 
 
 @pytest.mark.parametrize(
@@ -136,18 +136,18 @@ def test_an_act_that_a_foreign_page_sends_is_refused(headers, status) -> None:
     ],
 )
 def test_what_is_no_act_is_told(body, rule) -> None:
-    answer = acting(desk_with(MemoryBus()), body)
+    answer = acting(app_state_with(MemoryBus()), body)
     assert answer.status_code == 400
     assert rule.lower() in answer.json()["error"].lower()
 
 
 def test_without_a_bus_or_an_answer_that_is_told(monkeypatch) -> None:
-    assert acting(desk_with(), ACT.encode()).status_code == 503
+    assert acting(app_state_with(), ACT.encode()).status_code == 503
     monkeypatch.setattr("wetwell.services.dashboard.client.ANSWER_S", 0.01)
-    silent = acting(desk_with(MemoryBus()), ACT.encode())
+    silent = acting(app_state_with(MemoryBus()), ACT.encode())
     assert (silent.status_code, silent.json()["error"]) == (504, "the alarm service does not answer")
     span = "kind=samples&start=2025-01-01&end=2025-01-02"
-    past = get(f"/api/stations/alpha/history?{span}", desk_with(MemoryBus()))
+    past = get(f"/api/stations/alpha/history?{span}", app_state_with(MemoryBus()))
     assert past.json()["error"] == "the historian does not answer"
 
 
@@ -187,7 +187,7 @@ def test_an_act_goes_to_the_alarm_service_and_its_answer_comes_back() -> None:
 
     async def run():
         bus = MemoryBus()
-        async with answering(bus, alarm_act_key("alpha"), answer), client_of(desk_with(bus)) as client:
+        async with answering(bus, alarm_act_key("alpha"), answer), client_of(app_state_with(bus)) as client:
             kind = {"content-type": "application/json", "origin": PAGE}
             return await client.post("/api/stations/alpha/alarm-act", content=ACT.encode(), headers=kind)
 
@@ -200,7 +200,7 @@ def test_an_act_goes_to_the_alarm_service_and_its_answer_comes_back() -> None:
     "query", ["", "kind=nothing&start=2025-01-01&end=2025-01-02", "kind=kpi&start=2025-01-02&end=x"]
 )
 def test_what_is_no_question_to_the_historian_is_told(query) -> None:
-    answer = get(f"/api/stations/alpha/history?{query}", desk_with(MemoryBus()))
+    answer = get(f"/api/stations/alpha/history?{query}", app_state_with(MemoryBus()))
     assert answer.status_code == 400
     assert answer.json()["error"]
 
@@ -228,7 +228,7 @@ def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkey
 
     async def run():
         bus = MemoryBus()
-        async with answering(bus, history_key("*"), answer), client_of(desk_with(bus)) as client:
+        async with answering(bus, history_key("*"), answer), client_of(app_state_with(bus)) as client:
             span = {"start": "1970-01-01T00:00:00Z", "end": "1970-01-02T00:00:00Z"}
             whole = await client.get("/api/stations/alpha/recording.csv", params=span)
             late = {"start": "1980-01-01T00:00:00Z", "end": "1980-01-02T00:00:00Z"}
@@ -254,29 +254,29 @@ def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_pa
     (folder / "gap" / "report.html").write_text("<p>gap</p>")
     (tmp_path / "secret.html").write_text("secret")
     (folder / "link.html").symlink_to(tmp_path / "secret.html")
-    desk = desk_with(reports=folder)
-    assert [report["name"] for report in get("/api/reports", desk).json()["reports"]] == ["gap/report.html"]
-    page = get("/reports/gap/report.html", desk)
+    app_state = app_state_with(reports=folder)
+    assert [report["name"] for report in get("/api/reports", app_state).json()["reports"]] == ["gap/report.html"]
+    page = get("/reports/gap/report.html", app_state)
     assert page.text == "<p>gap</p>"
     assert "script-src" not in page.headers["content-security-policy"]
     assert "sandbox" in page.headers["content-security-policy"]
     for name in ("../secret.html", "%2e%2e/secret.html", "link.html", "gap", "none.html"):
-        assert get(f"/reports/{name}", desk).status_code == 404, name
+        assert get(f"/reports/{name}", app_state).status_code == 404, name
     assert get("/api/reports").json()["reason"] == "the setting dashboard.reports names no folder of HTML reports"
 
 
 def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_server() -> None:
     async def run():
         bus = MemoryBus()
-        desk = desk_with(bus)
+        app_state = app_state_with(bus)
         listener = open_socket("127.0.0.1", 0)
         address = f"http://127.0.0.1:{listener.getsockname()[1]}"
         events = []
         async with (
             httpx.AsyncClient(base_url=address, timeout=10) as client,
-            web_server(dashboard_app(desk), listener, desk.hub),
+            web_server(dashboard_app(app_state), listener, app_state.streams),
         ):
-            feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+            feeding = asyncio.create_task(Feed(bus, app_state.view, app_state.streams).run())
             publisher = bus.publisher(sample_key("alpha"))
             async with client.stream("GET", "/events", params={"station": "alpha"}) as stream:
                 assert stream.headers["content-type"].startswith("text/event-stream")
@@ -286,7 +286,7 @@ def test_samples_come_from_the_bus_to_the_browser_and_all_streams_end_with_the_s
                 async for line in lines:
                     if line.startswith('data: {"id"'):
                         events.append(json.loads(line.removeprefix("data: ")))
-                        desk.hub.close()
+                        app_state.streams.close()
             state = (await client.get("/api/stations/alpha")).json()
             feeding.cancel()
         return events, state
@@ -315,15 +315,15 @@ def test_stations_that_have_spoken_before_are_there_at_once_single_and_gathered(
         gathered = SampleBlock.of([a_sample(second, "beta") for second in range(200)]).encode()
         beta = bus.publisher(sample_block_key("beta"))
         beta.put(gathered)
-        desk = desk_with(bus)
-        feed = Feed(bus, desk.view, desk.hub)
+        app_state = app_state_with(bus)
+        feed = Feed(bus, app_state.view, app_state.streams)
         beta.put(gathered)  # while the feed begins: it comes as an answer, too
         feeding = asyncio.create_task(feed.run())
         async with asyncio.timeout(5.0):
-            while desk.view.frame_id < 2:  # noqa: ASYNC110 - nothing else tells it
+            while app_state.view.frame_id < 2:  # noqa: ASYNC110 - nothing else tells it
                 await asyncio.sleep(0.01)
         feeding.cancel()
-        return {name: [row[0] for row in rows_of(desk, name)] for name in ("alpha", "beta")}
+        return {name: [row[0] for row in rows_of(app_state, name)] for name in ("alpha", "beta")}
 
     assert asyncio.run(run()) == {"alpha": [7000], "beta": [1000 * second for second in range(200)]}
 
@@ -341,23 +341,23 @@ def past_of(payload):
 
 @contextlib.asynccontextmanager
 async def looked_at(bus, monkeypatch):
-    """A desk that hears station alpha since second 2000 and beta, with a page that is open on alpha."""
+    """The state of an app that hears station alpha since second 2000 and beta, with a page that is open on alpha."""
     monkeypatch.setattr("wetwell.services.dashboard.backfill.SETTLED_S", 0.0)
-    desk = desk_with(bus)
+    app_state = app_state_with(bus)
     publishers = {name: bus.publisher(sample_key(name)) for name in ("alpha", "beta")}
-    events = desk.hub.listen("alpha")
-    feeding = asyncio.create_task(Feed(bus, desk.view, desk.hub).run())
+    events = app_state.streams.listen("alpha")
+    feeding = asyncio.create_task(Feed(bus, app_state.view, app_state.streams).run())
     assert b"resync" in await anext(events)
     for name, publisher in publishers.items():
         publisher.put(a_sample(2000, name).encode())
     try:
-        yield desk, publishers["alpha"], events
+        yield app_state, publishers["alpha"], events
     finally:
         feeding.cancel()
 
 
-def rows_of(desk, station="alpha"):
-    return json.loads(desk.view.station_state(station))["rows"]
+def rows_of(app_state, station="alpha"):
+    return json.loads(app_state.view.station_state(station))["rows"]
 
 
 def test_charts_of_a_station_that_is_looked_at_begin_with_what_the_historian_has(monkeypatch) -> None:
@@ -369,13 +369,16 @@ def test_charts_of_a_station_that_is_looked_at_begin_with_what_the_historian_has
             questions.append(payload)
             return past_of(payload)
 
-        async with answering(bus, history_key("*"), answer), looked_at(bus, monkeypatch) as (desk, alpha, events):
+        async with (
+            answering(bus, history_key("*"), answer),
+            looked_at(bus, monkeypatch) as (app_state, alpha, events),
+        ):
             async for event in events:
                 if b"resync" in event:  # open pages are told to ask for the whole state
                     break
             alpha.put(a_sample(2001).encode())
-            await until(lambda: rows_of(desk)[-1][0] == 2_001_000)
-            return rows_of(desk), rows_of(desk, "beta"), questions
+            await until(lambda: rows_of(app_state)[-1][0] == 2_001_000)
+            return rows_of(app_state), rows_of(app_state, "beta"), questions
 
     rows, unseen, questions = asyncio.run(run())
     assert len(rows) == ROWS[0][1]
@@ -402,13 +405,13 @@ def test_charts_begin_with_what_comes_where_no_historian_tells_more_and_ask_agai
         async with contextlib.AsyncExitStack() as stack:
             if answer is not None:
                 await stack.enter_async_context(answering(bus, history_key("*"), refuse))
-            desk, alpha, _ = await stack.enter_async_context(looked_at(bus, monkeypatch))
-            await until(lambda: len(rows_of(desk)) == 1 and (answer is None or asked))
+            app_state, alpha, _ = await stack.enter_async_context(looked_at(bus, monkeypatch))
+            await until(lambda: len(rows_of(app_state)) == 1 and (answer is None or asked))
             alpha.put(a_sample(2001).encode())
-            await until(lambda: len(rows_of(desk)) == 2)
+            await until(lambda: len(rows_of(app_state)) == 2)
             async with answering(bus, history_key("*"), past_of) if answer is None else contextlib.nullcontext():
-                await until(lambda: len(asked) == 2 or len(rows_of(desk)) > 2)
-            return rows_of(desk)
+                await until(lambda: len(asked) == 2 or len(rows_of(app_state)) > 2)
+            return rows_of(app_state)
 
     rows = asyncio.run(run())
     assert len(rows) == (ROWS[0][1] if answer is None else 2)
@@ -417,15 +420,15 @@ def test_charts_begin_with_what_comes_where_no_historian_tells_more_and_ask_agai
 def test_a_station_in_a_time_that_nobody_keeps_harms_nothing(monkeypatch) -> None:
     async def run():
         bus = MemoryBus()
-        async with looked_at(bus, monkeypatch) as (desk, alpha, _):
+        async with looked_at(bus, monkeypatch) as (app_state, alpha, _):
             early = a_sample(0, "gamma").model_copy(update={"time": -MAX_STAMP_NS})
             bus.publisher(sample_key("gamma")).put(early.encode())
-            gamma = desk.hub.listen("gamma")
+            gamma = app_state.streams.listen("gamma")
             await anext(gamma)
             assert b'"rows"' in await anext(gamma)
             alpha.put(a_sample(2001).encode())
-            await until(lambda: len(rows_of(desk)) == 2)  # the feed goes on
-            return rows_of(desk, "gamma")
+            await until(lambda: len(rows_of(app_state)) == 2)  # the feed goes on
+            return rows_of(app_state, "gamma")
 
     assert len(asyncio.run(run())) == 1
 
@@ -449,7 +452,7 @@ def test_200_open_pages_all_get_each_frame() -> None:
                         return
 
     async def run():
-        desk = desk_with(MemoryBus())
+        app_state = app_state_with(MemoryBus())
         listener = open_socket("127.0.0.1", 0)
         address = f"http://127.0.0.1:{listener.getsockname()[1]}"
         got = [[] for _ in range(pages)]
@@ -457,15 +460,15 @@ def test_200_open_pages_all_get_each_frame() -> None:
         loop = asyncio.get_running_loop()
         async with (
             httpx.AsyncClient(base_url=address, timeout=30, limits=limits) as client,
-            web_server(dashboard_app(desk), listener, desk.hub),
+            web_server(dashboard_app(app_state), listener, app_state.streams),
             asyncio.TaskGroup() as group,
         ):
             for numbers in got:
                 group.create_task(look(client, numbers))
-            await until(lambda: desk.hub.clients == pages)
+            await until(lambda: app_state.streams.clients == pages)
             for number in range(1, frames + 1):
-                desk.view.take_sample(a_sample(number).encode())
-                desk.hub.send("alpha", desk.view.advance(loop.time())["alpha"])
+                app_state.view.handle_sample(a_sample(number).encode())
+                app_state.streams.send("alpha", app_state.view.advance(loop.time())["alpha"])
         return got
 
     assert asyncio.run(run()) == [[1, 2, 3, 4]] * pages
@@ -480,7 +483,7 @@ def tokens(tmp_path_factory):
 
 @contextlib.asynccontextmanager
 async def guarded(file, bus=None):
-    app = dashboard_app(desk_with(bus), file, is_local=False)
+    app = dashboard_app(app_state_with(bus), file, is_local=False)
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="https://site.example") as client:
         yield client
 

@@ -100,7 +100,7 @@ def test_an_order_that_was_answered_is_known_after_a_kill(alpha, payloads, tmp_p
     async def orders_before_and_after_a_kill() -> tuple[Verdict, Verdict, int]:
         with MemoryBus() as bus:
             first = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
-            await first.handle_missed(Sample.decode(payload) for payload in payloads)
+            await first.judge_in_turns(Sample.decode(payload) for payload in payloads)
             obeying = asyncio.create_task(Intake(bus, [first]).run())
             answer = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()

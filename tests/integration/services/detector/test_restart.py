@@ -65,7 +65,7 @@ def source(bus: MemoryBus, historian: Historian, samples: list[Sample], gather: 
             return
         gathered = samples[number // gather * gather : number + 1]
         payload = gathered[0].encode() if gather == 1 else SampleBlock.of(gathered).encode()
-        historian.take("samples" if gather == 1 else "blocks", payload)
+        historian.handle("samples" if gather == 1 else "blocks", payload)
         publisher.put(payload)
 
     return send

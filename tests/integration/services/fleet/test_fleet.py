@@ -95,7 +95,7 @@ async def judged_and_wanted(tmp_path: Path) -> tuple[Verdicts, Verdicts]:
                 for name in NAMES:
                     for sample in samples[name][first : first + PART]:
                         payload = sample.encode()
-                        historian.take("samples", payload)
+                        historian.handle("samples", payload)
                         publishers[name].put(payload)
                 if first == 3 * 3600:
                     workers = await client.run(os.getpid)

@@ -81,10 +81,10 @@ def filled(store: Store, days: int = 4) -> Historian:
     historian = Historian(store)
     made = samples(days)
     for sample in (*made[::-1], *made[:5]):
-        historian.take("samples", sample.encode())
+        historian.handle("samples", sample.encode())
     for day in range(days):
-        historian.take("verdicts", verdict(day).encode())
-        historian.take("verdicts", verdict(day).encode())
+        historian.handle("verdicts", verdict(day).encode())
+        historian.handle("verdicts", verdict(day).encode())
     assert historian.commit(NOW_NS) == len(made) + 5 + 2 * days
     assert historian.figures(NOW_NS)["doubled"] == 5.0 + days
     return historian
@@ -155,11 +155,11 @@ def test_late_samples_join_their_day_and_its_figures(name: str, make_store: Call
     store = make_store(name)
     historian = Historian(store)
     for sample in made[: len(made) // 8] + made[len(made) // 4 :]:
-        historian.take("samples", sample.encode())
+        historian.handle("samples", sample.encode())
     historian.commit(NOW_NS)
     maintain(historian)
     for sample in made:
-        historian.take("samples", sample.encode())
+        historian.handle("samples", sample.encode())
     historian.commit(NOW_NS)
     maintain(historian)
     whole = filled(make_store("folder"))
@@ -174,7 +174,7 @@ def test_late_samples_do_not_hide_the_minutes_of_their_day(name: str, make_store
     maintain(historian)
     for done in (False, True):
         assert close(ask(historian, kind="samples", points=24), mean), done
-        historian.take("samples", samples(1)[3].encode())
+        historian.handle("samples", samples(1)[3].encode())
         assert historian.commit(NOW_NS) == 1
         assert close(ask(historian, kind="samples", points=24), mean), done
         maintain(historian)

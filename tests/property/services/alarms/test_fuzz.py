@@ -1,4 +1,4 @@
-"""Whatever somebody sends, the keeper of alarms goes on and what it publishes can be read."""
+"""Whatever somebody sends, the service of alarms goes on and what it publishes can be read."""
 
 import json
 
@@ -85,25 +85,25 @@ class Question:
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(SENT, max_size=12))
-def test_no_payload_stops_the_keeper(sent):
+def test_no_payload_stops_the_service(sent):
     bus, now_s = MemoryBus(), [0.0]
     rules = {name: {"on_delay_s": 0.0} for name in ("level_high", "plc_lost")}
-    keeper = AlarmService(
+    service = AlarmService(
         bus, AlarmSettings(high_level_m=1.0, rules=rules), (), lambda: Now(round(now_s[0] * 1e9), now_s[0])
     )
     changes = bus.subscribe(alarm_key("*"))
     for kind, payload in sent:
         if kind == "act":
             question = Question(payload)
-            keeper.take_act(question)
+            service.handle_act(question)
             assert question.answer is not None
         else:
-            {"sample": keeper.take_sample, "verdict": keeper.take_verdict, "status": keeper.take_status}[kind](
-                payload
-            )
+            {"sample": service.handle_sample, "verdict": service.handle_verdict, "status": service.handle_status}[
+                kind
+            ](payload)
         now_s[0] += 20.0
-        keeper.look()
-    keeper.take_presence(Presence("wetwell/x//alive/detector", is_alive=True))
-    keeper.report()
+        service.look()
+    service.handle_presence(Presence("wetwell/x//alive/detector", is_alive=True))
+    service.report()
     for payload in changes._messages:
         Alarm.decode(payload)

@@ -8,7 +8,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.alarms.registry import AlarmRegistry, BookState
+from wetwell.services.alarms.registry import AlarmRegistry, RegistryState
 from wetwell.services.alarms.rules import RULES, changed_rules
 from wetwell.services.alarms.status import ActRefusedError
 
@@ -18,7 +18,7 @@ SUPPRESSED = ("shelved", "out_of_service")
 
 
 class Alarms(RuleBasedStateMachine):
-    """A book that may be killed after any step beside a plain account of what an operator was told."""
+    """A registry that may be killed after any step beside a plain account of what an operator was told."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class Alarms(RuleBasedStateMachine):
     @initialize(on_s=st.sampled_from([0, 3]), off_s=st.sampled_from([0, 2]))
     def begin(self, on_s: int, off_s: int) -> None:
         self.rules = changed_rules({"pump_fault": {"on_delay_s": on_s, "off_delay_s": off_s}})
-        self.book = AlarmRegistry(self.rules)
+        self.registry = AlarmRegistry(self.rules)
 
     @rule(name=st.sampled_from(ALARMS), is_there=st.booleans(), seconds=st.integers(0, 5))
     def see(self, name: tuple[str, int], is_there: bool, seconds: int) -> None:
@@ -41,7 +41,7 @@ class Alarms(RuleBasedStateMachine):
         self.is_there[name] = is_there
         station, pump = name
         now_ns = self.now_s * NS_PER_S
-        self.book.observe(station, "pump_fault", is_there, now_ns, now_ns, pump=pump)
+        self.registry.observe(station, "pump_fault", is_there, now_ns, now_ns, pump=pump)
         self.hear(None)
 
     @rule(name=st.sampled_from(ALARMS), act=st.sampled_from(NAMES), minutes=st.floats(0.02, 0.2))
@@ -54,41 +54,41 @@ class Alarms(RuleBasedStateMachine):
     def ask_again(self) -> None:
         if self.sent:
             act, answer = self.sent[-1]
-            assert self.book.answered(act) == answer
+            assert self.registry.answered(act) == answer
 
     @rule(seconds=st.integers(1, 15))
     def wait(self, seconds: int) -> None:
         self.now_s += seconds
         now_ns = self.now_s * NS_PER_S
-        for entry, standing in self.book.shelves_over(now_ns):
-            self.book.take_back(entry, standing, now_ns, now_ns)
+        for record, status in self.registry.ended_shelves(now_ns):
+            self.registry.unshelve(record, status, now_ns, now_ns)
         self.hear("unshelve")
-        for entry in self.book.entries.values():
-            until_ns = entry.standing.until_ns
-            assert (until_ns is not None) == (entry.standing.state == "shelved")
+        for record in self.registry.records.values():
+            until_ns = record.status.until_ns
+            assert (until_ns is not None) == (record.status.state == "shelved")
             assert until_ns is None or until_ns > now_ns, "a shelf has ended and nobody was told"
 
     @rule()
     def restart(self) -> None:
-        kept = self.book.state().model_dump_json()
-        self.book = AlarmRegistry(self.rules)
-        self.book.restore(BookState.model_validate_json(kept))
-        assert json.loads(self.book.state().model_dump_json()) == json.loads(kept)
-        assert self.book.changed == []
+        kept = self.registry.state().model_dump_json()
+        self.registry = AlarmRegistry(self.rules)
+        self.registry.restore(RegistryState.model_validate_json(kept))
+        assert json.loads(self.registry.state().model_dump_json()) == json.loads(kept)
+        assert self.registry.changed == []
 
     def ask(self, act: AlarmAct) -> None:
         now_ns = self.now_s * NS_PER_S
         try:
-            entry, after = self.book.after(act, now_ns)
+            record, after = self.registry.after(act, now_ns)
         except ActRefusedError:
             return
-        answer = self.book.carry_out(act, entry, after, now_ns, now_ns)
+        answer = self.registry.carry_out(act, record, after, now_ns, now_ns)
         self.sent.append((act, answer))
         self.hear(act.act)
 
     def hear(self, act: str | None) -> None:
         """Check every message against the account."""
-        changed, self.book.changed = self.book.changed, []
+        changed, self.registry.changed = self.registry.changed, []
         for alarm in changed:
             name = (alarm.station, alarm.pump)
             assert alarm.time > self.times.get(name, -1), "two changes at one time"
@@ -105,7 +105,7 @@ class Alarms(RuleBasedStateMachine):
 
     @invariant()
     def states_agree_with_what_was_told(self) -> None:
-        for alarm in self.book.alarms() if hasattr(self, "book") else ():
+        for alarm in self.registry.alarms() if hasattr(self, "registry") else ():
             name = (alarm.station, alarm.pump)
             if alarm.state == "unacknowledged":
                 assert alarm.is_active

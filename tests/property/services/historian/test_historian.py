@@ -53,7 +53,7 @@ def test_what_was_committed_is_read_back_exactly(acts: list[Sample | str]) -> No
         kept: dict[tuple[str, int, int], Sample] = {}
         for act in [*acts, "commit", "maintain"]:
             if isinstance(act, Sample):
-                historian.take("samples", act.encode())
+                historian.handle("samples", act.encode())
                 waiting.append(act)
             elif act == "commit":
                 assert historian.commit(0) == len(waiting)
@@ -115,7 +115,7 @@ NEARLY = st.dictionaries(st.sampled_from(NAMES), VALUE | st.lists(VALUE, max_siz
 @given(payload=st.binary(max_size=200) | NEARLY)
 def test_no_payload_takes_it_down(filled: Historian, payload: bytes) -> None:
     for kind in ("samples", "blocks", "verdicts", "alarms"):
-        filled.take(kind, payload)
+        filled.handle(kind, payload)
     assert History.decode(filled.answer("alpha", payload)).station
 
 
@@ -126,7 +126,7 @@ def filled() -> Iterator[Historian]:
         store = FolderStore(Path(name))
         historian = Historian(store)
         for time in (-LONGEST_NS, 0, 1, LONGEST_NS):
-            historian.take("samples", Sample(station="alpha", seq=0, time=time, pumps=()).encode())
+            historian.handle("samples", Sample(station="alpha", seq=0, time=time, pumps=()).encode())
         assert historian.commit(0) == 4
         yield historian
         store.close()

@@ -78,10 +78,10 @@ def played(store: Store, pool: list[Sample], acts: list[Act], *, blocks_too: boo
         samples = chosen(pool, act)
         sent += len(samples)
         if act.in_block and blocks_too:
-            historian.take("blocks", SampleBlock.of(samples).encode())
+            historian.handle("blocks", SampleBlock.of(samples).encode())
         else:
             for sample in samples:
-                historian.take("samples", sample.encode())
+                historian.handle("samples", sample.encode())
         if act.then:
             historian.commit(0)
         if act.then == "maintain":

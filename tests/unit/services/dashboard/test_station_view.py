@@ -58,7 +58,7 @@ def frame_of(view, now_s, station="alpha"):
 
 
 def test_a_frame_holds_the_new_samples_and_then_no_more(view) -> None:
-    view.take_sample(sample(1, level_m=1.25).encode())
+    view.handle_sample(sample(1, level_m=1.25).encode())
     frame = frame_of(view, 0.25)
     assert frame["rows"] == [[1000, 1.25, None, 50, 200, 26, 18, 0, 0, None, 0.5]]
     assert frame["running"] == [True, False]
@@ -68,10 +68,10 @@ def test_a_frame_holds_the_new_samples_and_then_no_more(view) -> None:
 
 
 def test_many_samples_are_thinned_and_the_last_one_stays(view) -> None:
-    view.take_sample(sample(0).encode())
+    view.handle_sample(sample(0).encode())
     view.advance(0.25)
     for second in range(1, 100):
-        view.take_sample(sample(second).encode())
+        view.handle_sample(sample(second).encode())
     times_ms = [row[0] for row in frame_of(view, 0.5)["rows"]]
     assert len(times_ms) == ROWS_A_FRAME
     assert times_ms[-1] == 99_000
@@ -83,7 +83,7 @@ def test_the_chart_keeps_of_a_station_in_real_time_each_sample_however_many_come
     for frame in range(1, 4 * 600 + 1):
         second, rest = divmod(frame, 4)
         if rest == 0 and second % size == 0:
-            view.take_sample_block(
+            view.handle_sample_block(
                 SampleBlock.of([sample(number) for number in range(second - size, second)]).encode()
             )
         view.advance(frame / 4.0)
@@ -96,7 +96,7 @@ def test_of_a_station_that_runs_faster_than_life_as_many_samples_are_drawn_from_
     for frame in range(1, 73):  # a hundred samples a second
         if frame * 25 % size == 0:
             block = [sample(number) for number in range(frame * 25 - size, frame * 25)]
-            view.take_sample_block(SampleBlock.of(block).encode())
+            view.handle_sample_block(SampleBlock.of(block).encode())
         view.advance(frame / 4.0)
     first = min(size, view.stations["alpha"].kept_rows)
     rows = json.loads(view.station_state("alpha"))["rows"]
@@ -106,7 +106,7 @@ def test_of_a_station_that_runs_faster_than_life_as_many_samples_are_drawn_from_
 def test_a_block_that_comes_by_two_ways_is_taken_once(view) -> None:
     block = SampleBlock.of([sample(second) for second in range(300)]).encode()
     for now_s in (0.25, 0.5):
-        view.take_sample_block(block)
+        view.handle_sample_block(block)
         view.advance(now_s)
     state = json.loads(view.station_state("alpha"))
     assert [row[0] for row in state["rows"]] == [1000 * second for second in range(300)]
@@ -123,8 +123,8 @@ def test_thinned_keeps_order_and_last(count) -> None:
 
 def test_a_state_is_the_sum_of_the_frames(view) -> None:
     for second in range(1, 4):
-        view.take_sample(sample(second).encode())
-        view.take_verdict(verdict(second).encode())
+        view.handle_sample(sample(second).encode())
+        view.handle_verdict(verdict(second).encode())
         view.advance(float(second))
     state = json.loads(view.station_state("alpha"))
     assert [row[0] for row in state["rows"]] == [1000, 2000, 3000]
@@ -134,10 +134,10 @@ def test_a_state_is_the_sum_of_the_frames(view) -> None:
 
 def test_samples_that_come_again_are_dropped_and_a_source_that_begins_anew_is_followed(view) -> None:
     for second in (500, 501, 500, 501):
-        view.take_sample(sample(second).encode())
+        view.handle_sample(sample(second).encode())
     assert len(frame_of(view, 0.25)["rows"]) == 2
     for second in range(LATE_SAMPLES):
-        view.take_sample(sample(second).encode())
+        view.handle_sample(sample(second).encode())
     frame = frame_of(view, 0.5)
     assert frame["begins"]
     assert [row[0] for row in frame["rows"]] == [117_000, 118_000, 119_000]
@@ -145,27 +145,27 @@ def test_samples_that_come_again_are_dropped_and_a_source_that_begins_anew_is_fo
 
 def test_the_past_goes_before_what_was_heard_as_far_as_there_is_room(view) -> None:
     for second in (500, 501):
-        view.take_sample(sample(second).encode())
+        view.handle_sample(sample(second).encode())
     view.advance(0.25)
     station = view.stations["alpha"]
     station.kept_rows = 5
     assert station.room == 3
-    assert station.take_past([f"[{second}]" for second in range(10)], station.first_ns)
+    assert station.prepend([f"[{second}]" for second in range(10)], station.first_ns)
     rows = json.loads(view.station_state("alpha"))["rows"]
     assert [row[0] for row in rows] == [7, 8, 9, 500_000, 501_000]
-    assert station.take_past(["[6]"], station.first_ns)
+    assert station.prepend(["[6]"], station.first_ns)
     assert json.loads(view.station_state("alpha"))["rows"] == rows
 
 
 def test_a_past_that_comes_after_the_source_has_begun_anew_is_left_out(view) -> None:
-    view.take_sample(sample(500).encode())
+    view.handle_sample(sample(500).encode())
     station = view.stations["alpha"]
     first_ns = station.first_ns
     for second in range(LATE_SAMPLES):
-        view.take_sample(sample(second).encode())
+        view.handle_sample(sample(second).encode())
     view.advance(0.25)
     assert station.first_ns == (LATE_SAMPLES - 1) * NS_PER_S
-    assert not station.take_past(["[0]"], first_ns)
+    assert not station.prepend(["[0]"], first_ns)
     assert len(json.loads(view.station_state("alpha"))["rows"]) == 1
 
 
@@ -189,63 +189,63 @@ def test_a_ragged_answer_of_a_stranger_harms_nothing() -> None:
 
 def test_a_verdict_that_comes_again_counts_once(view) -> None:
     for _ in range(2):
-        view.take_verdict(verdict(1).encode())
+        view.handle_verdict(verdict(1).encode())
     assert len(frame_of(view, 0.25)["verdicts"]) == 1
 
 
 def test_lost_samples_are_counted_by_their_numbers(view) -> None:
     for second in (1, 2, 6):
-        view.take_sample(sample(second).encode())
+        view.handle_sample(sample(second).encode())
     assert frame_of(view, 0.25)["lost"] == 3
 
 
 def test_silence_becomes_no_data_and_ends_with_the_next_sample(view) -> None:
-    view.take_sample(sample(1).encode())
-    view.take_verdict(verdict(1).encode())
+    view.handle_sample(sample(1).encode())
+    view.handle_verdict(verdict(1).encode())
     assert frame_of(view, 0.25)["state"] == "normal"
     silent = frame_of(view, 20.0)
     assert (silent["state"], silent["stale"]) == ("no_data", True)
-    view.take_sample(sample(2).encode())
+    view.handle_sample(sample(2).encode())
     assert frame_of(view, 20.25)["state"] == "normal"
 
 
 def test_a_fault_ranks_above_silence_and_the_worst_pump_counts(view) -> None:
-    view.take_verdict(verdict(1, "pump_fault", pump=2).encode())
-    view.take_verdict(verdict(1, "normal", pump=1).encode())
+    view.handle_verdict(verdict(1, "pump_fault", pump=2).encode())
+    view.handle_verdict(verdict(1, "normal", pump=1).encode())
     assert frame_of(view, 20.0)["state"] == "pump_fault"
 
 
 def test_the_overview_sends_what_has_changed_only(view) -> None:
-    view.take_sample(sample(1).encode())
-    view.take_sample(sample(1, "beta").encode())
+    view.handle_sample(sample(1).encode())
+    view.handle_sample(sample(1, "beta").encode())
     view.advance(0.25)
     first = json.loads(view.site_frame())
     assert [station["name"] for station in first["stations"].values()] == ["alpha", "beta"]
     assert view.site_frame() is None
-    view.take_sample(sample(2, "beta").encode())
+    view.handle_sample(sample(2, "beta").encode())
     view.advance(0.5)
     second = json.loads(view.site_frame())
     assert second == {"id": view.frame_id, "live": [[1, 2000, 1, 200, 18.5, [1]]], "stations": {}}
 
 
 def test_alarms_count_until_they_are_normal(view) -> None:
-    view.take_alarm(alarm().encode())
+    view.handle_alarm(alarm().encode())
     view.advance(0.25)
     summary = json.loads(view.site_state())["stations"]["0"]
     assert (summary["alarms"], summary["unacknowledged"]) == (1, 1)
     assert [each["id"] for each in json.loads(view.alarms())] == ["pump1.pump_fault"]
-    view.take_alarm(alarm("normal").encode())
+    view.handle_alarm(alarm("normal").encode())
     assert json.loads(view.alarms()) == []
 
 
 def test_services_are_there_until_they_are_gone(view) -> None:
-    view.take_presence(Presence("wetwell/alpha/alive/detector", is_alive=True))
-    view.take_status(
+    view.handle_presence(Presence("wetwell/alpha/alive/detector", is_alive=True))
+    view.handle_status(
         Status(time=0, station="alpha", service="detector", state="running", figures={"samples": 3.0}).encode()
     )
-    view.take_presence(Presence("wetwell/_site/alive/historian", is_alive=True))
+    view.handle_presence(Presence("wetwell/_site/alive/historian", is_alive=True))
     assert frame_of(view, 0.25)["alive"] == ["detector"]
-    view.take_presence(Presence("wetwell/alpha/alive/detector", is_alive=False))
+    view.handle_presence(Presence("wetwell/alpha/alive/detector", is_alive=False))
     assert frame_of(view, 0.5)["alive"] == []
     health = {service["service"]: service for service in view.health(3.0)}
     assert not health["detector"]["is_alive"]
@@ -255,7 +255,7 @@ def test_services_are_there_until_they_are_gone(view) -> None:
 
 
 def test_what_is_no_message_is_counted_and_harms_nothing(view) -> None:
-    for take in (view.take_sample, view.take_verdict, view.take_model, view.take_alarm, view.take_status):
+    for take in (view.handle_sample, view.handle_verdict, view.handle_model, view.handle_alarm, view.handle_status):
         take(b"{}")
         take(b"\xff")
     assert view.counts["malformed"] == 10
@@ -269,5 +269,5 @@ def test_values_that_are_none_stay_none() -> None:
 
 def test_many_stations_share_the_rows_that_are_kept(view) -> None:
     for number in range(ROWS[0][0] + 1):
-        view.take_sample(sample(1, f"station-{number}").encode())
+        view.handle_sample(sample(1, f"station-{number}").encode())
     assert {station.kept_rows for station in view.stations.values()} == {ROWS[1][1]}

@@ -29,7 +29,7 @@ def feed_of(*names, **device):
 
 
 def take(feed, values, now_s=0.0, latency_s=0.01):
-    return feed.take(Poll(values=values), STAMP_NS, latency_s, now_s)
+    return feed.handle_poll(Poll(values=values), STAMP_NS, latency_s, now_s)
 
 
 def test_samples_count_and_bear_the_time_of_the_poll():
@@ -105,7 +105,7 @@ def polled(recording):
         shown |= {"heartbeat": n % 65536, "time_s": stamp_ns // NS_PER_S}
         words = {name: encode(OWN[name], value, "ABCD") for name, value in shown.items()}
         values = {name: signals[name].value(words[name], "ABCD", house_unit(name)) for name in words}
-        yield feed.take(Poll(values=values), 0, 0.0, float(n))
+        yield feed.handle_poll(Poll(values=values), 0, 0.0, float(n))
 
 
 def test_the_detector_says_the_same_of_a_plc_as_of_the_simulator(alpha, learnt):

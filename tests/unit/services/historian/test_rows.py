@@ -133,7 +133,7 @@ def test_a_block_that_is_none_is_counted_and_left_out_whole(
     assert change in payload
     with contextlib.closing(FolderStore(tmp_path)) as store:
         historian = Historian(store)
-        historian.take("blocks", payload.encode())
+        historian.handle("blocks", payload.encode())
         assert historian.commit(0) == 0
         assert historian.figures(0)["malformed"] == 1.0
     assert told in caplog.text
@@ -143,8 +143,8 @@ def test_figures_count_samples(tmp_path: Path) -> None:
     with contextlib.closing(FolderStore(tmp_path)) as store:
         historian = Historian(store)
         for payload in (block(*range(10)).encode(), block(*range(10)).encode(), block(20, 21).encode()):
-            historian.take("blocks", payload)
-        historian.take("samples", sample(30).encode())
+            historian.handle("blocks", payload)
+        historian.handle("samples", sample(30).encode())
         assert historian.figures(0)["waiting"] == historian.figures(0)["taken"] == 23.0
         assert historian.commit(31 * NS_PER_S) == 23
         figures = historian.figures(31 * NS_PER_S)
@@ -162,8 +162,8 @@ def test_a_spool_gives_up_the_oldest_rows_but_never_the_last() -> None:
     small = Spool(1)
     small.put(rows[:1])
     assert (small.waiting, small.lost) == (5, 0)
-    assert small.take(1) == rows[:1]
-    assert (small.waiting, small.take(1)) == (0, [])
+    assert small.pop(1) == rows[:1]
+    assert (small.waiting, small.pop(1)) == (0, [])
 
 
 def test_blocks_that_begin_alike_are_both_kept(live: LiveDatabase) -> None:
@@ -218,7 +218,7 @@ def test_a_database_of_version_1_is_upgraded_and_nothing_is_lost(
     assert caplog.text.count("upgraded from version 1 to 2") == 1
     with contextlib.closing(FolderStore(tmp_path)) as store:
         historian = Historian(store)
-        historian.take("blocks", block(298, 299, 300).encode())
+        historian.handle("blocks", block(298, 299, 300).encode())
         assert historian.commit(0) == 3
         history = History.decode(historian.answer("alpha", HistoryQuery(kind="samples", raw=True).encode()))
         assert history.columns["seq"] == tuple(map(float, range(301)))

@@ -53,7 +53,7 @@ def historian(store: FolderStore) -> Historian:
 
 def fill(historian: Historian, *samples: Sample) -> int:
     for each in samples:
-        historian.take("samples", each.encode())
+        historian.handle("samples", each.encode())
     return historian.commit(NOW_NS)
 
 
@@ -105,7 +105,7 @@ def test_a_question_that_is_none_or_about_nobody_is_answered_with_an_error(histo
     [b"", b"[]", sample(1, station="../alpha").encode(), sample(1, station="a" * 65).encode(), b'{"schema": "x"}'],
 )
 def test_what_is_no_sample_is_counted(historian: Historian, payload: bytes) -> None:
-    historian.take("samples", payload)
+    historian.handle("samples", payload)
     assert historian.commit(NOW_NS) == 0
     assert historian.figures(NOW_NS)["malformed"] == 1.0
 
@@ -113,7 +113,7 @@ def test_what_is_no_sample_is_counted(historian: Historian, payload: bytes) -> N
 def test_verdicts_come_in_the_order_of_time_the_last_ones_and_doubles_once(historian: Historian) -> None:
     verdicts = [verdict(second, state) for second, state in ((2, "unknown"), (1, "normal"), (2, "normal"))]
     for each in (*verdicts, verdicts[0]):
-        historian.take("verdicts", each.encode())
+        historian.handle("verdicts", each.encode())
     historian.commit(NOW_NS)
     told = ask(historian, kind="verdicts").messages
     assert [(message["time"][-3:], message["state"]) for message in told] == [

@@ -1,0 +1,91 @@
+"""Results of commands for people and as JSON; the figures of a recording."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+
+from wetwell.protocols.recordings.kpi import Kpis
+from wetwell.protocols.timestamps import to_iso
+
+
+def as_json(value: object) -> str:
+    """JSON text for standard output."""
+    return json.dumps(value, indent=2)
+
+
+def as_lines(result: Mapping[str, object], indent: str = "") -> str:
+    """A result for people: one value a line, a list of alike tables as one table.
+
+    Examples
+    --------
+    >>> print(as_lines({"rows": 3, "pumps": [{"pump": 1, "head_m": 26.0}, {"pump": 2, "head_m": 25.5}]}))
+    rows: 3
+    pumps:
+      pump  head_m
+         1    26.0
+         2    25.5
+    """
+    lines = []
+    for key, value in result.items():
+        if isinstance(value, Mapping):
+            lines += [f"{indent}{key}:", as_lines(value, indent + "  ")]
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            lines += [f"{indent}{key}:", *_rows(value, indent + "  ")]
+        else:
+            lines.append(f"{indent}{key}: {value}")
+    return "\n".join(lines)
+
+
+def _rows(tables: Sequence[Mapping[str, object]], indent: str) -> list[str]:
+    cells = [list(tables[0]), *([str(value) for value in table.values()] for table in tables)]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
+    return [indent + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
+
+
+def kpi_table(figures: Kpis, *, with_hours: bool) -> dict[str, object]:
+    """Figures of a recording by day and in total, and by hour where asked for; what is not known is None."""
+    pumps = range(len(figures.starts))
+    days = [
+        {
+            "day": to_iso(day_ns)[:10],
+            "pump": pump + 1,
+            "starts": int(figures.daily_starts[pump, day]),
+            "run_h": _figure(figures.daily_run_h[pump, day]),
+            "volume_m3": _figure(figures.daily_volume_m3[pump, day]),
+            "energy_kwh": _figure(figures.daily_energy_kwh[pump, day]),
+            "known_h": _figure(figures.daily_known_h[day]),
+        }
+        for day, day_ns in enumerate(figures.day_ns.tolist())
+        for pump in pumps
+    ]
+    totals = [
+        {
+            "pump": pump + 1,
+            "starts": int(figures.starts[pump]),
+            "run_h": _figure(figures.run_h[pump]),
+            "volume_m3": _figure(figures.volume_m3[pump]),
+            "energy_kwh": _figure(figures.energy_kwh[pump]),
+            "specific_energy_kwh_m3": _figure(figures.specific_energy_kwh_m3[pump]),
+            "duty_share": _figure(figures.duty_share[pump]),
+        }
+        for pump in pumps
+    ]
+    hours = [
+        {
+            "hour": to_iso(hour_ns),
+            "energy_kwh": [_figure(kwh) for kwh in figures.hourly_energy_kwh[:, hour]],
+            "station_energy_kwh": _figure(figures.station_hourly_energy_kwh[hour]),
+            "cumulative_energy_kwh": [_figure(kwh) for kwh in figures.cumulative_energy_kwh[:, hour]],
+        }
+        for hour, hour_ns in enumerate(figures.hour_ns.tolist() if with_hours else [])
+    ]
+    station = {
+        "volume_m3": _figure(figures.volume_m3.sum()),
+        "energy_kwh": _figure(figures.energy_kwh.sum()),
+        "specific_energy_kwh_m3": _figure(figures.station_specific_energy_kwh_m3),
+    }
+    return {"days": days, "totals": totals, "station": station} | ({"hours": hours} if with_hours else {})
+
+
+def _figure(value: float) -> float | None:
+    return round(float(value), 4) if math.isfinite(value) else None
