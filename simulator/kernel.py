@@ -16,7 +16,7 @@ from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.channels import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_channel, read_pumps, silence
 from wetwell.simulator.telemetry.sensors import delayed
-from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR, level_at_volume_m, next_volume_m3, overflow_m3h
 
 INERTIA_STEPS = 3
 """Steps within a second in which the column of water is accelerated."""
@@ -158,7 +158,7 @@ def move_water(plant: PlantRecords, state: PlantState, static_head_m: float, fri
         for i in range(mean_m3h.size):
             mean_m3h[i] = flow_m3h[i]
         return
-    inertia_m_m3h = inertia_s2_m2 / 3600.0 * INERTIA_STEPS / STAGE
+    inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * INERTIA_STEPS / STAGE
     for i in range(mean_m3h.size):
         mean_m3h[i] = 0.0
     for _ in range(INERTIA_STEPS):

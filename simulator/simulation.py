@@ -113,7 +113,7 @@ class Simulation:
         begin = self._plant.seconds
         time_s = np.arange(begin, begin + seconds, dtype=np.float64)
         forcing = healthy_forcing(
-            self._inflow.take(seconds),
+            self._inflow.next_seconds(seconds),
             len(self.station.pump),
             with_sensors=any(isinstance(fault, SensorFault) for fault in self.scenario.fault),
         )

@@ -10,12 +10,11 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import channels
-from wetwell.simulator.wet_well import volume_at_level_m3
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR, volume_at_level_m3
 
 MAX_DELAY_S = 119
 PAST_S = MAX_DELAY_S + 2
 MAX_STARTS_PER_HOUR = 60
-SECONDS_PER_HOUR = 3600
 
 
 @dataclass(slots=True)

@@ -10,7 +10,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 from wetwell.simulator.records import Records, records_of
 
-SECONDS_PER_HOUR = 3600.0
+SECONDS_PER_HOUR = 3600
 WEIR_COEFFICIENT_M05_S = 1.84
 """Of a sharp-crested weir in metric units (Francis)."""
 

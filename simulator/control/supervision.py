@@ -8,7 +8,8 @@ from wetwell.simulator.control.drive import next_frequency_hz
 from wetwell.simulator.control.rules import NOTHING, controlled_frequency_hz, next_in_rotation, wanted_change
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.parameters import PlantRecords
-from wetwell.simulator.state import SECONDS_PER_HOUR, PlantState
+from wetwell.simulator.state import PlantState
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 
 @inlined

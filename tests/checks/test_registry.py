@@ -229,17 +229,17 @@ def test_fault_that_ends_before_it_starts_is_refused_in_one_line(part):
 @every_inflow
 def test_inflow_does_not_depend_on_block_lengths(part):
     inflow = part(**needed(part))
-    whole = inflow.stream(np.random.default_rng(7)).take(4000)
+    whole = inflow.stream(np.random.default_rng(7)).next_seconds(4000)
     for lengths in ([1] * 50, [899, 900, 901], [0, 13, 0, 2000, 1]):
         stream = inflow.stream(np.random.default_rng(7))
-        blocks = [stream.take(length) for length in [*lengths, 4000 - sum(lengths)]]
+        blocks = [stream.next_seconds(length) for length in [*lengths, 4000 - sum(lengths)]]
         assert np.concatenate(blocks).tobytes() == whole.tobytes()
 
 
 @every_inflow
 def test_inflow_is_finite_never_negative_and_a_function_of_its_seed(part):
     inflow = part(**needed(part))
-    flow_m3h, again_m3h = (inflow.stream(np.random.default_rng(8)).take(20_000) for _ in range(2))
+    flow_m3h, again_m3h = (inflow.stream(np.random.default_rng(8)).next_seconds(20_000) for _ in range(2))
     assert flow_m3h.dtype == np.float64
     assert np.isfinite(flow_m3h).all()
     assert flow_m3h.min() >= 0

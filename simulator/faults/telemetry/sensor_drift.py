@@ -6,8 +6,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Finite
 from wetwell.simulator.faults.profile import ChannelFault
 from wetwell.simulator.forcing import Forcing
-
-SECONDS_PER_HOUR = 3600.0
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 
 class SensorDrift(ChannelFault):
