@@ -6,6 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled, inlined
+from wetwell.protocols.quantities import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.control.drive import turned_ratio
 from wetwell.simulator.control.supervision import drive, supervise
 from wetwell.simulator.forcing import Forcing
@@ -13,7 +14,6 @@ from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_he
 from wetwell.simulator.parameters import PlantRecords
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
 from wetwell.simulator.state import PlantState, Truth
-from wetwell.simulator.telemetry.channels import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_channel, read_pumps, silence
 from wetwell.simulator.telemetry.sensors import delayed
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR, level_at_volume_m, next_volume_m3, overflow_m3h

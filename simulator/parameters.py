@@ -8,20 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, AnalogueQuantity
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.simulator.power import hydraulic_power_kw
 from wetwell.simulator.records import Records, records_of
-from wetwell.simulator.telemetry.channels import (
-    FIRST_PUMP,
-    FLOW,
-    HEAD,
-    INFLOW,
-    LEVEL,
-    POWER,
-    Quantity,
-    channels,
-    channels_of,
-)
+from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
 from wetwell.simulator.wet_well import ProfilePoint, profile_of
 
 ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)
@@ -153,7 +144,7 @@ class PlantParameters:
         return replace(self, pumps=tuple(pumps))
 
     def with_sensors(
-        self, changed: Callable[[SensorParameters], SensorParameters], quantity: Quantity
+        self, changed: Callable[[SensorParameters], SensorParameters], quantity: AnalogueQuantity
     ) -> "PlantParameters":
         """The same plant with the sensors of a quantity changed, those of all pumps."""
         rows = channels_of(quantity, len(self.pumps))
@@ -245,9 +236,9 @@ def _sensor_parameters(sensors: Sensors, pumps: int) -> tuple[SensorParameters, 
     noise = np.zeros(channels(pumps))
     noise[LEVEL] = sensors.level_noise_m
     noise[INFLOW] = sensors.inflow_noise
-    noise[FIRST_PUMP + FLOW :: 4] = sensors.flow_noise
-    noise[FIRST_PUMP + HEAD :: 4] = sensors.head_noise
-    noise[FIRST_PUMP + POWER :: 4] = sensors.power_noise
+    noise[FIRST_PUMP + FLOW :: PUMP_CHANNELS] = sensors.flow_noise
+    noise[FIRST_PUMP + HEAD :: PUMP_CHANNELS] = sensors.head_noise
+    noise[FIRST_PUMP + POWER :: PUMP_CHANNELS] = sensors.power_noise
     return tuple(SensorParameters(noise=share, correlation=sensors.correlation) for share in noise.tolist())
 
 

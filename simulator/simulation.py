@@ -18,7 +18,7 @@ from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.plant import Plant
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
 from wetwell.simulator.state import Truth
-from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, PUMP_QUANTITIES, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 
 class Simulation:

@@ -4,11 +4,12 @@ import math
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled, inlined
+from wetwell.protocols.quantities import FLOW, HEAD, LEVEL, POWER
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.kernel import move_plant
 from wetwell.simulator.parameters import PlantRecords
 from wetwell.simulator.state import PlantState, Truth
-from wetwell.simulator.telemetry.channels import FLOW, HEAD, LEVEL, POWER, pump_channel
+from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import RESTING
 from wetwell.simulator.wet_well import level_at_volume_m, volume_at_level_m3
 

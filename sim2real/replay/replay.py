@@ -14,7 +14,7 @@ from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, plant_parameters
 from wetwell.simulator.state import first_state, still_truth
-from wetwell.simulator.telemetry.channels import INFLOW, LEVEL, Quantity, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 LEVEL_TIME_S = 150.0
 """Time constant with which the observer follows the recorded level."""
@@ -109,7 +109,7 @@ class Replay:
             if run.key == key:
                 return run
         level_m = np.empty(traces.seconds)
-        reading = np.empty((len(PUMP_SIGNALS), pumps, traces.seconds))
+        reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
         if traces.inflow_m3h is None:
             gains = 1.4 / UNKNOWN_INFLOW_TIME_S, 1.0 / UNKNOWN_INFLOW_TIME_S**2
         else:
@@ -118,7 +118,7 @@ class Replay:
             records,
             first_state(plant, max(self._first_level_m, 0.0)),
             self._forced(forces, plant),
-            np.zeros((len(PUMP_SIGNALS), pumps)),
+            np.zeros((len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
             self._told_level_m if is_held else traces.level_m,
             *gains,
@@ -159,8 +159,7 @@ def later(values: Floats, delay_s: float) -> Floats:
     return np.asarray((1.0 - share) * near + share * far, dtype=np.float64)
 
 
-def _delay_s(plant: PlantParameters, name: str) -> float:
-    quantity: Quantity = name  # type: ignore[assignment]
+def _delay_s(plant: PlantParameters, quantity: AnalogueQuantity) -> float:
     return plant.sensors[channels_of(quantity, len(plant.pumps))[0]].delay_s
 
 

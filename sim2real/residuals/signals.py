@@ -16,7 +16,7 @@ from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, B
 from wetwell.sim2real.residuals.noise import Noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity, channels_of
+from wetwell.simulator.telemetry.channels import channels_of
 
 SIGNAL_OF: dict[str, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
 STEADY_BIN_S = 20
@@ -73,7 +73,7 @@ class SignalMisfit:
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
 
 
-def _channel(plant: PlantParameters, name: Quantity, pump: int) -> int:
+def _channel(plant: PlantParameters, name: AnalogueQuantity, pump: int) -> int:
     return channels_of(name, len(plant.pumps), None if pump == NO_PUMP else pump + 1)[0]
 
 

@@ -5,7 +5,6 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Table
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.parameters import PlantParameters

@@ -9,12 +9,7 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import STATION_QUANTITIES, SensedQuantity
 from wetwell.protocols.station.station_file import NonNegative, Positive, Table
 from wetwell.simulator.forcing import Forcing
-from wetwell.simulator.telemetry.channels import Quantity, channels_of
-
-SensedQuantity = Literal["level_m", "inflow_m3h", "flow_m3h", "head_m", "power_kw"]
-"""Quantities that a sensor measures; the frequency is what the drive itself reports."""
-
-STATION_QUANTITIES = ("level_m", "inflow_m3h")
+from wetwell.simulator.telemetry.channels import channels_of
 
 
 class Profile(Table):

@@ -6,11 +6,12 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import inlined
+from wetwell.protocols.quantities import FLOW, FREQUENCY, HEAD, POWER
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.parameters import PlantRecords, SensorParameters
 from wetwell.simulator.records import Records
 from wetwell.simulator.state import PlantState, Truth
-from wetwell.simulator.telemetry.channels import FLOW, FREQUENCY, HEAD, POWER, pump_channel
+from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import sense, transmit
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import inlined
+from wetwell.protocols.quantities import LEVEL
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.parameters import SensorParameters
 from wetwell.simulator.state import ChannelState
-from wetwell.simulator.telemetry.channels import LEVEL
 
 RESTING = 1e-6
 """A damped reading under this value counts as zero once its pump stands."""

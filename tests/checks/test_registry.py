@@ -9,13 +9,14 @@ import pytest
 from pydantic import ValidationError
 
 from wetwell.protocols.errors import first_fault
+from wetwell.protocols.quantities import FIRST_PUMP
 from wetwell.protocols.station.station_file import load_toml
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import Profile, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.forcing import healthy_forcing
 from wetwell.simulator.inflow import INFLOWS
 from wetwell.simulator.scenario import Scenario
-from wetwell.simulator.telemetry.channels import FIRST_PUMP, channels
+from wetwell.simulator.telemetry.channels import channels
 
 REGISTERED = [*FAULTS.items(), *INFLOWS.items()]
 NEEDED = {

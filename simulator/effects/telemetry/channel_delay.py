@@ -3,9 +3,9 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity
 
 
 class ChannelDelay(Effect):
@@ -16,7 +16,7 @@ class ChannelDelay(Effect):
     Parameters
     ----------
     channel : str
-        Quantity that is late, of every pump if it is one of the pumps.
+        AnalogueQuantity that is late, of every pump if it is one of the pumps.
     delay_s : float
         d; 0 is no effect. [s]
 

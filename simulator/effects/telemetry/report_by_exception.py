@@ -3,9 +3,9 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
+from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters
-from wetwell.simulator.telemetry.channels import Quantity
 
 
 class ReportByException(Effect):
@@ -16,7 +16,7 @@ class ReportByException(Effect):
     Parameters
     ----------
     channel : str
-        Quantity that is reported so, of every pump if it is one of the pumps.
+        AnalogueQuantity that is reported so, of every pump if it is one of the pumps.
     deadband : float
         b; 0 is no effect. [unit of the channel]
 
