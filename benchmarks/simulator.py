@@ -33,7 +33,8 @@ from timing import least_s
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.services.stations import find_scenario, find_station
-from wetwell.simulator.plant import Plant, healthy_forcing
+from wetwell.simulator.forcing import healthy_forcing
+from wetwell.simulator.plant import Plant
 from wetwell.simulator.simulation import Simulation
 
 DAY_S = 86_400

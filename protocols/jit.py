@@ -18,11 +18,21 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     Numba takes the code on disk for new while the file of the function that is called from Python is unchanged:
     after a change in a function that it calls, touch it. The plain Python function is its attribute `py_func`.
     """
-    options: dict[str, Any] = {
-        "cache": True,
-        "nogil": True,
-        "error_model": "numpy",
-        "_nrt": False,
-        "forceinline": True,
-    }
-    return cast("Callable[P, R]", numba.njit(**options)(function))
+    return cast("Callable[P, R]", numba.njit(**_OPTIONS)(function))
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function as `compiled` does, but without an entry from Python: only compiled code can call it.
+
+    What unpacks the arguments takes longest to compile where they are tuples of arrays.
+    """
+    return cast("Callable[P, R]", numba.njit(**_OPTIONS | {"no_cpython_wrapper": True})(function))
+
+
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "forceinline": True,
+}

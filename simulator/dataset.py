@@ -22,7 +22,7 @@ from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import Profile, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.hydraulics import common_flows
 from wetwell.simulator.inflow import INFLOWS
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.power import electrical_power_kw
 from wetwell.simulator.scenario import Scenario
 

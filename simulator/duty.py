@@ -7,7 +7,7 @@ import numpy as np
 from wetwell.protocols.station.curve_fit import fit_error_m
 from wetwell.protocols.station.station_file import Pump, Station
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
-from wetwell.simulator.plant import PlantParameters, plant_parameters
+from wetwell.simulator.parameters import PlantParameters, plant_parameters
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw
 
 MIN_EXCESS = 0.01
@@ -37,12 +37,10 @@ def check_operable(station: str, parameters: PlantParameters) -> None:
         )
     rise_m = parameters.lift_slope * (start_m[-1] - parameters.lift_reference_m)
     static_head_m = max(parameters.static_head_m - rise_m, 0.0)
-    for number, (shutoff_m, automatic) in enumerate(
-        zip(parameters.curves[:, 0], parameters.is_automatic, strict=True), start=1
-    ):
-        if automatic and shutoff_m <= static_head_m * (1.0 + MIN_EXCESS):
+    for number, pump in enumerate(parameters.pumps, start=1):
+        if pump.is_automatic and pump.c0 <= static_head_m * (1.0 + MIN_EXCESS):
             raise ValueError(
-                f"{place}: pump[{number}]: curve does not meet the system curve: shut-off head {shutoff_m:g} m must "
+                f"{place}: pump[{number}]: curve does not meet the system curve: shut-off head {pump.c0:g} m must "
                 f"exceed the static head of {static_head_m:g} m, effects included, by {MIN_EXCESS:.0%}, or no water "
                 "flows"
             )

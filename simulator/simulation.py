@@ -11,12 +11,13 @@ from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_ANALOGUES, pump_col
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station, check_levels
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.simulator import layout as at
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFault, SystemFault
-from wetwell.simulator.plant import Forcing, Plant, Record, healthy_forcing
+from wetwell.simulator.forcing import Forcing, healthy_forcing
+from wetwell.simulator.plant import Plant
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
+from wetwell.simulator.state import Truth
 from wetwell.simulator.telemetry.channels import channels_of
 
 
@@ -66,8 +67,8 @@ class Simulation:
         levels = {
             f"{kind}_level{n}_m": float(level_m)
             for kind, levels_m in (
-                ("start", self._plant.levels_m[at.START_LEVEL]),
-                ("stop", self._plant.levels_m[at.STOP_LEVEL]),
+                ("start", self._plant.start_levels_m),
+                ("stop", self._plant.stop_levels_m),
             )
             for n, level_m in enumerate(levels_m, start=1)
         }
@@ -87,11 +88,11 @@ class Simulation:
         if unknown:
             raise ValueError(f"{unknown[0]} is not a setting of station '{self.station.name}'")
         settings |= changes
-        count = self._plant.levels_m.shape[1]
+        count = self._plant.start_levels_m.size
         start_m = tuple(settings[f"start_level{n}_m"] for n in range(1, count + 1))
         stop_m = tuple(settings[f"stop_level{n}_m"] for n in range(1, count + 1))
         check_levels(start_m, stop_m)
-        self._plant.levels_m[:] = start_m, stop_m
+        self._plant.start_levels_m[:], self._plant.stop_levels_m[:] = start_m, stop_m
         self._plant.is_automatic[:] = [settings[f"pump{i}_auto"] > 0 for i in range(1, len(self.station.pump) + 1)]
 
     def advance(self, seconds: int, *, truth: bool = True) -> Recording:
@@ -112,7 +113,7 @@ class Simulation:
         begin = self._plant.seconds
         time_s = np.arange(begin, begin + seconds, dtype=np.float64)
         forcing = healthy_forcing(
-            self._inflow.take(seconds),
+            self._inflow.next_seconds(seconds),
             len(self.station.pump),
             with_sensors=any(isinstance(fault, SensorFault) for fault in self.scenario.fault),
         )
@@ -120,44 +121,44 @@ class Simulation:
             effect.force(forcing, time_s)
         for fault in self.scenario.fault:
             fault.apply(forcing, time_s)
-        record = self._plant.advance(forcing, self._sensor_rng)
+        measured, true = self._plant.advance(forcing, self._sensor_rng)
         stamps_ns = self._start_ns + NS_PER_S * np.arange(begin, begin + seconds)
         return Recording(
             time_ns=stamps_ns,
-            columns=_measured(record.measured, len(self.station.pump)),
-            truth=self._truth(record, forcing, time_s) if truth else {},
+            columns=_measured(measured, len(self.station.pump)),
+            truth=self._truth_columns(true, forcing, time_s) if truth else {},
         )
 
-    def _truth(self, record: Record, forcing: Forcing, time_s: Floats) -> dict[str, npt.NDArray[Any]]:
+    def _truth_columns(self, true: Truth, forcing: Forcing, time_s: Floats) -> dict[str, npt.NDArray[Any]]:
         """Truth columns; the state of a pump knows its own faults and those of the whole station."""
         active = [fault.is_active(time_s) for fault in self.scenario.fault]
         shares = [fault.share(time_s) for fault in self.scenario.fault]
         concerned = [_pump_of(fault) for fault in self.scenario.fault]
         kinds = [_KINDS.index(next(k for k in _KINDS if isinstance(fault, k))) for fault in self.scenario.fault]
-        truth: dict[str, npt.NDArray[Any]] = {
+        columns: dict[str, npt.NDArray[Any]] = {
             "truth_state": _state_names(kinds, active, time_s.size),
             "truth_fault": _fault_names([fault.kind for fault in self.scenario.fault], active, time_s.size),
             "truth_severity": _largest(shares, time_s.size),
-            "truth_level_m": record.station_truth[at.TRUE_LEVEL],
+            "truth_level_m": true.level_m,
             "truth_inflow_m3h": forcing.inflow_m3h,
-            "truth_overflow_m3h": record.station_truth[at.TRUE_OVERFLOW],
+            "truth_overflow_m3h": true.overflow_m3h,
             "truth_friction_factor": forcing.friction_factor,
             "truth_static_rise_m": forcing.static_rise_m,
         }
         for i in range(len(self.station.pump)):
             felt = [k for k, pump in enumerate(concerned) if pump in {0, i + 1}]
             own = [shares[k] for k, pump in enumerate(concerned) if pump == i + 1]
-            truth |= {
+            columns |= {
                 f"truth_pump{i + 1}_state": _state_names(
                     [kinds[k] for k in felt], [active[k] for k in felt], time_s.size
                 ),
                 f"truth_pump{i + 1}_severity": _largest(own, time_s.size),
                 f"truth_pump{i + 1}_speed_factor": forcing.speed_factor[i],
-                f"truth_pump{i + 1}_flow_m3h": record.pump_truth[at.TRUE_FLOW, i],
-                f"truth_pump{i + 1}_head_m": record.pump_truth[at.TRUE_HEAD, i],
-                f"truth_pump{i + 1}_power_kw": record.pump_truth[at.TRUE_POWER, i],
+                f"truth_pump{i + 1}_flow_m3h": true.flow_m3h[i],
+                f"truth_pump{i + 1}_head_m": true.head_m[i],
+                f"truth_pump{i + 1}_power_kw": true.power_kw[i],
             }
-        return truth
+        return columns
 
 
 def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:

@@ -2,42 +2,50 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
-from wetwell.simulator import layout as at
+from wetwell.simulator.records import Records, records_of
 
-SECONDS_PER_HOUR = 3600.0
+SECONDS_PER_HOUR = 3600
 WEIR_COEFFICIENT_M05_S = 1.84
 """Of a sharp-crested weir in metric units (Francis)."""
 
 
-def profile_of(points: Sequence[tuple[float, float]]) -> Floats:
-    """Profile of points (level_m, area_m2) with the volume under each point, (3, k), rows as in `layout`.
+@dataclass(frozen=True, slots=True)
+class ProfilePoint:
+    """A point of the profile of the wet well, with the volume under it."""
+
+    level_m: float
+    area_m2: float
+    volume_m3: float
+
+
+def profile_of(points: Sequence[tuple[float, float]]) -> Records[ProfilePoint]:
+    """Profile of points (level_m, area_m2), at least one, from the floor up.
 
     Examples
     --------
-    >>> profile_of([(0.0, 2.0), (1.0, 4.0), (2.0, 4.0)])
-    array([[0., 1., 2.],
-           [2., 4., 4.],
-           [0., 3., 7.]])
+    >>> profile_of([(0.0, 2.0), (1.0, 4.0), (2.0, 4.0)])["volume_m3"]
+    array([0., 3., 7.])
     """
     levels_m, areas_m2 = np.array(points, dtype=float).T
     slices_m3 = 0.5 * (areas_m2[1:] + areas_m2[:-1]) * np.diff(levels_m)
-    return np.array([levels_m, areas_m2, np.concatenate([[0.0], np.cumsum(slices_m3)])])
+    volumes_m3 = np.concatenate([[0.0], np.cumsum(slices_m3)])
+    return records_of([ProfilePoint(*point) for point in zip(levels_m, areas_m2, volumes_m3, strict=True)])
 
 
 @compiled
-def _slope_m(profile: Floats, k: int) -> float:
+def _slope_m(profile: Records[ProfilePoint], k: int) -> float:
     """Growth of the area with the height in slice k, in m."""
-    rise_m = profile[at.PROFILE_LEVEL, k + 1] - profile[at.PROFILE_LEVEL, k]
-    return float((profile[at.PROFILE_AREA, k + 1] - profile[at.PROFILE_AREA, k]) / rise_m)
+    return (profile[k + 1].area_m2 - profile[k].area_m2) / (profile[k + 1].level_m - profile[k].level_m)
 
 
 @compiled
-def level_at_volume_m(volume_m3: float, profile: Floats) -> float:
+def level_at_volume_m(volume_m3: float, profile: Records[ProfilePoint]) -> float:
     r"""Level at which the wet well holds a volume.
 
     Within a slice with area $a + s x$ at height x the volume is $a x + s x^2 / 2$, so that
@@ -50,30 +58,30 @@ def level_at_volume_m(volume_m3: float, profile: Floats) -> float:
     ----------
     volume_m3 : float
         [m³]
-    profile : (3, k) array
-        k >= 1, from `profile_of`. [m, m², m³]
+    profile : records
+        From `profile_of`. [m, m², m³]
 
     Examples
     --------
     >>> level_at_volume_m(3.0, profile_of([(0.0, 2.0), (1.0, 4.0)]))
     1.0
     """
-    last = profile.shape[1] - 1
-    if volume_m3 >= profile[at.PROFILE_VOLUME, last]:
-        above_m3 = volume_m3 - profile[at.PROFILE_VOLUME, last]
-        return float(profile[at.PROFILE_LEVEL, last] + above_m3 / profile[at.PROFILE_AREA, last])
+    last = profile.size - 1
+    if volume_m3 >= profile[last].volume_m3:
+        above_m3 = volume_m3 - profile[last].volume_m3
+        return profile[last].level_m + above_m3 / profile[last].area_m2
     k = last - 1
-    while k > 0 and volume_m3 < profile[at.PROFILE_VOLUME, k]:
+    while k > 0 and volume_m3 < profile[k].volume_m3:
         k -= 1
-    rest_m3 = volume_m3 - profile[at.PROFILE_VOLUME, k]
-    area_m2 = profile[at.PROFILE_AREA, k]
+    rest_m3 = volume_m3 - profile[k].volume_m3
+    area_m2 = profile[k].area_m2
     slope_m = _slope_m(profile, k)
     height_m = 2.0 * rest_m3 / (area_m2 + math.sqrt(area_m2**2 + 2.0 * slope_m * rest_m3))
-    return float(profile[at.PROFILE_LEVEL, k] + height_m)
+    return profile[k].level_m + height_m
 
 
 @compiled
-def volume_at_level_m3(level_m: float, profile: Floats) -> float:
+def volume_at_level_m3(level_m: float, profile: Records[ProfilePoint]) -> float:
     """Volume in the wet well at a level: the inverse of `level_at_volume_m`.
 
     Examples
@@ -81,21 +89,21 @@ def volume_at_level_m3(level_m: float, profile: Floats) -> float:
     >>> volume_at_level_m3(1.5, profile_of([(0.0, 2.0), (1.0, 4.0)]))
     5.0
     """
-    last = profile.shape[1] - 1
-    if level_m >= profile[at.PROFILE_LEVEL, last]:
-        above_m = level_m - profile[at.PROFILE_LEVEL, last]
-        return float(profile[at.PROFILE_VOLUME, last] + above_m * profile[at.PROFILE_AREA, last])
+    last = profile.size - 1
+    if level_m >= profile[last].level_m:
+        above_m = level_m - profile[last].level_m
+        return profile[last].volume_m3 + above_m * profile[last].area_m2
     k = last - 1
-    while k > 0 and level_m < profile[at.PROFILE_LEVEL, k]:
+    while k > 0 and level_m < profile[k].level_m:
         k -= 1
-    height_m = level_m - profile[at.PROFILE_LEVEL, k]
-    area_m2 = profile[at.PROFILE_AREA, k]
+    height_m = level_m - profile[k].level_m
+    area_m2 = profile[k].area_m2
     slope_m = _slope_m(profile, k)
-    return float(profile[at.PROFILE_VOLUME, k] + height_m * (area_m2 + 0.5 * slope_m * height_m))
+    return profile[k].volume_m3 + height_m * (area_m2 + 0.5 * slope_m * height_m)
 
 
 @compiled
-def overflow_m3h(level_m: float, crest_m: float, width_m: float, profile: Floats) -> float:
+def overflow_m3h(level_m: float, crest_m: float, width_m: float, profile: Records[ProfilePoint]) -> float:
     r"""Flow over the overflow weir.
 
     $$Q = C\, b\, h^{3/2}, \qquad h = L - L_\text{crest}$$

@@ -8,7 +8,7 @@ from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import POWER, Bins
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.power import loaded_power_kw
 
 DAY_S = 86_400.0
@@ -64,7 +64,7 @@ def initial_guesses(
 def _rated_factor(replay: Replay) -> float:
     """Recorded power at nominal speed over that of the load by the configured efficiencies."""
     plant = plant_parameters(replay.station)
-    shaft_kw = float(np.mean(plant.rated_hydraulic_kw)) / plant.pump_efficiency
+    shaft_kw = float(np.mean([pump.rated_hydraulic_kw for pump in plant.pumps])) / plant.pump_efficiency
     loaded_kw = loaded_power_kw(shaft_kw, shaft_kw, plant.motor_efficiency, plant.drive_efficiency)
     is_full = replay.traces.frequency_hz > FULL * plant.nominal_frequency_hz[:, None]
     seen_kw = replay.traces.signals["power_kw"][is_full]

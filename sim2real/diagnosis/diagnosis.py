@@ -33,7 +33,7 @@ from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import LEVEL, SIGNALS, Bins
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 LITTLE = 0.3
 """Shrinkage under which an effect is none."""

@@ -17,7 +17,7 @@ from wetwell.sim2real.residuals.bins import (
     Bins,
 )
 from wetwell.simulator.effects.effect import Component
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 DRIFT_BLOCKS = 12
 STRAIGHT = 0.8

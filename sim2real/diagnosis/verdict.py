@@ -14,7 +14,7 @@ from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.sim2real.residuals.groups import groups_of
 from wetwell.sim2real.residuals.structure import repeating_squares
 from wetwell.simulator.effects.effect import Effect
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 Verdict = Literal["effect", "none", "unknown"]
 CALM = {IDLE, STEADY, MULTI_PUMP}

@@ -7,7 +7,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.hydraulics import common_flows, individual_flows
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.wet_well import volume_at_level_m3
 
 CHUNK_ROWS = 3600

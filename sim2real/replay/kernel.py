@@ -3,13 +3,15 @@
 import math
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.jit import compiled
+from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.quantities import FLOW, HEAD, LEVEL, POWER
-from wetwell.simulator import layout as at
-from wetwell.simulator.kernel import back_flow_m3h, gather_air, is_moving_now, load_pumps, move_water, turn_pumps
+from wetwell.simulator.forcing import Forcing
+from wetwell.simulator.kernel import move_plant
+from wetwell.simulator.parameters import PlantRecords
+from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import RESTING
-from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h, volume_at_level_m3
+from wetwell.simulator.wet_well import level_at_volume_m, volume_at_level_m3
 
 MOST_FOLLOWED = 0.5
 """Share of an error that one value may take away, however long there was none."""
@@ -19,21 +21,15 @@ LOST_S = 300
 
 @compiled
 def replay_seconds(
-    station: Floats,
-    pump: Floats,
-    profile: Floats,
-    sensor: Floats,
-    station_state: Floats,
-    pump_state: Floats,
-    curves: Floats,
+    plant: PlantRecords,
+    state: PlantState,
+    forcing: Forcing,
     damped: Floats,
-    station_force: Floats,
-    pump_force: Floats,
     frequency_hz: Floats,
     measured_level_m: Floats,
     level_gain: float,
     inflow_gain: float,
-    pump_truth: Floats,
+    truth: Truth,
     level_m: Floats,
     reading: Floats,
 ) -> None:
@@ -47,8 +43,8 @@ def replay_seconds(
 
     Parameters
     ----------
-    station, pump, profile, sensor, station_state, pump_state, curves, station_force, pump_force
-        As in the simulator's kernel; the inflow is a row of `station_force`.
+    plant, state, forcing
+        As in the simulator's kernel.
     damped : (3, pumps) array
         State of the damping of flow, head and power; to come as zeros.
     frequency_hz : (pumps, n) array
@@ -56,43 +52,29 @@ def replay_seconds(
         NaN is "no value".
     level_gain, inflow_gain : float
         g and g_b. [1/s, 1/s²]
-    pump_truth : (3, pumps, 1) array
-        Room for true flow, head and power of one second.
+    truth : Truth
+        Room for one second.
     level_m : (n,) array
         Out: what the level sensor would read in each second, before it is known what it read.
     reading : (3, pumps, n) array
         Out: flow, head and power as the sensors would read them without noise and delay.
     """
+    now, sensor = state.station[0], plant.sensors[LEVEL]
     extra_m3h = 0.0
-    sensed_m = level_at_volume_m(station_state[at.VOLUME], profile)
+    sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
     lost_s = 0
-    delay_s = sensor[at.DELAY, LEVEL]
+    delay_s = sensor.delay_s
     whole = int(delay_s)
     share = delay_s - whole
-    for second in range(station_force.shape[1]):
-        for i in range(pump_state.shape[1]):
-            pump_state[at.FREQUENCY_NOW, i] = frequency_hz[i, second]
-        true_m = level_at_volume_m(station_state[at.VOLUME], profile)
-        static_head_m = station[at.STATIC_HEAD] - station[at.LIFT_SLOPE] * (true_m - station[at.LIFT_REFERENCE])
-        static_head_m += station_force[at.STATIC_RISE, second]
-        friction_h2_m5 = station[at.FRICTION] * station_force[at.FRICTION_FACTOR, second]
-        is_moving = is_moving_now(pump_state)
-        if is_moving:
-            turn_pumps(station, pump, pump_state, pump_force, second, curves)
-            move_water(station, pump_state, curves, static_head_m, friction_h2_m5)
-        if station[at.AIR_HEAD] > 0.0:
-            gather_air(station, pump_state)
-        over_m3h = overflow_m3h(true_m, station[at.OVERFLOW_LEVEL], station[at.WEIR_WIDTH], profile)
-        inflow_m3h = station_force[at.INFLOW_FORCE, second] + station[at.UNMETERED_INFLOW] + extra_m3h
-        inflow_m3h += back_flow_m3h(station, pump, pump_state, pump_force, second, static_head_m, friction_h2_m5)
-        before_m3 = station_state[at.VOLUME]
-        station_state[at.VOLUME] = next_volume_m3(before_m3, inflow_m3h, over_m3h, pump_state[at.MEAN_FLOW])
-        pump_truth[:] = 0.0
-        if is_moving:
-            load_pumps(station, pump, pump_state, station_force[at.VOLTAGE_FACTOR, second], curves, 0, pump_truth)
-        _read(sensor, pump_state, damped, second, pump_truth, reading)
+    for second in range(forcing.inflow_m3h.size):
+        for i in range(state.pumps.size):
+            state.pumps[i].frequency_hz = frequency_hz[i, second]
+            truth.flow_m3h[i, 0] = truth.head_m[i, 0] = truth.power_kw[i, 0] = 0.0
+        move_plant(plant, state, forcing, second, extra_m3h, truth, 0)
+        true_m = truth.level_m[0]
+        _read(plant, state, damped, second, truth, reading)
 
-        sensed_m += (true_m - sensed_m) * sensor[at.FOLLOWED, LEVEL]
+        sensed_m += (true_m - sensed_m) * sensor.followed
         level_m[second] = sensed_m
         expected_m = sensed_m
         if delay_s > 0.0 and second > whole:
@@ -103,34 +85,36 @@ def replay_seconds(
         error_m = measured_level_m[second] - expected_m
         followed = min(level_gain * (lost_s + 1), MOST_FOLLOWED)
         if lost_s > LOST_S:
-            station_state[at.VOLUME] = volume_at_level_m3(max(measured_level_m[second], 0.0), profile)
+            now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], 0.0), plant.profile)
             sensed_m = measured_level_m[second]
         else:
-            area_m2 = (volume_at_level_m3(true_m + 0.01, profile) - volume_at_level_m3(true_m, profile)) / 0.01
-            corrected_m3 = station_state[at.VOLUME] + followed * error_m * area_m2
-            station_state[at.VOLUME] = max(corrected_m3, 0.0)
+            area_m2 = (
+                volume_at_level_m3(true_m + 0.01, plant.profile) - volume_at_level_m3(true_m, plant.profile)
+            ) / 0.01
+            corrected_m3 = now.volume_m3 + followed * error_m * area_m2
+            now.volume_m3 = max(corrected_m3, 0.0)
             sensed_m += followed * error_m
             extra_m3h += inflow_gain * error_m * area_m2 * 3600.0
         lost_s = 0
 
 
-@compiled
-def _read(
-    sensor: Floats, pump_state: Floats, damped: Floats, second: int, pump_truth: Floats, reading: Floats
-) -> None:
+@inlined
+def _read(plant: PlantRecords, state: PlantState, damped: Floats, second: int, truth: Truth, reading: Floats) -> None:
     """Read flow, head and power of each pump as its sensors do: damping, gain, offset, cutoff."""
-    for i in range(pump_state.shape[1]):
-        is_active = pump_state[at.FREQUENCY_NOW, i] > 0.0 or pump_state[at.MEAN_FLOW, i] > 0.0
-        for quantity in range(3):
-            channel = pump_channel((FLOW, HEAD, POWER)[quantity], i)
-            value = pump_truth[quantity, i, 0]
+    for i in range(state.pumps.size):
+        is_active = state.pumps[i].frequency_hz > 0.0 or state.mean_flow_m3h[i] > 0.0
+        for k, (quantity, true_value) in enumerate(
+            ((FLOW, truth.flow_m3h[i, 0]), (HEAD, truth.head_m[i, 0]), (POWER, truth.power_kw[i, 0]))
+        ):
+            sensor = plant.sensors[pump_channel(quantity, i)]
+            value = true_value
             is_seen = is_active
-            if sensor[at.FOLLOWED, channel] < 1.0:
-                damped[quantity, i] += (value - damped[quantity, i]) * sensor[at.FOLLOWED, channel]
-                value = damped[quantity, i]
+            if sensor.followed < 1.0:
+                damped[k, i] += (value - damped[k, i]) * sensor.followed
+                value = damped[k, i]
                 is_seen = is_active or value > RESTING
-            reading[quantity, i, second] = 0.0
+            reading[k, i, second] = 0.0
             if is_seen:
-                value = sensor[at.GAIN, channel] * value + sensor[at.OFFSET, channel]
-                if value >= sensor[at.CUTOFF, channel]:
-                    reading[quantity, i, second] = value
+                value = sensor.gain * value + sensor.offset
+                if value >= sensor.cutoff:
+                    reading[k, i, second] = value

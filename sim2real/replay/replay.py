@@ -1,7 +1,7 @@
 """What the simulator says for a recording, teacher-forced: frequency, inflow and level come from the recording."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQua
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.traces import Traces, repeated
 from wetwell.sim2real.replay.kernel import replay_seconds
-from wetwell.simulator import layout as at
 from wetwell.simulator.effects.effect import Effect
-from wetwell.simulator.plant import Forcing, PlantParameters, healthy_forcing, pack, plant_parameters
+from wetwell.simulator.forcing import Forcing, healthy_forcing
+from wetwell.simulator.parameters import PlantParameters, plant_parameters
+from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels_of
-from wetwell.simulator.wet_well import volume_at_level_m3
 
 LEVEL_TIME_S = 150.0
 """Time constant with which the observer follows the recorded level."""
@@ -91,48 +91,38 @@ class Replay:
             for k, name in enumerate(PUMP_METERS)
             if name in self.traces.signals
         }
-        delay_s = float(plant.sensors.delay_s[LEVEL])
+        delay_s = plant.sensors[LEVEL].delay_s
         return Prediction(level_m=later(level_m, delay_s), signals=signals, plant=plant)
 
     def _run(self, acting: Sequence[Effect], plant: PlantParameters) -> _Run:
         """Run of the kernel; one that is kept, where the plant differs from its plant in nothing that it reads."""
         traces, pumps = self.traces, self.traces.pumps
-        packed_station, pump, sensor = pack(plant)
-        packed_station[at.CONTROL_DELAY] = 0.0
-        is_held = plant.sensors.deadband[LEVEL] > 0.0
+        is_held = plant.sensors[LEVEL].deadband > 0.0
         frequency_delay_s = _delay_s(plant, "frequency_hz")
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
-        read = sensor[[at.GAIN, at.OFFSET, at.FOLLOWED, at.CUTOFF]]
-        delays_s = (frequency_delay_s, float(sensor[at.DELAY, LEVEL]), float(sensor[at.DELAY, INFLOW]))
-        arrays = (packed_station, pump, plant.profile, read)
-        key = (*(array.tobytes() for array in arrays), is_held, delays_s, forces)
+        records = replace(plant, control_delay_s=0.0).records()
+        read = tuple((sensor.gain, sensor.offset, sensor.followed, sensor.cutoff) for sensor in plant.sensors)
+        delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
+        station, profile = np.asarray(records.station).tolist(), np.asarray(records.profile).tolist()
+        key = (station, plant.pumps, profile, read, is_held, delays_s, forces)
         for run in self._kept:
             if run.key == key:
                 return run
         level_m = np.empty(traces.seconds)
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
-        station_state = np.zeros(at.STATION_STATES)
-        station_state[at.VOLUME] = volume_at_level_m3(max(self._first_level_m, 0.0), plant.profile)
-        pump_state = np.zeros((at.PUMP_STATES, pumps))
-        pump_state[at.AIR] = plant.air_head_m
         if traces.inflow_m3h is None:
             gains = 1.4 / UNKNOWN_INFLOW_TIME_S, 1.0 / UNKNOWN_INFLOW_TIME_S**2
         else:
             gains = 1.0 / LEVEL_TIME_S, 0.0
         replay_seconds(
-            packed_station,
-            pump,
-            plant.profile,
-            sensor,
-            station_state,
-            pump_state,
-            np.zeros((pumps, 3)),
+            records,
+            first_state(plant, max(self._first_level_m, 0.0)),
+            self._forced(forces, plant),
             np.zeros((len(PUMP_METERS), pumps)),
-            *self._forced(forces, plant).arrays[:2],
             np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
             self._told_level_m if is_held else traces.level_m,
             *gains,
-            np.zeros((len(PUMP_METERS), pumps, 1)),
+            still_truth(pumps, 1),
             level_m,
             reading,
         )
@@ -142,7 +132,7 @@ class Replay:
 
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""
-        delay_s = float(plant.sensors.delay_s[INFLOW])
+        delay_s = plant.sensors[INFLOW].delay_s
         if not writing and delay_s == 0.0:
             return self._forcing
         forcing = healthy_forcing(later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps)
@@ -170,7 +160,7 @@ def later(values: Floats, delay_s: float) -> Floats:
 
 
 def _delay_s(plant: PlantParameters, quantity: AnalogueQuantity) -> float:
-    return float(plant.sensors.delay_s[channels_of(quantity, plant.nominal_frequency_hz.size)[0]])
+    return plant.sensors[channels_of(quantity, len(plant.pumps))[0]].delay_s
 
 
 def _middle_level_m(station: Station) -> float:

@@ -97,10 +97,8 @@ class EventResiduals:
         another within the delay may find the level past its threshold.
         """
         plant = prediction.plant
-        frequency = channels_of("frequency_hz", plant.nominal_frequency_hz.size)[0]
-        level_m, slope_m_s = self.stretches.lines(
-            float(plant.sensors.delay_s[LEVEL] - plant.sensors.delay_s[frequency])
-        )
+        frequency = channels_of("frequency_hz", len(plant.pumps))[0]
+        level_m, slope_m_s = self.stretches.lines(plant.sensors[LEVEL].delay_s - plant.sensors[frequency].delay_s)
         is_start = self.bins.signal == START_LEVEL
         early_m = self.noise_m * _earliness(np.abs(slope_m_s) / self.noise_m)
         level_m = level_m + np.where(is_start, 1.0, -1.0) * (0.7 * early_m - 0.5 * SCAN_S * np.abs(slope_m_s))
@@ -111,8 +109,8 @@ class EventResiduals:
             is_past = np.where(is_start, error_m > 0.0, error_m < 0.0)
             error_m[is_past & (self.since_s <= plant.control_delay_s + WAITING_S)] = 0.0
         if self.pattern is not None:
-            held_m = min(float(plant.sensors.deadband[LEVEL]), self.pattern.deadband)
-            rounded_m = QUANTUM_SHARE * min(float(plant.sensors.quantum[LEVEL]), self.pattern.quantum)
+            held_m = min(plant.sensors[LEVEL].deadband, self.pattern.deadband)
+            rounded_m = QUANTUM_SHARE * min(plant.sensors[LEVEL].quantum, self.pattern.quantum)
             error_m = np.sign(error_m) * np.maximum(np.abs(error_m) - held_m - rounded_m, 0.0)
         return np.asarray(error_m / self.bins.deviation, dtype=np.float64)
 

@@ -15,7 +15,7 @@ from wetwell.sim2real.replay.replay import LEVEL_TIME_S, UNKNOWN_INFLOW_TIME_S, 
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
 from wetwell.sim2real.residuals.noise import GAUSSIAN_MAD, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.telemetry.channels import channels_of
 
 SIGNAL_OF: dict[AnalogueQuantity, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
@@ -65,16 +65,16 @@ class SignalResiduals:
             )
             is_ramp = np.isin(self.bins.regime, (START_RAMP, STOP_RAMP))[self.seconds.bin]
             error = np.where(is_ramp, self.recorded - np.clip(self.recorded, low, high), error)
-        sensors, channel = prediction.plant.sensors, _channel(prediction.plant, self.name, self.pump)
+        sensor = prediction.plant.sensors[_channel(prediction.plant, self.name, self.pump)]
         if self.pattern is not None:
-            held = min(sensors.deadband[channel], self.pattern.deadband) * self.is_repeated
-            allowed = held + QUANTUM_SHARE * min(sensors.quantum[channel], self.pattern.quantum)
+            held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
+            allowed = held + QUANTUM_SHARE * min(sensor.quantum, self.pattern.quantum)
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
 
 
 def _channel(plant: PlantParameters, name: AnalogueQuantity, pump: int) -> int:
-    return channels_of(name, plant.nominal_frequency_hz.size, None if pump == NO_PUMP else pump + 1)[0]
+    return channels_of(name, len(plant.pumps), None if pump == NO_PUMP else pump + 1)[0]
 
 
 def pump_residuals(

@@ -70,11 +70,12 @@ class TelemetryResiduals:
 
     def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
         """(patterns * cycles,) nothing where the plant holds or rounds the channel so, else `STRENGTH`."""
-        sensors, pumps = prediction.plant.sensors, prediction.plant.nominal_frequency_hz.size
+        sensors = prediction.plant.sensors
+        pumps = len(prediction.plant.pumps)
         left = []
         for pattern in self.patterns:
-            channel = channels_of(pattern.quantity, pumps)[0]
-            acting = float(sensors.deadband[channel] if pattern.deadband > 0.0 else sensors.quantum[channel])
+            sensor = sensors[channels_of(pattern.quantity, pumps)[0]]
+            acting = sensor.deadband if pattern.deadband > 0.0 else sensor.quantum
             left.append(STRENGTH * min(pattern.missed(acting) / 0.3, 1.0))
         return np.repeat(np.array(left), self.cycles)
 

@@ -32,7 +32,7 @@ from wetwell.simulator.effects.telemetry.level_sensor_lag import LevelSensorLag
 from wetwell.simulator.effects.telemetry.report_by_exception import ReportByException
 from wetwell.simulator.effects.wet_well.sump_area_profile import SumpAreaProfile
 from wetwell.simulator.effects.wet_well.unmetered_inflow import UnmeteredInflow
-from wetwell.simulator.plant import PlantParameters, plant_parameters
+from wetwell.simulator.parameters import PlantParameters, plant_parameters
 
 AnyEffect = Annotated[
     AirPocket

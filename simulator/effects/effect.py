@@ -5,10 +5,9 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Table
-from wetwell.simulator.plant import Forcing, PlantParameters
-from wetwell.simulator.telemetry.channels import channels_of
+from wetwell.simulator.forcing import Forcing
+from wetwell.simulator.parameters import PlantParameters
 
 Component = Literal[
     "sump",
@@ -61,24 +60,3 @@ class Effect(Table):
 
     def force(self, forcing: Forcing, time_s: Floats) -> None:
         """Work into the forcing of a block that begins at `time_s[0]`; for what changes with time."""
-
-
-def of_pumps(values: Floats, pump: int, value: float) -> Floats:
-    """(pumps,) values with that of one pump (from 1), or of all (0), replaced.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> of_pumps(np.zeros(3), 2, 5.0), of_pumps(np.zeros(2), 0, 1.0)
-    (array([0., 5., 0.]), array([1., 1.]))
-    """
-    replaced = values.copy()
-    replaced[pump - 1 if pump > 0 else slice(None)] = value
-    return replaced
-
-
-def of_channels(parameters: PlantParameters, row: str, quantity: AnalogueQuantity, value: float) -> PlantParameters:
-    """Parameters with one property of the sensors of a quantity replaced, on all pumps."""
-    values = getattr(parameters.sensors, row).copy()
-    values[channels_of(quantity, parameters.nominal_frequency_hz.size)] = value
-    return parameters.with_sensors(parameters.sensors._replace(**{row: values}))

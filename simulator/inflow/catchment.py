@@ -9,12 +9,12 @@ from pydantic import Field, model_validator
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import NonNegative, Positive, Table
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 HOURS = (
     *(0.55, 0.42, 0.34, 0.3, 0.34, 0.55, 1.05, 1.65, 1.8, 1.55, 1.25, 1.1),
     *(1.05, 1.0, 0.95, 0.92, 0.95, 1.08, 1.3, 1.5, 1.48, 1.25, 0.98, 0.74),
 )
-SECONDS_PER_HOUR = 3600
 SECONDS_PER_DAY = 86400.0
 FIRST_WEEKEND_DAY = 6
 STORM_LENGTH = 30.0
@@ -101,11 +101,11 @@ class CatchmentStream:
         self._draw_storm()
         self._time_s = 0
 
-    def take(self, seconds: int) -> Floats:
+    def next_seconds(self, seconds: int) -> Floats:
         """(seconds,) inflow of the next seconds, in m³/h."""
         first_s = self._time_s
         self._time_s += seconds
-        flow_m3h = self._dry_m3h(np.arange(first_s, self._time_s)) + self._take_noise_m3h(seconds)
+        flow_m3h = self._dry_m3h(np.arange(first_s, self._time_s)) + self._next_noise_m3h(seconds)
         np.maximum(flow_m3h, 0.0, out=flow_m3h)
         while self._next_storm[0] < self._time_s:
             self._storms.append(self._next_storm)
@@ -124,7 +124,7 @@ class CatchmentStream:
         dry_m3h: Floats = ((c3 * u + c2) * u + c1) * u + c0
         return dry_m3h
 
-    def _take_noise_m3h(self, seconds: int) -> Floats:
+    def _next_noise_m3h(self, seconds: int) -> Floats:
         noise_m3h = self._noise_rng.standard_normal(seconds)
         kept = math.exp(-1.0 / self._inflow.correlation_s)
         fresh_m3h = self._inflow.noise_m3h * math.sqrt(-math.expm1(-2.0 / self._inflow.correlation_s))

@@ -50,7 +50,7 @@ class DiurnalStream:
         self._surges = inflow.surges.stream(surge_rng)
         self._time_s = 0
 
-    def take(self, seconds: int) -> Floats:
+    def next_seconds(self, seconds: int) -> Floats:
         """(seconds,) inflow of the next seconds, in m³/h."""
         time_s = np.arange(self._time_s, self._time_s + seconds)
         self._time_s += seconds
@@ -58,4 +58,4 @@ class DiurnalStream:
             2.0 * np.pi * time_s / self._inflow.period_s
         )
         noise_m3h: Floats = self._inflow.noise_m3h * self._rng.standard_normal(seconds)
-        return np.maximum(base_m3h + noise_m3h, 0.0) + self._surges.take(seconds)
+        return np.maximum(base_m3h + noise_m3h, 0.0) + self._surges.next_seconds(seconds)

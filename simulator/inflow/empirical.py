@@ -63,7 +63,7 @@ class EmpiricalStream:
         self._rng = base_rng
         self._surges: SurgeStream = inflow.surges.stream(surge_rng)
 
-    def take(self, seconds: int) -> Floats:
+    def next_seconds(self, seconds: int) -> Floats:
         """(seconds,) inflow of the next seconds, in m³/h."""
         base_m3h: Floats = np.interp(self._rng.random(seconds), self._probabilities, self._flows_m3h)
-        return base_m3h + self._surges.take(seconds)
+        return base_m3h + self._surges.next_seconds(seconds)

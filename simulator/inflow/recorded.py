@@ -60,7 +60,7 @@ class RecordedStream:
         self._period_s = float(inflow.time_s[-1] + (np.median(steps_s) if steps_s.size else 1.0))
         self._time_s = 0
 
-    def take(self, seconds: int) -> Floats:
+    def next_seconds(self, seconds: int) -> Floats:
         """(seconds,) inflow of the next seconds, in m³/h."""
         time_s = np.arange(self._time_s, self._time_s + seconds) % self._period_s
         self._time_s += seconds

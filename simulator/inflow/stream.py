@@ -11,5 +11,5 @@ class InflowStream(Protocol):
     The numbers do not depend on the lengths in which they are taken.
     """
 
-    def take(self, seconds: int) -> Floats:
+    def next_seconds(self, seconds: int) -> Floats:
         """(seconds,) inflow of the next seconds, >= 0, in m³/h."""

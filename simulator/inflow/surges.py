@@ -46,7 +46,7 @@ class SurgeStream:
         self._rng = rng
         self._recent = np.zeros(surges.duration_s, dtype=np.int64)
 
-    def take(self, seconds: int) -> Floats:
+    def next_seconds(self, seconds: int) -> Floats:
         """(seconds,) flow of the surges of the next seconds, in m³/h."""
         arrivals = np.concatenate([self._recent, self._rng.poisson(self._surges.rate_per_s, seconds)])
         arrived = np.concatenate([[0], np.cumsum(arrivals)])

@@ -5,75 +5,97 @@ import math
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.jit import compiled
+from wetwell.protocols.jit import inlined
 from wetwell.protocols.quantities import FLOW, FREQUENCY, HEAD, POWER
-from wetwell.simulator import layout as at
+from wetwell.simulator.forcing import Forcing
+from wetwell.simulator.parameters import PlantRecords, SensorParameters
+from wetwell.simulator.records import Records
+from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import sense, transmit
 
 
-@compiled
-def is_plain_telemetry(sensor: Floats) -> bool:
+@inlined
+def is_plain_telemetry(sensors: Records[SensorParameters]) -> bool:
     """Whether an idle pump's channels just read 0: nothing damped, delayed or held."""
-    for k in range(sensor.shape[1]):
-        if sensor[at.FOLLOWED, k] < 1.0 or sensor[at.DELAY, k] > 0.0 or sensor[at.DEADBAND, k] > 0.0:
+    for k in range(sensors.size):
+        if sensors[k].followed < 1.0 or sensors[k].delay_s > 0.0 or sensors[k].deadband > 0.0:
             return False
     return True
 
 
-@compiled
-def read_pumps(
-    pump_state: Floats,
-    pump_truth: Floats,
+@inlined
+def read_channel(
+    channel: int,
+    true_value: float,
+    is_active: bool,
     is_frozen: bool,
-    may_rest: bool,
-    now_s: int,
-    sensor: Floats,
-    channel_state: Floats,
-    past: Floats,
-    sensor_force: Floats,
-    at_force: int,
+    plant: PlantRecords,
+    state: PlantState,
+    forcing: Forcing,
+    second: int,
     rng: np.random.Generator,
     measured: Floats,
+) -> float:
+    """Read and send a channel; its reading."""
+    at_force = second if forcing.has_sensor_faults else 0
+    reading = sense(
+        channel, true_value, is_active, plant.sensors[channel], state.channels[channel], forcing, at_force, rng
+    )
+    send(channel, reading, is_frozen, plant, state, measured, second)
+    return reading
+
+
+@inlined
+def read_pumps(
+    is_frozen: bool,
+    may_rest: bool,
+    plant: PlantRecords,
+    state: PlantState,
+    forcing: Forcing,
     second: int,
+    rng: np.random.Generator,
+    truth: Truth,
+    measured: Floats,
 ) -> None:
     """Read and send frequency, flow, head and power of each pump; the channels of a standing one may rest at 0."""
-    for i in range(pump_state.shape[1]):
-        frequency_hz = pump_state[at.FREQUENCY_NOW, i]
-        is_active = frequency_hz > 0.0 or pump_state[at.MEAN_FLOW, i] > 0.0
+    for i in range(state.pumps.size):
+        frequency_hz = state.pumps[i].frequency_hz
+        is_active = frequency_hz > 0.0 or state.mean_flow_m3h[i] > 0.0
         channel = pump_channel(FREQUENCY, i)
         if may_rest and not is_active:
-            silence(channel_state, channel, pump_channel(FREQUENCY, i + 1))
+            silence(state, channel, pump_channel(FREQUENCY, i + 1))
             continue
-        send(channel, frequency_hz, is_frozen, now_s, sensor, channel_state, past, measured, second)
-        for quantity, row in ((FLOW, at.TRUE_FLOW), (HEAD, at.TRUE_HEAD), (POWER, at.TRUE_POWER)):
+        send(channel, frequency_hz, is_frozen, plant, state, measured, second)
+        for quantity, value in (
+            (FLOW, truth.flow_m3h[i, second]),
+            (HEAD, truth.head_m[i, second]),
+            (POWER, truth.power_kw[i, second]),
+        ):
             channel = pump_channel(quantity, i)
-            value = pump_truth[row, i, second]
-            reading = sense(channel, value, is_active, sensor, channel_state, sensor_force, at_force, rng)
-            send(channel, reading, is_frozen, now_s, sensor, channel_state, past, measured, second)
+            read_channel(channel, value, is_active, is_frozen, plant, state, forcing, second, rng, measured)
 
 
-@compiled
+@inlined
 def send(
     channel: int,
     reading: float,
     is_frozen: bool,
-    now_s: int,
-    sensor: Floats,
-    channel_state: Floats,
-    past: Floats,
+    plant: PlantRecords,
+    state: PlantState,
     measured: Floats,
     second: int,
 ) -> None:
     """Record the telemetry of a reading; a frozen PLC repeats what it has sent last."""
-    if not is_frozen or math.isnan(channel_state[at.LAST_SENT, channel]):
-        transmit(channel, reading, now_s, sensor, channel_state, past)
-    measured[channel, second] = channel_state[at.LAST_SENT, channel]
+    sent = state.channels[channel]
+    if not is_frozen or math.isnan(sent.last_sent):
+        transmit(reading, state.station[0].second, plant.sensors[channel], sent, state.past[channel])
+    measured[channel, second] = sent.last_sent
 
 
-@compiled
-def silence(channel_state: Floats, first: int, end: int) -> None:
+@inlined
+def silence(state: PlantState, first: int, end: int) -> None:
     """Let the sensors and the telemetry of channels of standing pumps read 0."""
     for channel in range(first, end):
-        channel_state[at.LAST_READING, channel] = 0.0
-        channel_state[at.LAST_SENT, channel] = 0.0
+        state.channels[channel].last_reading = 0.0
+        state.channels[channel].last_sent = 0.0

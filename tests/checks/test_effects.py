@@ -274,5 +274,5 @@ def test_effects_fit_a_station_with_a_profile(alpha):
     station = Station.model_validate(alpha.model_copy(update={"sump": sump}).model_dump())
     effect = EFFECTS["sump_area_profile"](bottom_factor=0.5, height_m=1.0)
     profile = effective_parameters(under(station, effect)).profile
-    np.testing.assert_allclose(profile[0], [0.0, 0.5, 1.0, 2.0, 3.0])
-    np.testing.assert_allclose(profile[1], [2.0, 4.5, 6.4, 7.2, 8.0])
+    np.testing.assert_allclose(profile["level_m"], [0.0, 0.5, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(profile["area_m2"], [2.0, 4.5, 6.4, 7.2, 8.0])

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from wetwell.protocols.station.station_file import check_levels
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 
 class ThresholdShift(Effect):

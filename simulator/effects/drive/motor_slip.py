@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 
 class MotorSlip(Effect):
@@ -36,4 +36,4 @@ class MotorSlip(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let the motors slip."""
-        return replace(parameters, slip=parameters.slip + self.slip)
+        return parameters.with_pumps(lambda pump: replace(pump, slip=pump.slip + self.slip))

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 BENT = 0.05
 """Departure of the power from 1, or of the bow from 0, from which a ramp is bent."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class SupplyVoltageVariation(Effect):

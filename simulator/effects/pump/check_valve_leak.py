@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 
 class CheckValveLeak(Effect):
@@ -33,4 +33,4 @@ class CheckValveLeak(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let the valves leak."""
-        return replace(parameters, valve_leak_m3h=parameters.valve_leak_m3h + self.leak_m3h)
+        return parameters.with_pumps(lambda pump: replace(pump, valve_leak_m3h=pump.valve_leak_m3h + self.leak_m3h))

@@ -3,10 +3,8 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
-
 from wetwell.simulator.effects.effect import Component, Effect, PumpNumber, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 
 class PumpWear(Effect):
@@ -39,8 +37,13 @@ class PumpWear(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Lower the curve and move it to the left."""
-        worn = slice(None) if self.pump == 0 else slice(self.pump - 1, self.pump)
-        curves, q = parameters.curves.copy(), self.leak_m3h
-        c0, c1, c2 = curves[worn].T
-        curves[worn] = (1.0 - self.head_loss) * np.array([c0 + (c1 + c2 * q) * q, c1 + 2.0 * c2 * q, c2]).T
-        return replace(parameters, curves=curves)
+        kept, q = 1.0 - self.head_loss, self.leak_m3h
+        return parameters.with_pumps(
+            lambda pump: replace(
+                pump,
+                c0=kept * (pump.c0 + (pump.c1 + pump.c2 * q) * q),
+                c1=kept * (pump.c1 + 2.0 * pump.c2 * q),
+                c2=kept * pump.c2,
+            ),
+            self.pump,
+        )

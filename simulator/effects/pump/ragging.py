@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, PumpNumber, limits, of_pumps
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.effects.effect import Component, Effect, PumpNumber, limits
+from wetwell.simulator.parameters import PlantParameters
 
 
 class Ragging(Effect):
@@ -39,8 +39,6 @@ class Ragging(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let rags gather."""
-        return replace(
-            parameters,
-            ragging_limit=of_pumps(parameters.ragging_limit, self.pump, self.speed_loss),
-            ragging_s=of_pumps(parameters.ragging_s, self.pump, self.growth_s),
+        return parameters.with_pumps(
+            lambda pump: replace(pump, ragging_limit=self.speed_loss, ragging_s=self.growth_s), self.pump
         )

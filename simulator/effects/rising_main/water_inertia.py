@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 
 from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 
 
 class WaterInertia(Effect):

@@ -1,10 +1,11 @@
 """A channel that is late."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.protocols.quantities import AnalogueQuantity
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits, of_channels
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.parameters import PlantParameters
 
 
 class ChannelDelay(Effect):
@@ -15,7 +16,7 @@ class ChannelDelay(Effect):
     Parameters
     ----------
     channel : str
-        Quantity that is late, of every pump if it is one of the pumps.
+        AnalogueQuantity that is late, of every pump if it is one of the pumps.
     delay_s : float
         d; 0 is no effect. [s]
 
@@ -34,7 +35,7 @@ class ChannelDelay(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Delay the channel."""
-        return of_channels(parameters, "delay_s", self.channel, self.delay_s)
+        return parameters.with_sensors(lambda sensor: replace(sensor, delay_s=self.delay_s), self.channel)
 
     def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
         """Whether the delay is a second or more."""

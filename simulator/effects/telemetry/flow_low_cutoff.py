@@ -1,9 +1,10 @@
 """Low-flow cutoff of the flow meters."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.parameters import PlantParameters
 
 
 class FlowLowCutoff(Effect):
@@ -31,4 +32,4 @@ class FlowLowCutoff(Effect):
         """Cut low flows off."""
         if self.cutoff_m3h == 0.0:
             return parameters
-        return of_channels(parameters, "cutoff", "flow_m3h", self.cutoff_m3h)
+        return parameters.with_sensors(lambda sensor: replace(sensor, cutoff=self.cutoff_m3h), "flow_m3h")

@@ -1,10 +1,10 @@
 """Flow meters that read too much or too little."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
-from wetwell.simulator.telemetry.channels import channels_of
+from wetwell.simulator.parameters import PlantParameters
 
 
 class FlowMeterGain(Effect):
@@ -31,6 +31,4 @@ class FlowMeterGain(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Scale the readings."""
-        gain = parameters.sensors.gain.copy()
-        gain[channels_of("flow_m3h", parameters.nominal_frequency_hz.size)] *= self.factor
-        return parameters.with_sensors(parameters.sensors._replace(gain=gain))
+        return parameters.with_sensors(lambda sensor: replace(sensor, gain=sensor.gain * self.factor), "flow_m3h")

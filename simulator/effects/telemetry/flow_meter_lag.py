@@ -1,9 +1,10 @@
 """Damped flow meters."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits, of_channels
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.parameters import PlantParameters, followed_share
 
 
 class FlowMeterLag(Effect):
@@ -29,7 +30,9 @@ class FlowMeterLag(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Damp the flows."""
-        return of_channels(parameters, "lag_s", "flow_m3h", self.lag_s)
+        return parameters.with_sensors(
+            lambda sensor: replace(sensor, followed=followed_share(self.lag_s)), "flow_m3h"
+        )
 
     def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
         """Whether the lag is a second or more."""

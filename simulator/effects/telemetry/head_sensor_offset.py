@@ -1,10 +1,10 @@
 """Head sensors that are off."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
-from wetwell.simulator.telemetry.channels import channels_of
+from wetwell.simulator.parameters import PlantParameters
 
 
 class HeadSensorOffset(Effect):
@@ -31,6 +31,4 @@ class HeadSensorOffset(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Shift the readings."""
-        offset = parameters.sensors.offset.copy()
-        offset[channels_of("head_m", parameters.nominal_frequency_hz.size)] += self.offset_m
-        return parameters.with_sensors(parameters.sensors._replace(offset=offset))
+        return parameters.with_sensors(lambda sensor: replace(sensor, offset=sensor.offset + self.offset_m), "head_m")

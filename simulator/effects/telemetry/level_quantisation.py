@@ -1,9 +1,10 @@
 """A level in steps."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.parameters import PlantParameters
 
 
 class LevelQuantisation(Effect):
@@ -29,4 +30,4 @@ class LevelQuantisation(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Round the level."""
-        return of_channels(parameters, "quantum", "level_m", self.quantum_m)
+        return parameters.with_sensors(lambda sensor: replace(sensor, quantum=self.quantum_m), "level_m")

@@ -1,10 +1,11 @@
 """A channel that is reported when it has moved."""
 
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.protocols.quantities import AnalogueQuantity
-from wetwell.simulator.effects.effect import Component, Effect, limits, of_channels
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.parameters import PlantParameters
 
 
 class ReportByException(Effect):
@@ -15,7 +16,7 @@ class ReportByException(Effect):
     Parameters
     ----------
     channel : str
-        Quantity that is reported so, of every pump if it is one of the pumps.
+        AnalogueQuantity that is reported so, of every pump if it is one of the pumps.
     deadband : float
         b; 0 is no effect. [unit of the channel]
 
@@ -33,4 +34,4 @@ class ReportByException(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Hold the channel."""
-        return of_channels(parameters, "deadband", self.channel, self.deadband)
+        return parameters.with_sensors(lambda sensor: replace(sensor, deadband=self.deadband), self.channel)

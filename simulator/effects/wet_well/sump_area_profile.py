@@ -5,12 +5,11 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from wetwell.simulator import layout as at
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.plant import PlantParameters
+from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.wet_well import profile_of
 
-SHARES = np.linspace(0.0, 1.0, 13) ** 2
+GROWTH_SHARES = np.linspace(0.0, 1.0, 13) ** 2
 """Of the growth of the area up to h, at which the profile has its points."""
 
 
@@ -53,10 +52,10 @@ class SumpAreaProfile(Effect):
         """Scale the area along the profile."""
         if self.bottom_factor == self.top_factor == 1.0:
             return parameters
-        grown = SHARES if self.exponent > 1.0 else SHARES[[0, -1]]
+        grown = GROWTH_SHARES if self.exponent > 1.0 else GROWTH_SHARES[[0, -1]]
         knots_m = self.height_m * np.r_[grown ** (1.0 / self.exponent), 2.0]
         factors = np.r_[self.bottom_factor + (1.0 - self.bottom_factor) * grown, self.top_factor]
-        levels_m = np.union1d(parameters.profile[at.PROFILE_LEVEL], knots_m)
-        areas_m2 = np.interp(levels_m, parameters.profile[at.PROFILE_LEVEL], parameters.profile[at.PROFILE_AREA])
-        areas_m2 *= np.interp(levels_m, knots_m, factors)
+        profile = parameters.profile
+        levels_m = np.union1d(profile["level_m"], knots_m)
+        areas_m2 = np.interp(levels_m, profile["level_m"], profile["area_m2"]) * np.interp(levels_m, knots_m, factors)
         return replace(parameters, profile=profile_of(list(zip(levels_m, areas_m2, strict=True))))

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
 from wetwell.simulator.faults.profile import PumpFault
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class Blockage(PumpFault):

@@ -2,11 +2,9 @@
 
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-
 from wetwell.protocols.arrays import Floats
 from wetwell.simulator.faults.profile import PumpFault
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class DriveTrip(PumpFault):
@@ -35,5 +33,4 @@ class DriveTrip(PumpFault):
 
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Trip the pump's drive in a block that begins at `time_s[0]`."""
-        tripped = forcing.is_tripped[self.pump - 1]
-        np.maximum(tripped, self.share(time_s), out=tripped)
+        forcing.is_tripped[self.pump - 1] |= self.is_active(time_s)

@@ -7,7 +7,7 @@ from pydantic import Field
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Fraction
 from wetwell.simulator.faults.profile import SystemFault
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class PartlyClosedValve(SystemFault):

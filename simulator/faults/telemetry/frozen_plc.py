@@ -2,11 +2,9 @@
 
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-
 from wetwell.protocols.arrays import Floats
 from wetwell.simulator.faults.profile import SensorFault
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class FrozenPlc(SensorFault):
@@ -33,4 +31,4 @@ class FrozenPlc(SensorFault):
 
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Stop the PLC's program in a block that begins at `time_s[0]`."""
-        np.maximum(forcing.is_plc_frozen, self.share(time_s), out=forcing.is_plc_frozen)
+        forcing.is_plc_frozen[:] |= self.is_active(time_s)

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Finite
 from wetwell.simulator.faults.profile import ChannelFault
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class SensorBias(ChannelFault):

@@ -5,9 +5,8 @@ from typing import Any, ClassVar, Literal
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Finite
 from wetwell.simulator.faults.profile import ChannelFault
-from wetwell.simulator.plant import Forcing
-
-SECONDS_PER_HOUR = 3600.0
+from wetwell.simulator.forcing import Forcing
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 
 class SensorDrift(ChannelFault):

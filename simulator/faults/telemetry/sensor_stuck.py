@@ -2,11 +2,9 @@
 
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-
 from wetwell.protocols.arrays import Floats
 from wetwell.simulator.faults.profile import ChannelFault
-from wetwell.simulator.plant import Forcing
+from wetwell.simulator.forcing import Forcing
 
 
 class SensorStuck(ChannelFault):
@@ -33,5 +31,4 @@ class SensorStuck(ChannelFault):
 
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Hold the readings in a block that begins at `time_s[0]`."""
-        rows = self.rows(forcing)
-        forcing.is_sensor_stuck[rows] = np.maximum(forcing.is_sensor_stuck[rows], self.share(time_s))
+        forcing.is_sensor_stuck[self.rows(forcing)] |= self.is_active(time_s)

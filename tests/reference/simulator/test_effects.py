@@ -15,7 +15,7 @@ from scipy.optimize import brentq, fsolve
 from wetwell.protocols.station.station_file import Control, EffectTable
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.inflow.recorded import RecordedInflow
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 

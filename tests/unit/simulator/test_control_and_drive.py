@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.station.station_file import Control
-from wetwell.simulator.control import FIXED, LEAST_RUN_TIME, NOTHING, ROUND_ROBIN, next_in_rotation, wanted_change
-from wetwell.simulator.drive import next_frequency_hz
+from wetwell.simulator.control.drive import next_frequency_hz
+from wetwell.simulator.control.rules import NOTHING, next_in_rotation, wanted_change
 from wetwell.simulator.inflow.recorded import RecordedInflow
+from wetwell.simulator.parameters import FIXED, LEAST_RUN_TIME, ROUND_ROBIN
+from wetwell.simulator.records import records_of
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
+from wetwell.simulator.state import PumpState
 
 STARTS_M, STOPS_M = np.array([1.6, 1.8, 2.0]), np.array([0.5, 0.8, 1.0])
+RUN_S = (30.0, 10.0, 20.0)
 
 
 class Bench:
@@ -213,8 +217,8 @@ def test_wanted_change(level_m, running, change):
     ],
 )
 def test_rotation(rotation, turn, ready, chosen):
-    run_s = np.array([30.0, 10.0, 20.0])
-    assert next_in_rotation(rotation, turn, run_s, np.array(ready, dtype=float)) == chosen
+    pumps = [PumpState(run_s=run_s, is_ready=bool(is_ready)) for run_s, is_ready in zip(RUN_S, ready, strict=True)]
+    assert next_in_rotation(rotation, turn, records_of(pumps)) == chosen
 
 
 @pytest.mark.parametrize(

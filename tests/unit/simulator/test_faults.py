@@ -23,8 +23,8 @@ from wetwell.simulator.faults.telemetry.sensor_bias import SensorBias
 from wetwell.simulator.faults.telemetry.sensor_drift import SensorDrift
 from wetwell.simulator.faults.telemetry.sensor_noise import SensorNoise
 from wetwell.simulator.faults.telemetry.sensor_stuck import SensorStuck
+from wetwell.simulator.forcing import healthy_forcing
 from wetwell.simulator.inflow.recorded import RecordedInflow
-from wetwell.simulator.plant import healthy_forcing
 from wetwell.simulator.scenario import DEFAULT_START_NS, Scenario
 from wetwell.simulator.simulation import Simulation
 

@@ -16,7 +16,7 @@ NO_SURGES = Surges(rate_per_s=0)
 
 
 def taken(inflow, seconds, seed=1):
-    return inflow.stream(np.random.default_rng(seed)).take(seconds)
+    return inflow.stream(np.random.default_rng(seed)).next_seconds(seconds)
 
 
 @pytest.mark.parametrize("quantiles", [PAPER_QUANTILES, ((0.0, 5.0), (0.2, 30.0), (1.0, 40.0))])
@@ -50,7 +50,7 @@ def test_surges_arrive_as_a_poisson_process():
     """Pulses of one second count the arrivals: number within four standard deviations, gaps exponential."""
     rate_per_s, seconds = 5e-3, 1_000_000
     surges = Surges(rate_per_s=rate_per_s, flow_m3h=30.0, duration_s=1)
-    arrivals = surges.stream(np.random.default_rng(2)).take(seconds) / 30.0
+    arrivals = surges.stream(np.random.default_rng(2)).next_seconds(seconds) / 30.0
     expected = rate_per_s * seconds
     assert arrivals.sum() == pytest.approx(expected, abs=4 * math.sqrt(expected))
     gaps_s = np.diff(np.flatnonzero(arrivals))
@@ -63,7 +63,7 @@ def test_surges_add_up_to_rate_times_volume():
     """Total volume is Poisson(rate · T) pulses of height times length: within four standard deviations."""
     rate_per_s, seconds, duration_s = 0.01, 1_000_000, 50
     surges = Surges(rate_per_s=rate_per_s, flow_m3h=20.0, duration_s=duration_s)
-    flow_m3h = surges.stream(np.random.default_rng(4)).take(seconds)
+    flow_m3h = surges.stream(np.random.default_rng(4)).next_seconds(seconds)
     pulses = flow_m3h.sum() / 20.0 / duration_s
     assert pulses == pytest.approx(rate_per_s * seconds, abs=4 * math.sqrt(rate_per_s * seconds))
     active = np.rint(flow_m3h / 20.0)
@@ -76,7 +76,7 @@ def test_surges_add_up_to_rate_times_volume():
 def test_a_surge_that_stays_alone_has_its_height_and_length(duration_s):
     """A stretch of flow at no more than one height is one pulse, or pulses back to back."""
     surges = Surges(rate_per_s=2e-5, flow_m3h=30.0, duration_s=duration_s)
-    flow_m3h = surges.stream(np.random.default_rng(5)).take(1_000_000)
+    flow_m3h = surges.stream(np.random.default_rng(5)).next_seconds(1_000_000)
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], flow_m3h > 0, [0.0]])))
     stretches = list(zip(edges[::2], edges[1::2], strict=True))
     lengths_s = [last - first for first, last in stretches if flow_m3h[first:last].max() == 30.0]

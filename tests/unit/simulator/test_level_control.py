@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.station.station_file import Control, Sump
-from wetwell.simulator.control import controlled_frequency_hz
+from wetwell.simulator.control.rules import controlled_frequency_hz
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.inflow.surges import Surges
+from wetwell.simulator.records import records_of
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
+from wetwell.simulator.state import StationState
 
 DAY_S = 86_400
 SETPOINT_M = 1.2
@@ -80,13 +82,13 @@ def test_the_controller_recovers_from_saturation_without_a_long_undershoot(quiet
 
 def test_the_integral_rests_while_a_limit_holds_the_output():
     """Above the setpoint at full speed nothing is summed; once the error turns, the sum moves again."""
-    memory = np.zeros(3)
+    memory = records_of([StationState()])[0]
     arguments = (SETPOINT_M, 40.0, 120.0, 0.0, 15.0, 50.0, memory)
     for _ in range(1000):
         assert controlled_frequency_hz(3.0, *arguments) == 50.0
-    assert memory[0] == 0.0
+    assert memory["pid_integral_hz"] == 0.0
     assert controlled_frequency_hz(1.1, *arguments) < 50.0
-    assert memory[0] < 0.0
+    assert memory["pid_integral_hz"] < 0.0
 
 
 def test_running_pumps_keep_the_minimum_frequency(quiet_alpha):

@@ -6,7 +6,7 @@ import pytest
 from wetwell.sim2real.diagnosis.localisation import localise
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.parameters import plant_parameters
 
 RUNS, BINS_PER_RUN = 40, 20
 HEAD_DEVIATION = 0.05

@@ -8,7 +8,7 @@ import pytest
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import START_LEVEL, Bins
 from wetwell.sim2real.residuals.events import WINDOW_S, EventResiduals, Stretches
-from wetwell.simulator.plant import plant_parameters
+from wetwell.simulator.parameters import plant_parameters
 
 TURN_S = 100
 

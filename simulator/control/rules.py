@@ -2,15 +2,15 @@
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
+from wetwell.simulator.parameters import LEAST_RUN_TIME, ROUND_ROBIN
+from wetwell.simulator.records import Records
+from wetwell.simulator.state import PumpState, StationState
 
 NOTHING = -1
-ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)
-ROTATIONS = ("round_robin", "fixed", "least_run_time")
-SECONDS_PER_HOUR = 3600
 
 
 @compiled
-def next_in_rotation(rotation: int, turn: int, run_s: Floats, is_ready: Floats) -> int:
+def next_in_rotation(rotation: int, turn: int, pumps: Records[PumpState]) -> int:
     """Index of the pump that starts next, or -1 if none is ready.
 
     Parameters
@@ -20,18 +20,15 @@ def next_in_rotation(rotation: int, turn: int, run_s: Floats, is_ready: Floats) 
         one that has run least.
     turn : int
         Pump after the one that started last.
-    run_s : (pumps,) array
-        [s]
-    is_ready : (pumps,) array
-        1 for automatic, standing, and not started too often; else 0.
+    pumps : records
+        How long each has run, and whether it is ready: automatic, standing, and not started too often.
     """
-    pumps = is_ready.size
     best = NOTHING
-    for step in range(pumps):
-        pump = (turn + step) % pumps if rotation == ROUND_ROBIN else step
-        if is_ready[pump] <= 0.0:
+    for step in range(pumps.size):
+        pump = (turn + step) % pumps.size if rotation == ROUND_ROBIN else step
+        if not pumps[pump].is_ready:
             continue
-        if best == NOTHING or (rotation == LEAST_RUN_TIME and run_s[pump] < run_s[best]):
+        if best == NOTHING or (rotation == LEAST_RUN_TIME and pumps[pump].run_s < pumps[best].run_s):
             best = pump
         if rotation != LEAST_RUN_TIME:
             break
@@ -74,7 +71,7 @@ def controlled_frequency_hz(
     derivative_s: float,
     minimum_hz: float,
     nominal_hz: float,
-    memory: Floats,
+    memory: StationState,
 ) -> float:
     r"""Frequency by which running pumps hold the level: a PID controller.
 
@@ -91,19 +88,19 @@ def controlled_frequency_hz(
         K, T_i, T_d. [Hz/m, s, s]
     minimum_hz, nominal_hz : float
         Limits. [Hz]
-    memory : (3,) array
-        Integral part in Hz, last level in m, and 1 once there is one; changed in place.
+    memory : record
+        Integral part, last level, and whether there is one; changed in place.
 
     References
     ----------
     .. [1] K. J. Åström, T. Hägglund, Advanced PID Control, ISA 2006: conditional integration.
     """
     error_m = measured_level_m - setpoint_m
-    slope_m_s = measured_level_m - memory[1] if memory[2] > 0.0 else 0.0
-    memory[1] = measured_level_m
-    memory[2] = 1.0
-    integral_hz = memory[0] + gain_hz_m * error_m / integral_s
+    slope_m_s = measured_level_m - memory.pid_level_m if memory.has_pid_level else 0.0
+    memory.pid_level_m = measured_level_m
+    memory.has_pid_level = True
+    integral_hz = memory.pid_integral_hz + gain_hz_m * error_m / integral_s
     wanted_hz = nominal_hz + gain_hz_m * (error_m + derivative_s * slope_m_s) + integral_hz
     if minimum_hz < wanted_hz < nominal_hz or (wanted_hz >= nominal_hz) == (error_m < 0.0):
-        memory[0] = integral_hz
-    return float(min(max(wanted_hz, minimum_hz), nominal_hz))
+        memory.pid_integral_hz = integral_hz
+    return min(max(wanted_hz, minimum_hz), nominal_hz)

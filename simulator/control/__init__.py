@@ -1,0 +1,1 @@
+"""What moves the pumps: rules of the controller, drives, and the PLC that works by both."""

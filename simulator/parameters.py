@@ -1,0 +1,255 @@
+"""Parameters of a plant by name: the hook of effects, and what the kernel reads."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, AnalogueQuantity
+from wetwell.protocols.station.station_file import Sensors, Station
+from wetwell.simulator.power import hydraulic_power_kw
+from wetwell.simulator.records import Records, records_of
+from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
+from wetwell.simulator.wet_well import ProfilePoint, profile_of
+
+ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)
+ROTATIONS = ("round_robin", "fixed", "least_run_time")
+SMALLEST_HEAD_M = 1e-6
+"""Rated head at the least, so that a main without friction and lift has a rated power to compare with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PumpParameters:
+    """A pump: its curve and rated duty, and what is not as new.
+
+    Rags take speed, in a run ever more, towards `ragging_limit` with time constant `ragging_s`. `slip` is the loss of
+    speed at rated torque. While the pump stands, `valve_leak_m3h` flows back through its check valve at 1 m of head.
+    """
+
+    c0: float
+    c1: float
+    c2: float
+    nominal_frequency_hz: float
+    rated_hydraulic_kw: float
+    rated_flow_m3h: float
+    ragging_limit: float = 0.0
+    ragging_s: float = math.inf
+    slip: float = 0.0
+    valve_leak_m3h: float = 0.0
+    is_automatic: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorParameters:
+    r"""How a channel measures and transmits.
+
+    The sensor: $y = g\, x_\tau + o$ with x damped by a first-order lag τ, of which `followed` is the share of a step
+    that it follows within a second, then noise $y (1 + \sigma n)$ (the level: $y + \sigma n$) with $n$ white or
+    AR(1), then 0 below a cutoff. The telemetry: a delay, rounding to a quantum, and a value that is held until it has
+    moved by a deadband.
+    """
+
+    gain: float = 1.0
+    offset: float = 0.0
+    followed: float = 1.0
+    noise: float = 0.0
+    correlation: float
+    cutoff: float = -math.inf
+    delay_s: float = 0.0
+    quantum: float = 0.0
+    deadband: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantParameters:
+    """A station as the kernel reads it.
+
+    Wet well: profile, an overflow weir, inflow that no meter sees. Pumps: see `PumpParameters`. Rising main:
+    on a common header, the share `shared_friction` of k acts on the total flow, the rest on each pump's own;
+    static head that falls by `lift_slope` for each metre of level above `lift_reference_m`; `inertia_s2_m2` =
+    length / (g area); air that grows idle and purges running, in each main. Drive: shape of the ramp. Control:
+    levels, delay, rotation, limits, level controller. Electrical: a power that follows the frequency, or the load,
+    or between the two by `load_share`. Sensors: one a channel.
+    """
+
+    profile: Records[ProfilePoint]
+    overflow_level_m: float
+    weir_width_m: float
+    unmetered_inflow_m3h: float = 0.0
+
+    pumps: tuple[PumpParameters, ...]
+
+    static_head_m: float
+    friction_h2_m5: float
+    is_common_header: bool
+    shared_friction: float = 1.0
+    lift_slope: float = 0.0
+    lift_reference_m: float = 0.0
+    inertia_s2_m2: float = 0.0
+    air_head_m: float = 0.0
+    air_growth_s: float = math.inf
+    air_purge_s: float = math.inf
+    is_air_shared: bool = False
+
+    ramp_s: float
+    min_frequency_hz: float
+    dwell_s: float
+    ramp_power: float = 1.0
+    ramp_bow: float = 0.0
+    speed_lag_s: float = 0.0
+
+    start_levels_m: Floats
+    stop_levels_m: Floats
+    control_delay_s: float = 0.0
+    rotation: int
+    starts_per_hour: int
+    is_pid: bool
+    pid_level_m: float
+    pid_gain_hz_m: float
+    pid_integral_s: float
+    pid_derivative_s: float
+
+    voltage_v: float
+    rated_current_a: float
+    power_factor: float
+    pump_efficiency: float
+    motor_efficiency: float
+    drive_efficiency: float
+    shutoff_power_share: float
+    load_share: float
+
+    sensors: tuple[SensorParameters, ...]
+
+    @property
+    def curves(self) -> Floats:
+        """(pumps, 3) coefficients of the pump curves at nominal speed. [m, m/(m³/h), m/(m³/h)²]."""
+        return np.array([(pump.c0, pump.c1, pump.c2) for pump in self.pumps])
+
+    @property
+    def nominal_frequency_hz(self) -> Floats:
+        """(pumps,) nominal frequencies. [Hz]."""
+        return np.array([pump.nominal_frequency_hz for pump in self.pumps])
+
+    @property
+    def rated_flow_m3h(self) -> Floats:
+        """(pumps,) flows of each pump alone at nominal speed. [m³/h]."""
+        return np.array([pump.rated_flow_m3h for pump in self.pumps])
+
+    def with_pumps(self, changed: Callable[[PumpParameters], PumpParameters], number: int = 0) -> "PlantParameters":
+        """The same plant with one pump changed (from 1), or all (0)."""
+        pumps = [changed(pump) if number in {0, i} else pump for i, pump in enumerate(self.pumps, start=1)]
+        return replace(self, pumps=tuple(pumps))
+
+    def with_sensors(
+        self, changed: Callable[[SensorParameters], SensorParameters], quantity: AnalogueQuantity
+    ) -> "PlantParameters":
+        """The same plant with the sensors of a quantity changed, those of all pumps."""
+        rows = channels_of(quantity, len(self.pumps))
+        sensors = [changed(sensor) if row in rows else sensor for row, sensor in enumerate(self.sensors)]
+        return replace(self, sensors=tuple(sensors))
+
+    def records(self) -> "PlantRecords":
+        """What compiled code reads, of its own: it may be changed."""
+        return PlantRecords(
+            station=records_of([self]),
+            pumps=records_of(self.pumps),
+            sensors=records_of(self.sensors),
+            profile=self.profile,
+            start_levels_m=self.start_levels_m.copy(),
+            stop_levels_m=self.stop_levels_m.copy(),
+        )
+
+
+class PlantRecords(NamedTuple):
+    """Parameters of a plant in records; of the station there is one."""
+
+    station: Records[PlantParameters]
+    pumps: Records[PumpParameters]
+    sensors: Records[SensorParameters]
+    profile: Records[ProfilePoint]
+    start_levels_m: Floats
+    stop_levels_m: Floats
+
+
+def plant_parameters(station: Station) -> PlantParameters:
+    """Parameters of a station without its effects."""
+    control, electrical, main = station.control, station.electrical, station.rising_main
+    return PlantParameters(
+        profile=profile_of(station.sump.profile or [(0.0, station.sump.area_m2)]),
+        overflow_level_m=math.inf if station.sump.overflow_level_m is None else station.sump.overflow_level_m,
+        weir_width_m=station.sump.weir_width_m,
+        pumps=_pump_parameters(station),
+        static_head_m=main.static_head_m,
+        friction_h2_m5=main.friction_h2_m5,
+        is_common_header=main.layout == "common",
+        ramp_s=control.ramp_s,
+        min_frequency_hz=control.min_frequency_hz,
+        dwell_s=control.dwell_s,
+        start_levels_m=np.array(control.start_levels_m),
+        stop_levels_m=np.array(control.stop_levels_m),
+        rotation=ROTATIONS.index(control.rotation),
+        starts_per_hour=control.max_starts_per_hour,
+        is_pid=control.mode == "pid",
+        pid_level_m=control.setpoint_m,
+        pid_gain_hz_m=control.gain_hz_m,
+        pid_integral_s=control.integral_s,
+        pid_derivative_s=control.derivative_s,
+        voltage_v=electrical.voltage_v,
+        rated_current_a=electrical.rated_current_a,
+        power_factor=electrical.power_factor,
+        pump_efficiency=electrical.efficiency,
+        motor_efficiency=electrical.motor_efficiency,
+        drive_efficiency=electrical.drive_efficiency,
+        shutoff_power_share=electrical.shutoff_power_share,
+        load_share=1.0 if electrical.power_model == "load" else 0.0,
+        sensors=_sensor_parameters(station.sensors, len(station.pump)),
+    )
+
+
+def _pump_parameters(station: Station) -> tuple[PumpParameters, ...]:
+    """Pumps with their rated duty: each alone at nominal speed."""
+    main = station.rising_main
+    c0, c1, c2 = np.array([pump.coefficients for pump in station.pump]).T
+    lift_m = c0 - main.static_head_m
+    flow_m3h = 2.0 * lift_m / (-c1 + np.sqrt(c1**2 + 4.0 * (main.friction_h2_m5 - c2) * lift_m))
+    head_m = np.maximum(c0 + c1 * flow_m3h + c2 * flow_m3h**2, SMALLEST_HEAD_M)
+    return tuple(
+        PumpParameters(
+            c0=pump.coefficients[0],
+            c1=pump.coefficients[1],
+            c2=pump.coefficients[2],
+            nominal_frequency_hz=pump.nominal_frequency_hz,
+            rated_hydraulic_kw=hydraulic_power_kw(rated_m3h, rated_m),
+            rated_flow_m3h=rated_m3h,
+            is_automatic=number not in station.control.out_of_service,
+        )
+        for number, (pump, rated_m3h, rated_m) in enumerate(
+            zip(station.pump, flow_m3h.tolist(), head_m.tolist(), strict=True), start=1
+        )
+    )
+
+
+def _sensor_parameters(sensors: Sensors, pumps: int) -> tuple[SensorParameters, ...]:
+    noise = np.zeros(channels(pumps))
+    noise[LEVEL] = sensors.level_noise_m
+    noise[INFLOW] = sensors.inflow_noise
+    noise[FIRST_PUMP + FLOW :: PUMP_CHANNELS] = sensors.flow_noise
+    noise[FIRST_PUMP + HEAD :: PUMP_CHANNELS] = sensors.head_noise
+    noise[FIRST_PUMP + POWER :: PUMP_CHANNELS] = sensors.power_noise
+    return tuple(SensorParameters(noise=share, correlation=sensors.correlation) for share in noise.tolist())
+
+
+def followed_share(lag_s: float) -> float:
+    r"""Share of a step that a first-order lag follows within a second.
+
+    $$1 - e^{-1 / \tau}$$
+
+    Examples
+    --------
+    >>> followed_share(0.0), round(followed_share(10.0), 4)
+    (1.0, 0.0952)
+    """
+    return 1.0 if lag_s <= 0.0 else 1.0 - math.exp(-1.0 / lag_s)

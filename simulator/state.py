@@ -1,0 +1,117 @@
+"""State of a plant: what it carries from a second to the next, changed in place by the kernel."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.simulator.parameters import PlantParameters
+from wetwell.simulator.records import Records, records_of
+from wetwell.simulator.telemetry.channels import channels
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR, volume_at_level_m3
+
+MAX_DELAY_S = 119
+PAST_S = MAX_DELAY_S + 2
+MAX_STARTS_PER_HOUR = 60
+
+
+@dataclass(slots=True)
+class StationState:
+    """Wet well and controller.
+
+    The frequency that running pumps go to, the memory of the level controller, the number of running pumps, the pump
+    whose turn it is, and the seconds since the beginning.
+    """
+
+    volume_m3: float = 0.0
+    wanted_frequency_hz: float = math.inf
+    pid_integral_hz: float = 0.0
+    pid_level_m: float = 0.0
+    has_pid_level: bool = False
+    running: int = 0
+    turn: int = 0
+    second: int = 0
+
+
+@dataclass(slots=True)
+class PumpState:
+    """Drive and pump; `load` is the torque as a share of the rated one."""
+
+    frequency_hz: float = 0.0
+    shaft_ratio: float = 0.0
+    air_m: float = 0.0
+    load: float = 0.0
+    ragging: float = 0.0
+    dwell_left_s: float = 0.0
+    run_s: float = 0.0
+    is_commanded: bool = False
+    is_ready: bool = False
+
+
+@dataclass(slots=True)
+class ChannelState:
+    """Sensor and telemetry of a channel; NaN where nothing has been read or sent yet."""
+
+    damped: float = math.nan
+    last_noise: float = 0.0
+    last_reading: float = math.nan
+    last_sent: float = math.nan
+
+
+class PlantState(NamedTuple):
+    """State of a plant; of the station there is one record.
+
+    The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
+    now and before a step, and their means over the second. `past` (channels, m) and `level_history` (m,) are rings of
+    the last seconds. `started` holds the commanded pumps in the order of their starts; `recent_starts` (pumps, k) the
+    seconds of the last starts of each, the newest first.
+    """
+
+    station: Records[StationState]
+    pumps: Records[PumpState]
+    channels: Records[ChannelState]
+    curves: Floats
+    speed_ratio: Floats
+    flow_m3h: Floats
+    flow_before_m3h: Floats
+    mean_flow_m3h: Floats
+    past: Floats
+    level_history: Floats
+    started: Integers
+    recent_starts: Integers
+
+
+class Truth(NamedTuple):
+    """What truly was in n seconds: level and overflow (n,); flow, head and power of the pumps (pumps, n)."""
+
+    level_m: Floats
+    overflow_m3h: Floats
+    flow_m3h: Floats
+    head_m: Floats
+    power_kw: Floats
+
+
+def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
+    """State with all pumps standing at a level, for so long that all air has gathered."""
+    pumps = len(parameters.pumps)
+    return PlantState(
+        station=records_of([StationState(volume_m3=volume_at_level_m3(level_m, parameters.profile))]),
+        pumps=records_of([PumpState(air_m=parameters.air_head_m)] * pumps),
+        channels=records_of([ChannelState()] * channels(pumps)),
+        curves=np.zeros((pumps, 3)),
+        speed_ratio=np.zeros(pumps),
+        flow_m3h=np.zeros(pumps),
+        flow_before_m3h=np.zeros(pumps),
+        mean_flow_m3h=np.zeros(pumps),
+        past=np.full((channels(pumps), PAST_S), np.nan),
+        level_history=np.full(PAST_S, np.nan),
+        started=np.zeros(pumps, dtype=np.int64),
+        recent_starts=np.full((pumps, MAX_STARTS_PER_HOUR), -SECONDS_PER_HOUR, dtype=np.int64),
+    )
+
+
+def still_truth(pumps: int, seconds: int) -> Truth:
+    """Room for the truth of a block, in which the pumps stand."""
+    return Truth(np.empty(seconds), np.empty(seconds), *np.zeros((3, pumps, seconds)))
