@@ -65,6 +65,7 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     assert len(json.loads((folder / "trial.json").read_text())["cases"]) == COUNT
 
 
+@pytest.mark.check
 def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_path):
     plan = TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
     result = run_trial(plan, tmp_path, workers=1)
@@ -152,6 +153,7 @@ def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
         run_fake("perfect", folder, monkeypatch, command=(*FAKE, "--only", "friction_bias"))
 
 
+@pytest.mark.check
 def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
     replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
     _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
