@@ -12,7 +12,6 @@ import pytest
 from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.station.station_file import load_station
-from wetwell.services.cli import main
 from wetwell.services.trial.diagnosis import RECALIBRATION
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.run import run_trial
@@ -182,7 +181,7 @@ def test_stations_of_swmm_have_soft_starters():
     assert min(case.truth().station.control.ramp_s for case in cases if case.plant == "fine") >= 6.0
 
 
-def test_command_line(folder, monkeypatch, capsys):
+def test_command_line(run_wetwell, folder, monkeypatch, capsys):
     monkeypatch.setenv("FAKE_MODE", "none")
     monkeypatch.setenv("FAKE_FOLDER", str(folder))
     days = str(3600 / 86_400)
@@ -198,18 +197,10 @@ def test_command_line(folder, monkeypatch, capsys):
         "--out",
         str(folder),
     ]
-    monkeypatch.setattr(sys, "argv", ["wetwell", "gap", "trial", *options])
-    main_ended(0)
+    assert run_wetwell("gap", "trial", *options) == 0
     assert "trial.html" in capsys.readouterr().out
-    monkeypatch.setattr(sys, "argv", ["wetwell", "gap", "trial", *options, "--kinds", "sngle"])
-    main_ended(2)
+    assert run_wetwell("gap", "trial", *options, "--kinds", "sngle") == 2
     assert "--kinds: got 'sngle'" in capsys.readouterr().err
-
-
-def main_ended(code):
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert int(ended.value.code or 0) == code
 
 
 def test_swmm_without_pyswmm_says_what_to_install(alpha, monkeypatch):
