@@ -7,8 +7,11 @@ SCENARIO ?= demo
 IMAGE ?= wetwell:latest
 BUILDER ?= docker
 BASE ?= python:3.11-slim-bookworm
+PYTEST := $(BIN)/pytest -q --numprocesses=3 --dist=worksteal --durations=10
+# Where every process compiles all modules anew, each start takes three times as long.
+export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: help up test lint types imports format docs requirements clean sbom audit image
+.PHONY: help up test check lint types imports kernels format docs requirements clean sbom audit image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -16,9 +19,12 @@ help:  ## Show the targets
 up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C stops
 	@exec $(BIN)/wetwell up --scenario $(SCENARIO)
 
-test: lint types imports sbom  ## Lint, types, import contract, SBOM, all tests
-	@find simulator detector protocols -name '*.nb[ci]' -delete  # kernels know changes of their own file only
-	$(BIN)/pytest -q --numprocesses=3 --dist=loadfile --durations=10
+test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard each commit
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint imports types kernels
+	$(PYTEST) -m "not check"
+
+check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
+	$(PYTEST) -m check
 
 lint: $(VENV)/.dev  ## ruff
 	$(BIN)/ruff check .
@@ -29,6 +35,10 @@ types: $(VENV)/.dev  ## mypy
 
 imports: $(VENV)/.dev  ## import contract
 	$(BIN)/lint-imports
+
+kernels: $(VENV)/.dev  ## Compile the kernels for the tests, if they or what they call have changed
+	$(BIN)/pytest -q tests/unit/services/test_cli.py tests/reference/sim2real/test_truth_plant.py \
+	  -k "test_simulate_then_detect or test_duty_point_of_one_pump"
 
 format: $(VENV)/.dev  ## Bring all files into form
 	$(BIN)/ruff check --fix .

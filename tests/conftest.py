@@ -4,14 +4,16 @@ import os
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from wetwell.protocols.station.station_file import Sensors, Station
+from wetwell.services.cli import main
 from wetwell.services.stations import find_station
 
 # The first call of a kernel compiles it: a time limit for one example says nothing.
@@ -42,6 +44,19 @@ def real_data() -> Path:
     if not (folder / "skab").is_dir():
         pytest.skip(f"WETWELL_TEST_DATA = {name} has no folder skab/")
     return folder
+
+
+@pytest.fixture
+def run_wetwell(monkeypatch) -> Callable[..., int]:
+    """Function that runs a command `wetwell` in this process, and gives its exit code."""
+
+    def run(*arguments: object) -> int:
+        monkeypatch.setattr(sys, "argv", ["wetwell", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return int(ended.value.code or 0)
+
+    return run
 
 
 class PostgresServer:

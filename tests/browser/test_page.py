@@ -14,6 +14,8 @@ from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.timestamps import from_iso
 from wetwell.services.security.tokens import new_token
 
+pytestmark = pytest.mark.check
+
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 SLOW_MS = 30_000
 MANY_IN_THE_FIRST_CHART = """async () => {

@@ -19,6 +19,8 @@ from wetwell.protocols.modbus.device_signal import Signal
 from wetwell.services.gateway.daemon import poll_all
 from wetwell.services.gateway.poller import connection_to
 
+pytestmark = pytest.mark.check
+
 PERIOD_S = 0.05
 ANSWER_TIMEOUT_S = 0.4
 HEARTBEAT_S = 0.3

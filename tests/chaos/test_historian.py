@@ -26,6 +26,8 @@ from wetwell.services.historian.store.interface import DAY_NS, Store, blocks
 from wetwell.services.historian.store.live_database import LiveDatabase
 from wetwell.services.historian.store.postgres_store import PostgresStore
 
+pytestmark = pytest.mark.check
+
 WRITER = Path(__file__).with_name("history_writer.py")
 NOW_NS = 10**18
 

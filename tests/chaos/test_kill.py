@@ -11,6 +11,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.keys import SITE, alive_key
@@ -18,6 +20,8 @@ from wetwell.protocols.bus.zenoh.link import connect_client
 from wetwell.protocols.messages.messages import Sample, Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS
 from wetwell.services.historian.store.folder_store import FolderStore
+
+pytestmark = pytest.mark.check
 
 SPEED = 15
 """Seconds of the station in one on the wall: the publishers' caches reach back 40 s."""

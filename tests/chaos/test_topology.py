@@ -13,6 +13,7 @@ import contextlib
 from collections.abc import AsyncIterator
 from functools import partial
 
+import pytest
 from routers import Router, free_address
 
 from wetwell.detector.curves.datasheet import datasheet_of
@@ -25,6 +26,8 @@ from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
+
+pytestmark = pytest.mark.check
 
 LIMIT_S = 60.0
 PART = 300

@@ -1,5 +1,6 @@
 """The manifests in `docker/kubernetes/`: the schemas of Kubernetes, and whether all that they name is there."""
 
+import importlib
 import math
 import re
 import shutil
@@ -8,10 +9,10 @@ import tomllib
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import click
-import kubernetes_validate
 import pytest
 import typer
 import yaml
@@ -22,6 +23,8 @@ from wetwell.services.cli import app
 from wetwell.services.runtime.settings import load_settings
 from wetwell.services.security.tokens import holder_of
 from wetwell.services.stations import find_station
+
+pytestmark = pytest.mark.check
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docker" / "kubernetes"
@@ -84,12 +87,18 @@ def pods_of(selector: Manifest) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def secrets() -> tuple[dict[str, dict[str, str]], str]:
+def schemas() -> ModuleType:
+    """Schemas of Kubernetes; not imported at the top, since that takes as long as all tests with them."""
+    return importlib.import_module("kubernetes_validate")
+
+
+@pytest.fixture(scope="module")
+def secrets(schemas: ModuleType) -> tuple[dict[str, dict[str, str]], str]:
     """Secrets by name that the script makes, and the token that it shows."""
     made = subprocess.run(["sh", FOLDER / "secrets.sh"], check=True, capture_output=True, text=True)
     found = {}
     for manifest in yaml.safe_load_all(made.stdout):
-        kubernetes_validate.validate(manifest, VERSIONS[-1], strict=True)
+        schemas.validate(manifest, VERSIONS[-1], strict=True)
         assert manifest["metadata"]["namespace"] == KUSTOMIZATION["namespace"]
         found[manifest["metadata"]["name"]] = manifest["stringData"]
     return found, made.stderr.split()[-1]
@@ -103,14 +112,14 @@ def test_all_files_belong_to_it_and_nothing_is_there_twice():
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("manifest", MANIFESTS, ids=IDS)
-def test_the_schemas_of_kubernetes_take_each_manifest(manifest, version):
-    kubernetes_validate.validate(manifest, version, strict=True)
+def test_the_schemas_of_kubernetes_take_each_manifest(schemas, manifest, version):
+    schemas.validate(manifest, version, strict=True)
 
 
-def test_the_schemas_refuse_what_is_wrong():
+def test_the_schemas_refuse_what_is_wrong(schemas):
     wrong = {**MANIFESTS[IDS.index("Deployment-worker")], "spec": {"replicas": "two"}}
-    with pytest.raises(kubernetes_validate.ValidationError):
-        kubernetes_validate.validate(wrong, VERSIONS[-1], strict=True)
+    with pytest.raises(schemas.ValidationError):
+        schemas.validate(wrong, VERSIONS[-1], strict=True)
 
 
 @pytest.mark.parametrize("name", PODS)

@@ -19,6 +19,8 @@ from wetwell.services.cli import app
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.tokens import holder_of
 
+pytestmark = pytest.mark.check
+
 ROOT = Path(__file__).parents[2]
 DOCKER = ROOT / "docker"
 COMPOSE = yaml.safe_load((DOCKER / "compose.yaml").read_text())

@@ -49,6 +49,7 @@ def test_what_is_said_of_a_walk_is_in_its_pages() -> None:
             assert any(text in line for line in lines), text
 
 
+@pytest.mark.check
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("walk", WALKS, ids=lambda walk: walk.pages[0].removeprefix("docs/"))
 def test_commands_run(walk: Walk, tmp_path: Path) -> None:

@@ -146,4 +146,4 @@ wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz"""
         },
     ),
 )
-LEFT_OUT_PAGES = {"README.md": "make test runs this test; make up is `wetwell up`, which a walk runs"}
+LEFT_OUT_PAGES = {"README.md": "make check runs this test; make up is `wetwell up`, which a walk runs"}

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alarm_report_key, verdict_key
@@ -19,6 +20,8 @@ from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
 from wetwell.protocols.messages.messages import Verdict
 from wetwell.services.alarms.client import list_alarms, new_act, send_act
 from wetwell.services.cli import app
+
+pytestmark = pytest.mark.check
 
 LIMIT_S = 60.0
 

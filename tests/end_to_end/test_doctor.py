@@ -14,6 +14,8 @@ from wetwell.protocols.bus.zenoh.link import open_router
 from wetwell.services.doctor.examine import examine
 from wetwell.services.doctor.finding import Finding, exit_code
 
+pytestmark = pytest.mark.check
+
 LISTEN_S = 1.5
 
 

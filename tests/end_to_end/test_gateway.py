@@ -9,7 +9,10 @@ import sys
 import time
 
 import numpy as np
+import pytest
 import zenoh
+
+pytestmark = pytest.mark.check
 
 SPEED = 20
 SAMPLES = 30

@@ -7,6 +7,8 @@ import pytest
 from rules import broken_rules
 from site_kinds import light_site
 
+pytestmark = pytest.mark.check
+
 SITES = 7
 """Of one test; seven tests with 140 station-days each make a thousand with those of the other file."""
 

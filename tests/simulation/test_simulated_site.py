@@ -11,6 +11,7 @@ from rules import broken_rules, fingerprint
 from site_kinds import alpha_site
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("seed", range(4))
 def test_a_site_that_is_asked_each_ten_seconds_tells_and_keeps_all_whatever_befalls_it(folder, seed):
     assert broken_rules(alpha_site(seed, 2, 1.0, 10, folder)) == []
@@ -21,6 +22,7 @@ def test_a_seed_gives_the_same_events_again(folder):
     assert fingerprint(sites[0]) == fingerprint(sites[1])
 
 
+@pytest.mark.check
 @pytest.mark.timeout(900)  # half a minute of one quiet core
 def test_many_seeds_see_every_accident(folder):
     happened: Counter[str] = Counter()

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -122,12 +121,7 @@ def test_users_and_roles_of_the_manifests_let_each_do_its_duty(tmp_path):
 
 
 @pytest.mark.parametrize("wrong", ["127.0.0.1:1", "udp/127.0.0.1:1"])
-def test_a_router_upstream_is_an_endpoint(wrong, monkeypatch, capsys):
-    from wetwell.services.cli import main  # noqa: PLC0415
-
+def test_a_router_upstream_is_an_endpoint(wrong, run_wetwell, monkeypatch, capsys):
     monkeypatch.setenv("WETWELL_ZENOH__UPSTREAM", f'["{wrong}"]')
-    monkeypatch.setattr(sys, "argv", ["wetwell", "router"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
+    assert run_wetwell("router") == 2
     assert f"zenoh.upstream[1]: got '{wrong}'" in capsys.readouterr().err

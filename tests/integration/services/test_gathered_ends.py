@@ -33,7 +33,7 @@ def bus(monkeypatch):
             return bus
 
         for service in ("replay", "simulator"):
-            monkeypatch.setattr(f"wetwell.services.{service}.connect", connect)
+            monkeypatch.setattr(f"wetwell.services.{service}.daemon.connect", connect)
         yield bus
 
 

@@ -11,6 +11,8 @@ from wetwell.detector.evaluation.scores import macro_f1
 from wetwell.services.batch.backtest import SimulatedRecording, judge
 from wetwell.services.stations import find_scenario
 
+pytestmark = pytest.mark.check
+
 SEED = 20
 BOUNDS = {
     "always_normal": (0.29, 0.32),

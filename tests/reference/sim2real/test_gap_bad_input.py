@@ -1,8 +1,6 @@
 """Recordings that are no gap but a mistake: the command says what is wrong, and names no effect with confidence."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -43,14 +41,20 @@ def constant(recording):
     return Recording(time_ns=recording.time_ns, columns={n: v * 0.0 + v[200] for n, v in recording.columns.items()})
 
 
-def run(folder, recording, station):
-    """Exit code, standard output and standard error of the real command."""
-    write_recording(recording, folder / "field.parquet")
-    (folder / "station.toml").write_text(tomli_w.dumps(station.model_dump(mode="json", exclude_none=True)), "utf-8")
-    command = [sys.executable, "-m", "wetwell.services", "gap", "diagnose", "--station", "station.toml"]
-    command += ["--recording", "field.parquet", "--out", "out", "--json", "--only", "friction_bias"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout, done.stderr
+@pytest.fixture
+def diagnose(run_wetwell, tmp_path, monkeypatch, capsys):
+    """Function that runs the command on a recording; gives exit code, standard output and standard error."""
+
+    def run(recording, station):
+        write_recording(recording, tmp_path / "field.parquet")
+        table = station.model_dump(mode="json", exclude_none=True)
+        (tmp_path / "station.toml").write_text(tomli_w.dumps(table), "utf-8")
+        monkeypatch.chdir(tmp_path)
+        command = ["gap", "diagnose", "--station", "station.toml", "--recording", "field.parquet"]
+        code = run_wetwell(*command, "--out", "out", "--json", "--only", "friction_bias")
+        return code, *capsys.readouterr()
+
+    return run
 
 
 @pytest.mark.parametrize(
@@ -70,43 +74,43 @@ def run(folder, recording, station):
         (scaled("_frequency_hz", 2.0), "as if in % of nominal: prepare the recording with a scale of 0.5"),
     ],
 )
-def test_a_mistake_is_said_and_nothing_is_written(alpha, rows, tmp_path, change, message):
-    code, out, error = run(tmp_path, change(rows), alpha)
+def test_a_mistake_is_said_and_nothing_is_written(alpha, rows, diagnose, tmp_path, change, message):
+    code, out, error = diagnose(change(rows), alpha)
     assert (code, out) == (2, "")
     assert message in error
     assert len(error.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
-def test_the_file_of_another_station_is_noticed(alpha, rows, tmp_path):
+def test_the_file_of_another_station_is_noticed(alpha, rows, diagnose):
     table = alpha.model_dump(mode="json", exclude_none=True)
     table["sump"]["area_m2"] = 3.0 * alpha.sump.area_m2
     table["control"]["start_levels_m"] = [level + 1.0 for level in alpha.control.start_levels_m]
     table["rising_main"]["static_head_m"] = 0.3 * alpha.rising_main.static_head_m
     table["rising_main"]["friction_h2_m5"] = 0.1 * alpha.rising_main.friction_h2_m5
-    code, _, error = run(tmp_path, rows, Station.model_validate(table))
+    code, _, error = diagnose(rows, Station.model_validate(table))
     assert code == 2
     assert "this looks like a recording of another station than 'alpha'" in error
 
 
-def test_gaps_are_bridged_and_no_gap_of_the_simulator(alpha, rows, tmp_path):
+def test_gaps_are_bridged_and_no_gap_of_the_simulator(alpha, rows, diagnose):
     second = np.arange(len(rows))
     is_kept = ((second < 5000) | (second > 7000)) & (second % 1800 > 45)
-    code, out, _ = run(tmp_path, cut(is_kept)(rows), alpha)
+    code, out, _ = diagnose(cut(is_kept)(rows), alpha)
     assert (code, json.loads(out)["verdict"]) == (0, "none")
 
 
-def test_a_channel_that_never_moves_is_passed_over_and_named(alpha, rows, tmp_path):
-    code, out, _ = run(tmp_path, changed(rows, "_head_m", lambda values: 0.0 * values + 20.0), alpha)
+def test_a_channel_that_never_moves_is_passed_over_and_named(alpha, rows, diagnose):
+    code, out, _ = diagnose(changed(rows, "_head_m", lambda values: 0.0 * values + 20.0), alpha)
     report = json.loads(out)
     assert (code, report["verdict"]) == (0, "none")
     assert "head" not in report["signals"]
     assert any(note.startswith("no head") for note in report["notes"])
 
 
-def test_rows_out_of_order_with_their_stamps_are_put_in_order(alpha, rows, tmp_path):
+def test_rows_out_of_order_with_their_stamps_are_put_in_order(alpha, rows, diagnose):
     order = np.random.default_rng(2).permutation(len(rows))
-    code, out, _ = run(tmp_path, cut(order)(rows), alpha)
+    code, out, _ = diagnose(cut(order)(rows), alpha)
     report = json.loads(out)
     assert (code, report["verdict"]) == (0, "none")
     assert "rows stood before an earlier one" in report["notes"][0]

@@ -2,24 +2,16 @@
 
 import json
 import socket
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from wetwell.services.cli import main
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.inflow import INFLOWS
 
 STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-4]}]\n'
-
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["wetwell", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +59,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 def test_an_error_is_one_line(
     arguments: list[str],
     said: str,
-    monkeypatch: pytest.MonkeyPatch,
+    run_wetwell: Callable[..., int],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -84,7 +76,7 @@ def test_an_error_is_one_line(
         paths[name].write_text(text)
     names = {"tmp": tmp_path, **paths}
     before = sorted(tmp_path.iterdir())
-    assert run(monkeypatch, *(argument.format(**names) for argument in arguments)) == 2
+    assert run_wetwell(*(argument.format(**names) for argument in arguments)) == 2
     printed = capsys.readouterr()
     assert printed.err.splitlines()[-1].startswith("wetwell: " + said.format(**names))
     assert "Traceback" not in printed.err
@@ -147,31 +139,31 @@ def test_a_station_that_cannot_work_is_refused_at_every_start(
     command: list[str],
     text: str,
     said: str,
-    monkeypatch: pytest.MonkeyPatch,
+    run_wetwell: Callable[..., int],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     station = tmp_path / "station.toml"
     station.write_text(text)
-    assert run(monkeypatch, *(argument.format(station=station, tmp=tmp_path) for argument in command)) == 2
+    assert run_wetwell(*(argument.format(station=station, tmp=tmp_path) for argument in command)) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"wetwell: {station}: ")
     assert said in line
     assert list(tmp_path.iterdir()) == [station]
 
 
-def test_wrong_flags_end_with_2(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(monkeypatch, "simulate", "--nosuch") == 2
+def test_wrong_flags_end_with_2(run_wetwell: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_wetwell("simulate", "--nosuch") == 2
     assert "--nosuch" in capsys.readouterr().err
 
 
 def test_simulate_then_detect(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    run_wetwell: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recording, verdicts = tmp_path / "r.parquet", tmp_path / "v.jsonl"
-    assert run(monkeypatch, "simulate", "--days", "0.05", "--out", recording, "--json") == 0
+    assert run_wetwell("simulate", "--days", "0.05", "--out", recording, "--json") == 0
     assert json.loads(capsys.readouterr().out)["rows"] == 4320
-    assert run(monkeypatch, "detect", "--recording", recording, "--out", verdicts, "--json") == 0
+    assert run_wetwell("detect", "--recording", recording, "--out", verdicts, "--json") == 0
     summary = json.loads(capsys.readouterr().out)
     lines = [json.loads(line) for line in verdicts.read_text().splitlines()]
     assert summary["counts"]["samples"] == 4320
@@ -180,63 +172,63 @@ def test_simulate_then_detect(
     assert all(line["schema"] == "wetwell.verdict/1" and line["station"] == "alpha" for line in lines)
 
 
-def test_modbus_map_is_csv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(monkeypatch, "modbus-map", "--format", "csv") == 0
+def test_modbus_map_is_csv(run_wetwell: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_wetwell("modbus-map", "--format", "csv") == 0
     head, *rows = capsys.readouterr().out.splitlines()
     assert head == "name,table,address,count,type,unit,access,description"
     assert any(row.startswith("pump3_head_m,input,") for row in rows)
 
 
-def test_effects_lists_the_registry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(monkeypatch, "effects", "--json") == 0
+def test_effects_lists_the_registry(run_wetwell: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_wetwell("effects", "--json") == 0
     rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)["effects"]}
     assert list(rows) == list(EFFECTS)
     assert rows["motor_slip"]["component"] == "drive"
     assert rows["motor_slip"]["parameters"] == [
         {"name": "slip", "unit": "1", "low": 0.0, "high": 0.15, "neutral": 0.0}
     ]
-    assert run(monkeypatch, "effects") == 0
+    assert run_wetwell("effects") == 0
     assert "motor_slip (drive)\n  An asynchronous motor" in capsys.readouterr().out
 
 
 def test_faults_and_inflows_list_their_registries(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run_wetwell: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(monkeypatch, "faults", "--json") == 0
+    assert run_wetwell("faults", "--json") == 0
     rows = {row["kind"]: row for row in json.loads(capsys.readouterr().out)["faults"]}
     assert list(rows) == list(FAULTS)
     assert rows["impeller_wear"]["parameters"][-1] == {"name": "head_loss", "default": 0.15, "range": ">= 0, < 1"}
     assert rows["drive_trip"]["summary"].startswith("Thermal or earth-fault protection")
-    assert run(monkeypatch, "inflows", "--json") == 0
+    assert run_wetwell("inflows", "--json") == 0
     assert [row["kind"] for row in json.loads(capsys.readouterr().out)["inflows"]] == list(INFLOWS)
-    assert run(monkeypatch, "faults") == 0
+    assert run_wetwell("faults") == 0
     assert "  shape: step (step, intermittent)\n" in capsys.readouterr().out
-    assert run(monkeypatch, "inflows") == 0
+    assert run_wetwell("inflows") == 0
     assert "  time_s: must be given\n" in capsys.readouterr().out
 
 
 def test_station_show_gives_the_duty_points(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    run_wetwell: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(monkeypatch, "station", "show", "alpha", "--json") == 0
+    assert run_wetwell("station", "show", "alpha", "--json") == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["each_pump_alone"][0]["flow_m3h"] == pytest.approx(200.0, abs=0.01)
     assert shown["total_flow_m3h"] == pytest.approx(600.0, abs=0.03)
 
 
 def test_a_file_of_plcs_is_checked_and_a_plc_that_is_away_is_told(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    run_wetwell: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(monkeypatch, "modbus-map") == 0
+    assert run_wetwell("modbus-map") == 0
     (tmp_path / "map.csv").write_text(capsys.readouterr().out)
     file = tmp_path / "plc.toml"
     with socket.socket() as deaf:
         deaf.bind(("127.0.0.1", 0))  # and does not listen
         file.write_text(f'station = "s"\nhost = "127.0.0.1"\nport = {deaf.getsockname()[1]}\nmap = "map.csv"\n')
-        assert run(monkeypatch, "gateway", "check", file, "--json") == 0
+        assert run_wetwell("gateway", "check", file, "--json") == 0
         shown = json.loads(capsys.readouterr().out)["s"]
         assert (shown["pumps"], len(shown["signals"]), shown["not_in_the_map"]) == (3, 19, "")
-        assert run(monkeypatch, "gateway", "read", file, "--json") == 1
+        assert run_wetwell("gateway", "read", file, "--json") == 1
         assert json.loads(capsys.readouterr().out)["s"]["error"] == "cannot connect: connection refused"
     file.write_text("plc = 3\n")
     for arguments, said in (
@@ -244,5 +236,5 @@ def test_a_file_of_plcs_is_checked_and_a_plc_that_is_away_is_told(
         (["gateway", "--plc", file], f"wetwell: {file}: plc: "),
         (["gateway"], "wetwell: gateway: give --plc FILE, or gateway.plcs in the settings"),
     ):
-        assert run(monkeypatch, *arguments) == 2
+        assert run_wetwell(*arguments) == 2
         assert capsys.readouterr().err.startswith(said)

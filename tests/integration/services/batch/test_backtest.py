@@ -1,14 +1,12 @@
 """`wetwell backtest` from the command line, on recordings, scenarios and a dataset."""
 
 import json
-import sys
 from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import pytest
 
 from wetwell.protocols.recordings.recording import write_recording
-from wetwell.services.cli import main
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.scenario import Scenario
@@ -23,13 +21,6 @@ SHORT = Scenario(
 )
 
 
-def run(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", ["wetwell", "backtest", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
-
-
 @pytest.fixture(scope="module")
 def recordings(alpha, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
@@ -39,13 +30,13 @@ def recordings(alpha, tmp_path_factory):
     return paths
 
 
-def test_two_recordings_give_one_report_whatever_the_number_of_workers(recordings, monkeypatch, tmp_path, capsys):
+def test_two_recordings_give_one_report_whatever_the_number_of_workers(recordings, run_wetwell, tmp_path, capsys):
     results = []
     for workers in (1, 2):
         out = tmp_path / str(workers)
         arguments = [argument for path in recordings for argument in ("--recording", path)]
         arguments += ["--detectors", "wetwell,paper_f_test", "--workers", workers, "--out", out]
-        assert run(monkeypatch, *arguments) == 0
+        assert run_wetwell("backtest", *arguments) == 0
         result = json.loads((out / "backtest.json").read_text())
         for figures in result["detectors"].values():
             assert figures.pop("judging_s_per_station_day") > 0.0
@@ -68,9 +59,9 @@ def test_two_recordings_give_one_report_whatever_the_number_of_workers(recording
     assert result["detectors"]["paper_f_test"]["reliability"] is None
 
 
-def test_a_scenario_is_simulated_and_the_result_printed(monkeypatch, tmp_path, capsys):
+def test_a_scenario_is_simulated_and_the_result_printed(run_wetwell, tmp_path, capsys):
     arguments = ["--scenario", "nominal", "--seeds", 2, "--first-seed", 7, "--days", 0.3, "--workers", 1]
-    assert run(monkeypatch, *arguments, "--detectors", "always_normal", "--out", tmp_path, "--json") == 0
+    assert run_wetwell("backtest", *arguments, "--detectors", "always_normal", "--out", tmp_path, "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((tmp_path / "backtest.json").read_text())
     assert printed["recordings"] == ["nominal, seed 7", "nominal, seed 8"]
@@ -80,7 +71,7 @@ def test_a_scenario_is_simulated_and_the_result_printed(monkeypatch, tmp_path, c
     assert figures["detection"] == {}
 
 
-def test_what_cannot_be_scored_is_said_in_one_line(alpha, monkeypatch, tmp_path, capsys):
+def test_what_cannot_be_scored_is_said_in_one_line(alpha, run_wetwell, tmp_path, capsys):
     bare = tmp_path / "bare.csv"
     write_recording(replace(Simulation(alpha, SHORT, 1).advance(100), truth={}), bare)
     for arguments, said in (
@@ -89,7 +80,7 @@ def test_what_cannot_be_scored_is_said_in_one_line(alpha, monkeypatch, tmp_path,
         (["--dataset", tmp_path], f"{tmp_path}/manifest.json: cannot be read"),
         (["--recording", bare, "--detectors", "oracle"], "detector 'oracle' is none of"),
     ):
-        assert run(monkeypatch, *arguments, "--workers", 1, "--out", tmp_path / "out") == 2
+        assert run_wetwell("backtest", *arguments, "--workers", 1, "--out", tmp_path / "out") == 2
         error = capsys.readouterr().err.strip()
         assert said in error
         assert len(error.splitlines()) == 1

@@ -21,7 +21,6 @@ from wetwell.services.batch.dataset import make_dataset, plan_of
 from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 from wetwell.services.batch.gap import diagnose_file
 from wetwell.services.batch.parallel import Failure, work_through
-from wetwell.services.cli import main
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.run import run_trial
 from wetwell.simulator.scenario import Scenario
@@ -57,13 +56,6 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def run(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", ["wetwell", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
-
-
 def test_a_dataset_goes_on_after_an_item_that_fails_and_has_the_bytes_of_one_process(
     alpha, scheduler, tmp_path, monkeypatch
 ):
@@ -83,13 +75,13 @@ def test_a_dataset_goes_on_after_an_item_that_fails_and_has_the_bytes_of_one_pro
 
 
 def test_a_backtest_leaves_out_what_cannot_be_scored_and_resumes(
-    alpha, recordings, scheduler, tmp_path, monkeypatch, capsys
+    alpha, recordings, scheduler, tmp_path, monkeypatch, run_wetwell, capsys
 ):
     monkeypatch.chdir(recordings)
     options = ["--recording", "bad.csv", "--recording", "good.parquet", "--detectors", "always_normal"]
     results = []
     for name, where in (("here", ["--workers", 1]), ("there", ["--scheduler", scheduler])):
-        assert run(monkeypatch, "backtest", *options, *where, "--out", tmp_path / name) == 1
+        assert run_wetwell("backtest", *options, *where, "--out", tmp_path / name) == 1
         result = json.loads((tmp_path / name / "backtest.json").read_text())
         assert result["detectors"]["always_normal"].pop("judging_s_per_station_day") > 0.0
         results.append(result)
@@ -119,7 +111,7 @@ def test_a_backtest_leaves_out_what_cannot_be_scored_and_resumes(
 
 
 def test_diagnoses_are_those_of_single_recordings_and_a_bad_one_is_told(
-    alpha, recordings, scheduler, tmp_path, monkeypatch, capsys
+    alpha, recordings, scheduler, tmp_path, monkeypatch, run_wetwell, capsys
 ):
     (recordings / "wrong.toml").write_text("nothing = 1\n")
     (recordings / "other.csv").write_text("")
@@ -127,7 +119,7 @@ def test_diagnoses_are_those_of_single_recordings_and_a_bad_one_is_told(
     monkeypatch.chdir(recordings)
     arguments = ["--recording", "good.parquet", "--recording", "bad.csv", "--recordings", "table.csv"]
     arguments += ["--only", "friction_bias", "--json", "--scheduler", scheduler, "--out", tmp_path / "there"]
-    assert run(monkeypatch, "gap", "diagnose", *arguments) == 1
+    assert run_wetwell("gap", "diagnose", *arguments) == 1
     result = json.loads(capsys.readouterr().out)
     diagnose_file(alpha, recordings / "good.parquet", tmp_path / "here", only=["friction_bias"])
     assert files(tmp_path / "there" / "good") == files(tmp_path / "here")
@@ -168,8 +160,8 @@ def test_a_task_that_kills_its_process_is_one_failure(where):
     assert len(failed) < (4 if where else 2)  # Dask may give up what is on the same worker, too
 
 
-def test_what_cannot_be_a_scheduler_is_one_line(tmp_path, monkeypatch, capsys):
-    assert run(monkeypatch, "dataset", "--out", tmp_path / "set", "--scheduler", "here") == 2
+def test_what_cannot_be_a_scheduler_is_one_line(tmp_path, monkeypatch, run_wetwell, capsys):
+    assert run_wetwell("dataset", "--out", tmp_path / "set", "--scheduler", "here") == 2
     said = "--scheduler: got 'here', must be tcp://HOST:PORT, tls://HOST:PORT or local"
     assert capsys.readouterr().err.splitlines() == [f"wetwell: {said}"]
     monkeypatch.setattr(executors, "CONNECT_S", 0.5)

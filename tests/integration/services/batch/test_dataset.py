@@ -14,19 +14,11 @@ import pytest
 from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.services.batch.dataset import check_dataset, make_dataset, plan_of
-from wetwell.services.cli import main
 from wetwell.services.stations import find_station
 
 COUNT = 6
 DAYS = 0.3
 OPTIONS = ["--days", str(DAYS), "--seed", "5"]
-
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["wetwell", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -82,7 +74,7 @@ def test_another_plan_in_the_same_folder_is_refused(folder, made) -> None:
     assert {name: data for name, data in content(folder).items() if name != "manifest.part.jsonl"} == made
 
 
-def test_the_manifest_rebuilds_every_file(monkeypatch, folder, made) -> None:
+def test_the_manifest_rebuilds_every_file(run_wetwell, folder, made) -> None:
     manifest = json.loads(made["manifest.json"])
     assert manifest["schema"] == "wetwell.dataset/1"
     assert sum(manifest["classes"].values()) == COUNT == len(manifest["items"])
@@ -90,7 +82,7 @@ def test_the_manifest_rebuilds_every_file(monkeypatch, folder, made) -> None:
     item = manifest["items"][1]
     again = folder / "again.parquet"
     files = ["--station", folder / item["station_file"], "--scenario", folder / item["scenario_file"]]
-    assert run(monkeypatch, "simulate", *files, "--seed", item["seed"], "--out", again) == 0
+    assert run_wetwell("simulate", *files, "--seed", item["seed"], "--out", again) == 0
     assert again.read_bytes() == made[item["file"]]
     for item in manifest["items"]:
         assert find_station(str(folder / item["station_file"])).name == item["station"]["name"]
@@ -101,14 +93,14 @@ def test_the_manifest_rebuilds_every_file(monkeypatch, folder, made) -> None:
         assert item["class"] in recording.truth["truth_state"]
 
 
-def test_the_example_of_the_docs(monkeypatch, tmp_path, capsys) -> None:
+def test_the_example_of_the_docs(monkeypatch, run_wetwell, tmp_path, capsys) -> None:
     text = (Path(__file__).parents[4] / "docs" / "datasets.md").read_text(encoding="utf-8")
     shell, python = (re.findall(rf"```{form}\n(.*?)```", text, flags=re.DOTALL) for form in ("sh", "python"))
     monkeypatch.chdir(tmp_path)
     commands = [line.split() for line in shell[0].splitlines()]
     assert [command[:2] for command in commands] == [["wetwell", "dataset"]] * 2
     for command in commands:
-        assert run(monkeypatch, *command[1:]) == 0
+        assert run_wetwell(*command[1:]) == 0
     assert "items: 10" in capsys.readouterr().out
     exec(python[0], {})  # noqa: S102 - the text of our own docs
     manifest = json.loads((tmp_path / "pumps" / "manifest.json").read_text())
@@ -119,14 +111,14 @@ def test_the_example_of_the_docs(monkeypatch, tmp_path, capsys) -> None:
     assert {"000001.parquet", "000001.station.toml", "000001.scenario.toml", "manifest.json"} <= names
 
 
-def test_the_check_finds_a_changed_byte(monkeypatch, folder, capsys) -> None:
-    assert run(monkeypatch, "dataset", "--check", folder, "--json") == 0
+def test_the_check_finds_a_changed_byte(run_wetwell, folder, capsys) -> None:
+    assert run_wetwell("dataset", "--check", folder, "--json") == 0
     assert json.loads(capsys.readouterr().out)["files"] == 3 * COUNT
     changed = bytearray((folder / "000002.parquet").read_bytes())
     changed[500] ^= 1
     (folder / "000002.parquet").write_bytes(changed)
     (folder / "000003.parquet").unlink()
-    assert run(monkeypatch, "dataset", "--check", folder) == 2
+    assert run_wetwell("dataset", "--check", folder) == 2
     said = capsys.readouterr().err.splitlines()
     assert said == [
         f"wetwell: {folder}/000002.parquet: is not what the manifest says, its SHA-256 differs (and 1 more)"
@@ -151,9 +143,9 @@ def test_a_file_outside_of_the_folder_is_not_read(folder) -> None:
         (["dataset", "--out", "{tmp}/d", "--station", "none"], "station 'none' is neither a file nor one of alpha"),
     ],
 )
-def test_an_error_is_one_line(monkeypatch, tmp_path, capsys, arguments: list[str], said: str) -> None:
+def test_an_error_is_one_line(run_wetwell, tmp_path, capsys, arguments: list[str], said: str) -> None:
     (tmp_path / "file").write_text("")
-    assert run(monkeypatch, *(argument.format(tmp=tmp_path) for argument in arguments)) == 2
+    assert run_wetwell(*(argument.format(tmp=tmp_path) for argument in arguments)) == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith("wetwell: " + said.format(tmp=tmp_path))
 
 

@@ -28,7 +28,10 @@ from wetwell.services.runtime.settings import DetectorSettings, FleetSettings, H
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = pytest.mark.filterwarnings("ignore")  # of Dask's own threads and sockets at a kill
+pytestmark = [
+    pytest.mark.check,
+    pytest.mark.filterwarnings("ignore"),  # of Dask's own threads and sockets at a kill
+]
 
 Verdicts = dict[str, dict[tuple[int, int], bytes]]
 """Payload by station, time and pump."""

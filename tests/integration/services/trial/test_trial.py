@@ -12,7 +12,6 @@ import pytest
 from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.station.station_file import load_station
-from wetwell.services.cli import main
 from wetwell.services.trial.diagnosis import RECALIBRATION
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.run import run_trial
@@ -65,6 +64,7 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     assert len(json.loads((folder / "trial.json").read_text())["cases"]) == COUNT
 
 
+@pytest.mark.check
 def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_path):
     plan = TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
     result = run_trial(plan, tmp_path, workers=1)
@@ -152,6 +152,7 @@ def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
         run_fake("perfect", folder, monkeypatch, command=(*FAKE, "--only", "friction_bias"))
 
 
+@pytest.mark.check
 def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
     replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
     _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
@@ -180,7 +181,7 @@ def test_stations_of_swmm_have_soft_starters():
     assert min(case.truth().station.control.ramp_s for case in cases if case.plant == "fine") >= 6.0
 
 
-def test_command_line(folder, monkeypatch, capsys):
+def test_command_line(run_wetwell, folder, monkeypatch, capsys):
     monkeypatch.setenv("FAKE_MODE", "none")
     monkeypatch.setenv("FAKE_FOLDER", str(folder))
     days = str(3600 / 86_400)
@@ -196,18 +197,10 @@ def test_command_line(folder, monkeypatch, capsys):
         "--out",
         str(folder),
     ]
-    monkeypatch.setattr(sys, "argv", ["wetwell", "gap", "trial", *options])
-    main_ended(0)
+    assert run_wetwell("gap", "trial", *options) == 0
     assert "trial.html" in capsys.readouterr().out
-    monkeypatch.setattr(sys, "argv", ["wetwell", "gap", "trial", *options, "--kinds", "sngle"])
-    main_ended(2)
+    assert run_wetwell("gap", "trial", *options, "--kinds", "sngle") == 2
     assert "--kinds: got 'sngle'" in capsys.readouterr().err
-
-
-def main_ended(code):
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert int(ended.value.code or 0) == code
 
 
 def test_swmm_without_pyswmm_says_what_to_install(alpha, monkeypatch):

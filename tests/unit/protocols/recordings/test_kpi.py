@@ -1,7 +1,6 @@
 """Figures of a recording against an independent computation with pandas, second by second."""
 
 import json
-import sys
 
 import numpy as np
 import pandas as pd
@@ -10,7 +9,6 @@ import pytest
 from wetwell.protocols.recordings.kpi import kpis
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.cli import main
 
 START_S = 1_735_689_600 + 82_000  # so that a midnight lies inside
 PUMPS = (1, 2)
@@ -121,14 +119,10 @@ def test_a_gap_of_no_length_is_refused() -> None:
 
 
 @pytest.mark.parametrize("as_json", [True, False])
-def test_the_command_prints_days_and_totals(monkeypatch, tmp_path, capsys, as_json: bool) -> None:
+def test_the_command_prints_days_and_totals(run_wetwell, tmp_path, capsys, as_json: bool) -> None:
     recording = field_recording(1)
     write_recording(recording, tmp_path / "r.parquet")
-    command = ["wetwell", "kpi", "--recording", str(tmp_path / "r.parquet"), *(["--json"] if as_json else [])]
-    monkeypatch.setattr(sys, "argv", command)
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
+    assert run_wetwell("kpi", "--recording", tmp_path / "r.parquet", *(["--json"] if as_json else [])) == 0
     printed = capsys.readouterr().out
     energy_kwh = kpis(recording).energy_kwh
     if as_json:

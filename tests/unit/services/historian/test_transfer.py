@@ -1,7 +1,6 @@
 """Recordings into the history and out of it again, by the command line's functions and by itself."""
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.cli import main
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS
 from wetwell.services.historian.transfer import export_recording, import_recording
@@ -74,15 +72,12 @@ def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
     store.close()
 
 
-def test_the_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_commands(run_wetwell, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, out, data = tmp_path / "a.csv", tmp_path / "b.csv", tmp_path / "history"
     write_recording(recording(), source)
 
     def run(*arguments: object) -> dict[str, object]:
-        monkeypatch.setattr(sys, "argv", ["wetwell", *map(str, arguments), "--data", str(data), "--json"])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert not ended.value.code
+        assert run_wetwell(*arguments, "--data", data, "--json") == 0
         return json.loads(capsys.readouterr().out)
 
     told = run("import", "--recording", source, "--station", "beta")
