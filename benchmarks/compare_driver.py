@@ -131,11 +131,12 @@ def checkpoint(station: str, source: str, rows: int) -> None:
 
 
 def alarm_state(state: dict[str, Any]) -> None:
-    """The state file of the alarms: read from what version 0.1 wrote, and written again."""
+    """The state file of the alarms: read, and written again where it was not refused."""
     Path("state").mkdir(exist_ok=True)
     Path("state/alarms.json").write_text(json.dumps(state))
     file = find("services", "StateFile")(Path("state"))
-    file.save(file.load())
+    if (kept := file.load()) is not None:
+        file.save(kept)
 
 
 def messages(station: str, source: str) -> None:
