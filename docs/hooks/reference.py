@@ -6,6 +6,7 @@ import pkgutil
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal, get_args, get_origin
 
+import names
 import typer
 from pydantic import BaseModel
 
@@ -30,6 +31,7 @@ def pages() -> dict[str, str]:
         "effects.md": _parts("Effects", effect_table()),
         "faults.md": _parts("Faults", part_table(FAULTS)),
         "inflows.md": _parts("Inflow models", part_table(INFLOWS)),
+        "names.md": names.names_page(),
     }
 
 
