@@ -5,7 +5,6 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from wetwell.detector.stream.gate import Frame, PumpFrame
 from wetwell.protocols import quantities as q
 from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.messages.readings import PumpRow, Row, row_values
@@ -47,12 +46,12 @@ def test_types_and_lists_name_the_same():
     assert q.PUMP_METERS == ("flow_m3h", "head_m", "power_kw")
 
 
-@pytest.mark.parametrize("pump", [PumpReading, PumpBlock, PumpRow, PumpFrame])
+@pytest.mark.parametrize("pump", [PumpReading, PumpBlock, PumpRow])
 def test_records_of_a_pump_have_the_fields_of_the_list(pump):
     assert list(get_type_hints(pump))[-len(q.PUMP_QUANTITIES) :] == list(q.PUMP_QUANTITIES)
 
 
-@pytest.mark.parametrize("station", [Sample, SampleBlock, Row, Frame])
+@pytest.mark.parametrize("station", [Sample, SampleBlock, Row])
 def test_records_of_a_station_have_the_fields_of_the_list(station):
     assert [name for name in get_type_hints(station) if name in q.STATION_QUANTITIES] == list(q.STATION_QUANTITIES)
 
