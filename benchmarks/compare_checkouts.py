@@ -10,6 +10,7 @@ on standard error, a JSON object at the end; exit code 1 if anything differs. Wh
 
 import argparse
 import fnmatch
+import hashlib
 import json
 import os
 import queue
@@ -29,6 +30,7 @@ from compare_items import Item, items
 DRIVER = Path(__file__).with_name("compare_driver.py")
 MASKS = (rb'"date": "\d{4}-\d\d-\d\d"', rb'"salt": "[0-9a-f]{32}"', rb"\A[0-9a-f]{64}\n\Z")
 """What is left out of the comparison: the day, and the salt of a trial's seals with what follows from it."""
+CORES = ("protocols", "simulator", "detector", "sim2real")
 SHOWN = 300
 """Most bytes of a difference that are printed."""
 
@@ -50,6 +52,7 @@ class Checkout:
     def __init__(self, root: Path, python: Path | None) -> None:
         self._command = [python or root / ".venv" / "bin" / "python", "-P", DRIVER]
         plain = {"COLUMNS": "120", "LC_ALL": "C.UTF-8", "TZ": "UTC", "PYTHONPATH": str(root / "src")}
+        plain["NUMBA_CACHE_DIR"] = str(kernels_of(root))
         self._environment = {name: value for name, value in os.environ.items() if "WETWELL_" not in name} | plain
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -80,6 +83,15 @@ class Checkout:
         """End the process."""
         if self._process is not None:
             self._process.communicate()
+
+
+def kernels_of(root: Path) -> Path:
+    """Folder for what is compiled from these very sources; Numba looks at no file but that of the function itself."""
+    digest = hashlib.sha256()
+    for package in CORES:
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return Path(tempfile.gettempdir(), f"compare-kernels-{digest.hexdigest()[:16]}")
 
 
 def content(path: Path, folder: Path) -> bytes:

@@ -15,7 +15,7 @@ MAX_SKEW_S = 60.0
 LEAST_STRETCH_S = 1.0
 MAX_VERDICT_AGE_S = 86_400.0
 LEAST_FREE_BYTES = 1_000_000_000
-SITE_SERVICES = {
+NEEDED_SERVICES = {
     "historian": "nothing is kept; start it: wetwell historian",
     "alarms": "nobody is called; start it: wetwell alarms",
     "dashboard": "there is no page; start it: wetwell dashboard",
@@ -178,7 +178,7 @@ def _history(survey: Survey, station: str) -> Finding:
 
 
 def _services(survey: Survey) -> Iterator[Finding]:
-    for service, advice in SITE_SERVICES.items():
+    for service, advice in NEEDED_SERVICES.items():
         if (SITE, service) in survey.alive:
             yield Finding("services", "ok", f"{service} is running")
         else:

@@ -24,9 +24,9 @@ from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import SIGNALS
 from wetwell.simulator.effects import effects_of
 
-RANKED = 8
+DRAWN_CANDIDATES = 8
 SHOWN_S = 1800
-VERDICTS = {
+VERDICT_WORDS = {
     "none": "No gap beyond the noise of the sensors.",
     "unknown": "There is a gap that no effect of the library explains.",
     "effect": "The gap is explained by the effects below.",
@@ -37,7 +37,7 @@ def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
     """Self-contained HTML page of a diagnosis."""
     gap = report.gap
     verdict = [
-        paragraph(VERDICTS[report.verdict]),
+        paragraph(VERDICT_WORDS[report.verdict]),
         table(
             ["gap on held-out cycles", "before", "after", "floor", "shrinkage", "95 % interval"],
             [["all signals", gap.before, gap.after, gap.floor, gap.shrinkage, _interval(gap.shrinkage_ci)]],
@@ -127,7 +127,7 @@ def _residual(report: GapReport, diagnosis: Diagnosis) -> str:
 
 
 def _ranking(report: GapReport) -> str:
-    best = report.candidates[:RANKED]
+    best = report.candidates[:DRAWN_CANDIDATES]
     bars = bar_chart(
         "Shrinkage by each effect alone", [c.name for c in best], {"shrinkage": [c.shrinkage for c in best]}
     )

@@ -10,7 +10,7 @@ from rich.progress import Progress
 from wetwell.sim2real.diagnosis.report import GapReport
 
 PLACES = 4
-RANKED = 5
+PRINTED_CANDIDATES = 5
 
 
 @contextmanager
@@ -45,7 +45,7 @@ def gap_lines(report: GapReport, out: Path) -> str:
         lines.append(f"  effect  {effect.name}: {values}")
         if effect.equivalent:
             lines.append(f"          not to be told from {', '.join(effect.equivalent)}")
-    lines += [f"  ranking {c.name:28} shrinks by {c.shrinkage:.1%}" for c in report.candidates[:RANKED]]
+    lines += [f"  ranking {c.name:28} shrinks by {c.shrinkage:.1%}" for c in report.candidates[:PRINTED_CANDIDATES]]
     if (loop := report.closed_loop) is not None:
         lines.append(
             f"closed loop: level NMAE {loop.before.level_nmae:.2%} before, {loop.after.level_nmae:.2%} after; "

@@ -48,3 +48,19 @@ def test_files_define_what_a_page_says(page):
 
 def test_pages_name_files():
     assert sum(len(named(page)) for page in PAGES) > 40
+
+
+def test_the_architecture_page_has_all_rooms_and_no_other():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = page.partition("## Rooms\n")[2].partition("\n## ")[0]
+    rooms, package = set(), ""
+    for cell in re.findall(r"^\| (.*?) \|", table, re.MULTILINE):
+        folders = re.findall(r"`(\w+)/`", cell)
+        if cell.startswith("**"):
+            (package,) = folders
+        else:
+            rooms |= {f"{package}/{folder}" for folder in folders}
+    packages = {room.partition("/")[0] for room in rooms}
+    assert rooms == {
+        path.parent.relative_to(ROOT).as_posix() for name in packages for path in (ROOT / name).glob("*/__init__.py")
+    }

@@ -12,7 +12,7 @@ log = logging.getLogger(__name__)
 
 VERSION = 2
 
-_SCHEMA = f"""
+_LIVE_TABLES = f"""
 BEGIN IMMEDIATE;
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
 CREATE TABLE sample (
@@ -56,7 +56,7 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
     if version > VERSION:
         raise StoreError(f"{path}: version {version} is newer than {VERSION}, which this program knows")
     if version == 0:
-        database.executescript(_SCHEMA)
+        database.executescript(_LIVE_TABLES)
     elif version == 1:
         with alone():
             if _version(database) == 1:  # else another has done it meanwhile
