@@ -30,7 +30,8 @@ from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.keys import model_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
-from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
+from wetwell.protocols.messages.sample import PumpReading, Sample
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.lifecycle import ticks
 from wetwell.services.stations import find_station

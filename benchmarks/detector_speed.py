@@ -26,7 +26,7 @@ from wetwell.detector.runs.run_tracker import ROLLING_SAMPLES
 from wetwell.detector.statistics.rolling_f_test import LOG_P, RollingFTest, scan
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_scenario, find_station

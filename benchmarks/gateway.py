@@ -24,7 +24,7 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client, open_router
-from wetwell.protocols.messages.messages import Status
+from wetwell.protocols.messages.status import Status
 from wetwell.protocols.modbus.device_map import Device, Plc
 from wetwell.protocols.modbus.device_signal import Signal
 from wetwell.protocols.modbus.registers import register_table

@@ -31,7 +31,7 @@ from wetwell.detector.statistics.f_distribution import log_f_survival
 from wetwell.detector.statistics.tangent import tangent_residuals
 from wetwell.detector.stream.block import Block, blocks
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_scenario, find_station

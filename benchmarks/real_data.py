@@ -19,8 +19,8 @@ import numpy as np
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.messages.readings import PumpRow, Row
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.importers.skab import read_skab
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from wetwell.protocols.bus.keys import SITE, status_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus
-from wetwell.protocols.messages.messages import Status, Verdict
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.lifecycle import PARENT_VARIABLE
 
 PATIENCE_S = 300.0

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from memory_bus import MemoryBus
 from site_load import Played, messages_of, prepare
 
-from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import load_station
 from wetwell.services.detector.checkpoint import Checkpoint

@@ -15,8 +15,8 @@ from wetwell.detector.stream.loop import Stop
 from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.verdict.evidence import rolling_evidence
 from wetwell.detector.verdict.maintenance import Costs
-from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.messages.readings import Readings
+from wetwell.protocols.messages.verdict import Verdict
 
 
 class Detector:

@@ -31,7 +31,7 @@ from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
 from wetwell.detector.verdict.severity import severity
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 EARLY_PROBABILITY = 0.999
 EARLY_SEGMENTS = 2

@@ -15,7 +15,7 @@ from wetwell.detector.sensors.sensor_noise import healthy_noise, reading_noise
 from wetwell.detector.statistics.cusum import Cusum
 from wetwell.detector.verdict.control_limits import ControlLimits
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 from wetwell.protocols.timestamps import NS_PER_S
 
 RECENT_RUNS = 12

@@ -10,7 +10,9 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from wetwell.protocols.bus.interface import Bus, Subscription
 from wetwell.protocols.bus.keys import status_key, verdict_key
 from wetwell.protocols.errors import WetwellError
-from wetwell.protocols.messages.messages import MessageError, Status, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.connection import listen
 from wetwell.services.runtime.health.board import BOARD, HealthBoard
 from wetwell.services.runtime.lifecycle import PARENT_VARIABLE, stop_event, until

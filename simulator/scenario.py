@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from wetwell.protocols.messages.messages import Stamp
+from wetwell.protocols.messages.message import Stamp
 from wetwell.protocols.station.station_file import NAME_PATTERN, NonNegative, Positive, Table
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.inflow import Inflow

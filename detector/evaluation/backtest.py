@@ -29,7 +29,7 @@ from wetwell.detector.evaluation.scores import (
     scored_runs,
     step_s,
 )
-from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import LEARNING_S
 

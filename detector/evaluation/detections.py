@@ -10,7 +10,7 @@ from wetwell.detector.baseline.learning import DAY_S
 from wetwell.detector.evaluation.scores import FAULTS, learning_end_ns, severity_column, step_s, truth_of
 from wetwell.detector.stream.run_state import WARM_UP_S
 from wetwell.protocols.arrays import Flags
-from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Integers
-from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.recordings.recording import TRUTH_PREFIX, Recording
 from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 

@@ -15,7 +15,7 @@ from wetwell.detector.inference.posterior import (
     Posterior,
 )
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 ALARM_PROBABILITY = 0.99
 SEPARATED_SHARE = 0.7

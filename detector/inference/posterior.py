@@ -9,7 +9,7 @@ from wetwell.detector.baseline.model import Baseline
 from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.observation import DRAWDOWN, POWER, PUMP, SYSTEM, Observation
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 STATES: tuple[State, ...] = ("normal", "pump_fault", "system_fault", "pump_and_system_fault")
 FAULT_STATES = STATES[1:]

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from wetwell.detector.inference.posterior import FAULT_STATES
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 from wetwell.protocols.station.station_file import NonNegative, Table
 
 

@@ -10,8 +10,8 @@ from wetwell.detector.baseline.model import Model as ResidualModel
 from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.verdict.severity import SIGMAS_95
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import Verdict
 from wetwell.protocols.messages.model import Curve, Model, PumpModel
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import Station
 
 POINTS = 31

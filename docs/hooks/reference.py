@@ -11,7 +11,7 @@ import typer
 from pydantic import BaseModel
 
 import wetwell.protocols.messages
-from wetwell.protocols.messages.messages import Message
+from wetwell.protocols.messages.message import Message
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.cli import app
 from wetwell.services.reports.part_tables import part_table
@@ -116,8 +116,7 @@ def _messages() -> str:
 
 
 def _message_models() -> Iterator[type[Message]]:
-    modules = sorted(name for _, name, _ in pkgutil.iter_modules(wetwell.protocols.messages.__path__))
-    for name in sorted(modules, key=lambda name: (name != "messages", name)):
+    for name in sorted(name for _, name, _ in pkgutil.iter_modules(wetwell.protocols.messages.__path__)):
         module = importlib.import_module(f"wetwell.protocols.messages.{name}")
         for model in vars(module).values():
             is_own = isinstance(model, type) and model.__module__ == module.__name__

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field, ValidationError
 
-from wetwell.protocols.messages.messages import Message
+from wetwell.protocols.messages.message import Message
 
 SOURCE_BYTES = 8
 PAGE_BYTES = 65_536

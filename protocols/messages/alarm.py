@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from wetwell.protocols.messages.messages import Message, Stamp
+from wetwell.protocols.messages.message import Message, Stamp
 
 AlarmState = Literal[
     "normal",

@@ -4,7 +4,8 @@ import logging
 from collections import Counter
 from typing import TypeVar
 
-from wetwell.protocols.messages.messages import Message, MessageError, Sample
+from wetwell.protocols.messages.message import Message, MessageError
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 
 M = TypeVar("M", bound=Message)

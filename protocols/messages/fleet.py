@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from wetwell.protocols.messages.messages import Message, Stamp
+from wetwell.protocols.messages.message import Message, Stamp
 from wetwell.protocols.station.station_file import Station
 
 

@@ -4,7 +4,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from wetwell.protocols.messages.messages import Message, Number, Stamp
+from wetwell.protocols.messages.message import Message, Number, Stamp
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 
 Kind = Literal["samples", "verdicts", "alarms", "kpi", "stations"]

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from wetwell.protocols.messages.messages import Message, Number, Stamp
+from wetwell.protocols.messages.message import Message, Number, Stamp
 
 
 class Curve(Message):

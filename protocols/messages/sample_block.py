@@ -7,8 +7,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import Message, Number, PumpReading, Quality, Sample, Stamp
+from wetwell.protocols.messages.message import Message, Number, Stamp
 from wetwell.protocols.messages.readings import row_values
+from wetwell.protocols.messages.sample import PumpReading, Quality, Sample
 from wetwell.protocols.quantities import (
     FIRST_PUMP,
     FLOW,

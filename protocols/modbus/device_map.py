@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.messages.messages import Quality
+from wetwell.protocols.messages.sample import Quality
 from wetwell.protocols.modbus.device_csv import read_map_csv
 from wetwell.protocols.modbus.device_signal import ByteOrder, Signal, check_signal
 from wetwell.protocols.modbus.registers import MAX_PUMPS

@@ -25,8 +25,8 @@ import pyarrow.parquet
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.messages.readings import PumpRow, Row
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import (
     PUMP_ANALOGUES,
     PUMP_QUANTITIES,

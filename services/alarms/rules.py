@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from wetwell.protocols.messages.alarm import Priority, RuleName
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 
 
 @dataclass(frozen=True)

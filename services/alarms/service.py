@@ -10,8 +10,11 @@ from wetwell.protocols.bus.keys import SITE, alarm_act_key, alarm_key
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmFigure, AlarmReport, AlarmState
 from wetwell.protocols.messages.decoding import M, SampleMessage, decoded, samples_of
-from wetwell.protocols.messages.messages import MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
 from wetwell.services.alarms.audit import Audit
 from wetwell.services.alarms.record import AlarmRecord

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import RuleName
-from wetwell.protocols.messages.messages import Sample, Status, Verdict
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.registry import AlarmRegistry
 from wetwell.services.alarms.rules import VERDICT_RULES, verdict_advice, verdict_text

@@ -19,7 +19,7 @@ from wetwell.detector.evaluation.scores import in_order_of_time, without_truth
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording, read_recording
 from wetwell.protocols.station.station_file import Station, load_station
 from wetwell.protocols.timestamps import LEARNING_S

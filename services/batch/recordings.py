@@ -12,7 +12,7 @@ from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import BLOCK_ROWS, blocks
 from wetwell.protocols.atomic_file import atomic_file
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording, recording_writer
 from wetwell.protocols.station.station_file import Station
 from wetwell.simulator.simulation import Simulation

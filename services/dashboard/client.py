@@ -11,8 +11,9 @@ from wetwell.protocols.bus.keys import alarm_act_key, history_key
 from wetwell.protocols.errors import WetwellError, first_fault
 from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import MessageError, Number, Sample
+from wetwell.protocols.messages.message import MessageError, Number
 from wetwell.protocols.messages.readings import row_values
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import columns_of
 from wetwell.protocols.timestamps import to_iso
 

@@ -3,7 +3,8 @@
 import math
 
 from wetwell.protocols.messages.history import History
-from wetwell.protocols.messages.messages import Number, Sample
+from wetwell.protocols.messages.message import Number
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import PUMP_ANALOGUES, STATION_QUANTITIES, pump_column
 
 NS_PER_MS = 1_000_000
@@ -25,7 +26,7 @@ def sample_row(sample: Sample) -> str:
 
     Examples
     --------
-    >>> from wetwell.protocols.messages.messages import PumpReading
+    >>> from wetwell.protocols.messages.sample import PumpReading
     >>> pump = PumpReading(frequency_hz=50.0, flow_m3h=201.23, head_m=26.1)
     >>> sample_row(Sample(station="alpha", seq=0, time=1_000_000_000, level_m=1.2, pumps=(pump,)))
     '[1000,1.2,null,50,201.2,26.1,null]'

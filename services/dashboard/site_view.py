@@ -9,9 +9,11 @@ from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.decoding import M, decoded
-from wetwell.protocols.messages.messages import Sample, Status, Verdict
 from wetwell.protocols.messages.model import Model
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.dashboard.station_view import StationView
 
 log = logging.getLogger(__name__)

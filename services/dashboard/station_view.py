@@ -5,8 +5,10 @@ from collections import deque
 from typing import Any
 
 from wetwell.protocols.messages.alarm import Alarm
-from wetwell.protocols.messages.messages import Sample, State, Status, Verdict
 from wetwell.protocols.messages.model import Model
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.services.dashboard.sample_row import NS_PER_MS, live_figures, sample_row, thinned
 
 ROWS_A_FRAME = 8

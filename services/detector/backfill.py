@@ -9,7 +9,8 @@ import numpy as np
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import history_key
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import MessageError, Quality, Sample
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import Quality, Sample
 from wetwell.protocols.recordings.recording import Recording
 
 log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SnapshotError
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.state_file import put_aside, read_kept
 
 log = logging.getLogger(__name__)

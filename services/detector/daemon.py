@@ -9,7 +9,7 @@ from functools import partial
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import status_key
-from wetwell.protocols.messages.messages import Status
+from wetwell.protocols.messages.status import Status
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake

@@ -9,7 +9,8 @@ from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import order_key, sample_block_key, sample_key
 from wetwell.protocols.messages.decoding import SampleMessage, samples_of
 from wetwell.protocols.messages.history import LONGEST_NS
-from wetwell.protocols.messages.messages import MessageError, Sample
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.detector.backfill import missed_samples
 from wetwell.services.detector.station_detector import StationDetector

@@ -4,7 +4,7 @@ from wetwell.detector.detector import Detector
 from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import model_key
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.runtime.clock import now_ns
 

@@ -16,8 +16,11 @@ from wetwell.detector.verdict.maintenance import Costs
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import verdict_key
 from wetwell.protocols.messages.decoding import SampleMessage, decoded
-from wetwell.protocols.messages.messages import MessageError, Order, Sample, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.order import Order
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.model_publisher import ModelPublisher

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from wetwell.protocols.bus.keys import SITE
-from wetwell.protocols.messages.messages import Sample, Status
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.status import Status
 from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.services.doctor.finding import Finding, Level

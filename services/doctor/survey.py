@@ -20,8 +20,11 @@ from wetwell.protocols.bus.keys import (
 from wetwell.protocols.messages.alarm import AlarmReport
 from wetwell.protocols.messages.decoding import M, SampleMessage, samples_of
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import MessageError, Sample, Status, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.runtime.clock import now_ns
 

@@ -5,7 +5,8 @@ from collections import Counter, deque
 from collections.abc import Mapping
 
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages.messages import PumpReading, Quality, Sample, ServiceState
+from wetwell.protocols.messages.sample import PumpReading, Quality, Sample
+from wetwell.protocols.messages.status import ServiceState
 from wetwell.protocols.modbus.client import NoAnswerError, RefusedError, WrongAnswerError
 from wetwell.protocols.modbus.device_map import Plc
 from wetwell.protocols.quantities import PUMP_ANALOGUES, pump_column

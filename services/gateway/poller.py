@@ -5,7 +5,8 @@ import random
 from collections.abc import Callable
 
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages.messages import Sample, ServiceState
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.status import ServiceState
 from wetwell.protocols.modbus.block_reads import plan_blocks
 from wetwell.protocols.modbus.client import ModbusConnection, RefusedError
 from wetwell.protocols.modbus.device_map import Plc

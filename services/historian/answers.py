@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.history import History, HistoryQuery, Kind
-from wetwell.protocols.messages.messages import MessageError
+from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.historian.hours import Hours, joined_hours
 from wetwell.services.historian.rows import HOUR_NS

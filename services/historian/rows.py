@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.protocols.messages.messages import Quality
 from wetwell.protocols.messages.readings import Readings, row_values
+from wetwell.protocols.messages.sample import Quality
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
 

@@ -10,8 +10,10 @@ from typing import Literal
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.history import LONGEST_NS
-from wetwell.protocols.messages.messages import MessageError, Sample, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.answers import answer

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import to_iso

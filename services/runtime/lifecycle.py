@@ -11,7 +11,7 @@ from typing import Any
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import alive_key, status_key
-from wetwell.protocols.messages.messages import ServiceState, Status
+from wetwell.protocols.messages.status import ServiceState, Status
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.health.board import BOARD
 from wetwell.services.systemd.notify import watched_by_systemd

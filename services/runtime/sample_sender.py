@@ -4,7 +4,7 @@ import asyncio
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import sample_block_key, sample_key
-from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
 
 HISTORY = 600

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from wetwell.protocols.messages.messages import Stamp
+from wetwell.protocols.messages.message import Stamp
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Finite, Positive, Table
 from wetwell.protocols.timestamps import NS_PER_S

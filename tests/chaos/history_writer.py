@@ -7,7 +7,7 @@ import itertools
 import sys
 from pathlib import Path
 
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore

@@ -13,7 +13,8 @@ import pytest
 from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import sample_key, status_key
-from wetwell.protocols.messages.messages import Sample, Status
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.status import Status
 from wetwell.protocols.modbus.device_map import Device, Plc
 from wetwell.protocols.modbus.device_signal import Signal
 from wetwell.services.gateway.daemon import poll_all

@@ -18,7 +18,7 @@ import pytest
 from wetwell.protocols.bus.keys import history_key, sample_key
 from wetwell.protocols.bus.zenoh.link import open_router
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore

@@ -21,7 +21,8 @@ from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.keys import sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
-from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.simulator.scenario import Scenario

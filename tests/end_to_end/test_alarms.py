@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alarm_report_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, open_router
 from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.client import list_alarms, new_act, send_act
 from wetwell.services.cli import app
 

@@ -10,7 +10,8 @@ from simulated_site import Site
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.keys import sample_key
-from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 

@@ -23,7 +23,7 @@ from wetwell.protocols.bus.interface import Keyed
 from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.alarm import Alarm
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S

@@ -12,7 +12,7 @@ from typing import Protocol
 from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.stream.block import Block
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 
 
 class StreamDetector(Protocol):

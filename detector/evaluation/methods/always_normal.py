@@ -2,7 +2,7 @@
 
 from wetwell.detector.evaluation.methods.run_detector import RunDetector
 from wetwell.detector.runs.run import Run
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 
 class AlwaysNormal(RunDetector):

@@ -7,7 +7,7 @@ from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.evaluation.methods.run_detector import ALPHA, RunDetector, state_of
 from wetwell.detector.runs.run import Run
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 
 class CusumStatsmodels(RunDetector):

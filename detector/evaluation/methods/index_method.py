@@ -13,7 +13,7 @@ from wetwell.detector.statistics.tangent import attribution_index
 from wetwell.detector.verdict.control_limits import OUTER_SHARE, PUMP_ABOVE, RUNS, SYSTEM_BELOW
 from wetwell.detector.verdict.evidence import CONFIDENCE, RESAMPLES
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 
 class IndexMethod(RunDetector):

@@ -7,7 +7,7 @@ from wetwell.detector.evaluation.methods.run_detector import ALPHA, RunDetector,
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.f_distribution import log_f_survival
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 
 class PaperFShift(RunDetector):

@@ -5,7 +5,7 @@ import math
 from wetwell.detector.evaluation.methods.run_detector import RunDetector
 from wetwell.detector.runs.run import Run
 from wetwell.detector.statistics.curve_drift import pump_curve_f_test, system_curve_f_test
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 LOG_ALPHA = math.log(0.05)
 

@@ -9,7 +9,7 @@ from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.evaluation.methods.run_detector import RunDetector, state_of
 from wetwell.detector.runs.run import Run
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 AWAY_SIGMAS = 3.0
 

@@ -10,7 +10,7 @@ from wetwell.detector.stream.block import Block
 from wetwell.detector.stream.loop import Stop
 from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
-from wetwell.protocols.messages.messages import State, Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 
 ALPHA = 1e-3

@@ -19,7 +19,7 @@ from wetwell.protocols.bus.zenoh.session import open_client_session, open_router
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import ZenohWorker
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages.messages import JSON_ENCODING
+from wetwell.protocols.messages.message import JSON_ENCODING
 
 logger = logging.getLogger(__name__)
 

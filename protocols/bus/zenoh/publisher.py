@@ -12,7 +12,7 @@ from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
 from wetwell.protocols.bus.zenoh.session import reason
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages.messages import JSON_ENCODING
+from wetwell.protocols.messages.message import JSON_ENCODING
 
 LAST_LOSS_S = 1.0
 """So long after a message that no other followed its publisher says that it was the last."""

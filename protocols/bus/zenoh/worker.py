@@ -18,7 +18,7 @@ from wetwell.protocols.bus.publisher_cache import CacheQuery, Page
 from wetwell.protocols.bus.sequencer import SourceStream
 from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher, at_once
 from wetwell.protocols.bus.zenoh.subscription import CHANNEL, ZenohSubscription
-from wetwell.protocols.messages.messages import JSON_ENCODING
+from wetwell.protocols.messages.message import JSON_ENCODING
 
 logger = logging.getLogger(__name__)
 

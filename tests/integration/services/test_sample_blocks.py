@@ -7,8 +7,9 @@ import pytest
 from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import sample_block_key, sample_key, verdict_key
-from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.dashboard.site_view import SiteView

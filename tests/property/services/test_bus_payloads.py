@@ -16,8 +16,11 @@ from wetwell.protocols.bus.keys import alarm_act_key
 from wetwell.protocols.messages.alarm import AlarmAct
 from wetwell.protocols.messages.fleet import Plan
 from wetwell.protocols.messages.history import HistoryQuery
-from wetwell.protocols.messages.messages import MessageError, Order, PumpReading, Sample, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.order import Order
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.station_detector import StationDetector

@@ -10,7 +10,8 @@ import pytest
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULT_STATES
-from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
+from wetwell.protocols.messages.sample import PumpReading, Sample
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.scenario import Scenario

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wetwell.protocols import quantities as q
-from wetwell.protocols.messages.messages import PumpReading, Sample
 from wetwell.protocols.messages.readings import PumpRow, Row, row_values
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import PumpBlock, SampleBlock
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.units import house_unit

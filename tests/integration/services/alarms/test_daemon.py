@@ -10,8 +10,10 @@ from memory_bus import MemoryBus
 from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alive_key, sample_block_key
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
-from wetwell.protocols.messages.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S, from_iso
 from wetwell.services.alarms.client import list_alarms, new_act, report, send_act
 from wetwell.services.alarms.daemon import keep

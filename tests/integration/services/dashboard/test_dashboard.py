@@ -12,7 +12,7 @@ from wetwell.protocols.bus.keys import alarm_act_key, history_key, sample_block_
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S

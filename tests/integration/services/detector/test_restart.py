@@ -12,8 +12,9 @@ from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Request, Subscription
 from wetwell.protocols.bus.keys import history_key, sample_block_key, sample_key, verdict_key
-from wetwell.protocols.messages.messages import Sample, Verdict
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake

@@ -19,7 +19,9 @@ from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.interface import Presence, Request, Subscription
 from wetwell.protocols.bus.keys import alive_key, history_key, sample_key, status_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, open_router
-from wetwell.protocols.messages.messages import Sample, Status, Verdict
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.fleet.controller import Fleet
 from wetwell.services.fleet.inventory import Inventory
 from wetwell.services.historian.service import Historian

@@ -16,7 +16,7 @@ from pyModbusTCP.server import ModbusServer as ForeignServer
 from pyModbusTCP.utils import encode_ieee, long_list_to_word
 
 from wetwell.protocols.bus.keys import sample_key
-from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.modbus.device_map import load_plcs
 from wetwell.protocols.modbus.registers import register_csv, register_table
 from wetwell.protocols.modbus.server import ModbusServer

@@ -8,7 +8,7 @@ from pathlib import Path
 from wetwell.protocols.bus.keys import history_key, sample_block_key, sample_key
 from wetwell.protocols.bus.zenoh.link import open_client, open_router
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.daemon import keep

@@ -20,7 +20,7 @@ from memory_bus import MemoryBus
 from prometheus_client.parser import text_string_to_metric_families
 
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages.messages import Status
+from wetwell.protocols.messages.status import Status
 from wetwell.services.runtime.health.board import HealthBoard
 from wetwell.services.runtime.health.page import health_page
 from wetwell.services.runtime.settings import HealthSettings

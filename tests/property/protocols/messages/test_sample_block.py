@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wetwell.detector.stream.block import LiveBlock
-from wetwell.protocols.messages.messages import MessageError, PumpReading, Sample
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
 from wetwell.protocols.timestamps import MAX_STAMP_NS
 

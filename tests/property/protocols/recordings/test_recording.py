@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wetwell.protocols.messages.messages import Sample
+from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES
 from wetwell.protocols.recordings.recording import (
     SUFFIXES,

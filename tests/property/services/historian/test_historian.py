@@ -12,7 +12,7 @@ from hypothesis import settings as limits
 from hypothesis import strategies as st
 
 from wetwell.protocols.messages.history import LONGEST_NS, History
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import columns_of
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import settings as limits
 from hypothesis import strategies as st
 
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.historian.rows import HOUR_NS, QUALITIES, pack_block
 from wetwell.services.historian.samples import Samples, merged

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import poisson
 
 from wetwell.detector.evaluation.detections import detections, false_alarms, poisson_interval
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
 

@@ -14,7 +14,7 @@ from wetwell.detector.evaluation.scores import (
     scored_runs,
     without_truth,
 )
-from wetwell.protocols.messages.messages import Verdict
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
 

@@ -19,7 +19,7 @@ from wetwell.detector.stream.gate import (
     let_through,
     new_gate,
 )
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import FIRST_PUMP, PUMP_VALUES
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 

@@ -6,7 +6,7 @@ from typing import get_args
 import pytest
 
 from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
-from wetwell.protocols.messages.messages import State
+from wetwell.protocols.messages.verdict import State
 
 COSTS = Costs(
     pull_pump=100.0,

@@ -8,7 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from wetwell.protocols.messages.messages import MessageError, PumpReading, Sample, Status, Verdict
+from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.sample import PumpReading, Sample
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 
 TIME_NS, TIME = 1_735_689_600_000_000_000, "2025-01-01T00:00:00Z"
 READING = PumpReading(frequency_hz=50.0, flow_m3h=200.0, head_m=26.0, power_kw=18.7, running=True)

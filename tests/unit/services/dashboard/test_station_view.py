@@ -7,8 +7,10 @@ import pytest
 from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.history import History
-from wetwell.protocols.messages.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.dashboard.sample_row import past_rows, sample_row, thinned
 from wetwell.services.dashboard.site_view import ROWS, SiteView

@@ -8,8 +8,10 @@ from memory_bus import MemoryBus
 from wetwell.protocols.bus.keys import sample_block_key
 from wetwell.protocols.messages.alarm import AlarmFigure, AlarmReport
 from wetwell.protocols.messages.history import History
-from wetwell.protocols.messages.messages import PumpReading, Sample, Status, Verdict
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.status import Status
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.doctor.checks import findings_of
 from wetwell.services.doctor.finding import exit_code

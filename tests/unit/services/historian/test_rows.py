@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import PumpReading, Sample
+from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.rows import HOUR_NS, MAX_DATA_BYTES, SampleRow, pack, pack_block

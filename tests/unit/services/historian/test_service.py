@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.messages import PumpReading, Sample, Verdict
+from wetwell.protocols.messages.sample import PumpReading, Sample
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
