@@ -155,7 +155,7 @@ def test_a_sample_that_cannot_be_judged_takes_none_of_its_block_along(alpha, sam
         with MemoryBus() as bus:
             verdicts = bus.subscribe(verdict_key("alpha"))
             judge = StationDetector(bus, alpha)
-            monkeypatch.setattr(judge.detector, "_stopped", lambda _: 1 / 0)
+            monkeypatch.setattr(judge.detector, "_judged", lambda _: 1 / 0)
             judge.handle_payloads(messages, kind)
             told.append(asyncio.run(verdicts.receive()))
         figures = judge.figures()
