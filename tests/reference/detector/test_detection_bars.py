@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.check
+
 PATH = Path(__file__).parents[3] / "benchmarks" / "detection.py"
 SEEDS = range(4000, 4002)
 LEAST_F1 = {

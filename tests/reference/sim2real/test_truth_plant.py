@@ -118,6 +118,7 @@ def of_running(columns, quantity):
     return np.concatenate([columns[f"pump{i}_{quantity}"] for i in range(1, 5) if f"pump{i}_{quantity}" in columns])
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", DEVIATIONS)
 def test_a_deviation_shows_where_it_must(name, seed):
@@ -151,6 +152,7 @@ SENSOR_SIDE = {
 }
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("name", SENSOR_SIDE)
 def test_a_deviation_of_a_channel_leaves_all_others_as_they_were(name):
     with_it, without = drawn(name, 3)
@@ -164,6 +166,7 @@ def test_a_deviation_of_a_channel_leaves_all_others_as_they_were(name):
     assert differing <= allowed
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("name", ["sump_area_profile", "unmetered_inflow", "control_delay", "threshold_shift"])
 def test_what_moves_the_level_leaves_the_curves_alone(name):
     with_it, without = drawn(name, 4)

@@ -184,6 +184,7 @@ def cheap_days(days, period_s):
         yield Sample(station="alpha", seq=seq, time=second * NS_PER_S, level_m=level_m, pumps=pumps)
 
 
+@pytest.mark.check
 def test_the_state_does_not_grow_over_ten_days(alpha):
     detector, sizes, states = Detector(alpha.name, datasheet_of(alpha)), [], set()
     for n, sample in enumerate(cheap_days(10, 30), start=1):

@@ -16,6 +16,8 @@ from wetwell.protocols.recordings.recording import read_recording
 from wetwell.services.batch.dataset import check_dataset, make_dataset, plan_of
 from wetwell.services.stations import find_station
 
+pytestmark = pytest.mark.check
+
 COUNT = 6
 DAYS = 0.3
 OPTIONS = ["--days", str(DAYS), "--seed", "5"]
