@@ -24,7 +24,8 @@ test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard ea
 	$(PYTEST) -m "not check"
 
 check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
-	$(PYTEST) -m check
+	$(BIN)/pytest -q --durations=10 -m check tests/browser  # alone: a page that is watched must keep up with its site
+	$(PYTEST) -m check --ignore=tests/browser
 
 lint: $(VENV)/.dev  ## ruff
 	$(BIN)/ruff check .
