@@ -8,10 +8,9 @@ from zoneinfo import ZoneInfo
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.modbus.device_signal import pump_of
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_of
 from wetwell.protocols.recordings.importers.times.time_format import TimeFormat
 from wetwell.protocols.recordings.origin import StoredValue
-from wetwell.protocols.recordings.recording import PUMP_QUANTITIES, STATION_COLUMNS
 from wetwell.protocols.station.station_file import NAME_PATTERN, Finite, Positive, Table, load_toml
 from wetwell.protocols.units import factor, house_unit
 
@@ -184,9 +183,9 @@ class TagMapping(Table):
 
 
 def _check_signal(name: str, signal: TagSignal) -> None:
-    if name not in STATION_COLUMNS and not pump_of(name):
+    if name not in STATION_QUANTITIES and not pump_of(name):
         raise ValueError(
-            f"signal.{name}: is no column of a recording, must be {', '.join(STATION_COLUMNS)} or "
+            f"signal.{name}: is no column of a recording, must be {', '.join(STATION_QUANTITIES)} or "
             f"pump1_ and so on with {', '.join(PUMP_QUANTITIES)}"
         )
     is_flag = name.endswith("_running")

@@ -8,7 +8,7 @@ import pyarrow.compute as pc
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.modbus.device_signal import pump_of
+from wetwell.protocols.quantities import pump_of
 from wetwell.protocols.recordings.importers.mapping import TagMapping, TagSignal
 from wetwell.protocols.recordings.importers.refusals import Refusals
 from wetwell.protocols.recordings.importers.signals.events import EventStore

@@ -44,7 +44,7 @@ def lines_of(text: str) -> list[str]:
 
 
 def find_delimiter(lines: Sequence[str]) -> str | None:
-    """Delimiter that cuts most lines into the same number of fields; None if none does.
+    """Delimiter that cuts most lines into the same number of fields, and into most; None if none does.
 
     Examples
     --------
@@ -54,14 +54,15 @@ def find_delimiter(lines: Sequence[str]) -> str | None:
     said = re.fullmatch(r"\s*sep=(.)\s*", lines[0]) if lines else None
     if said:
         return said[1]
-    shares = {}
     filled = [line for line in lines if line.strip()]
+    ranks: dict[str, tuple[bool, int, int]] = {}
     for delimiter in DELIMITERS:
         widths = Counter(len(row) for row in csv.reader(filled, delimiter=delimiter) if len(row) > 1)
-        shares[delimiter] = widths.most_common(1)[0][1] / len(filled) if widths else 0.0
-    often = [delimiter for delimiter in DELIMITERS if shares[delimiter] >= _OFTEN]
-    best = often[0] if often else max(DELIMITERS, key=lambda delimiter: shares[delimiter])
-    return best if shares[best] else None
+        if widths:
+            width, alike = widths.most_common(1)[0]
+            often = alike >= _OFTEN * len(filled)
+            ranks[delimiter] = (often, width if often else alike, -DELIMITERS.index(delimiter))
+    return max(ranks, key=lambda delimiter: ranks[delimiter]) if ranks else None
 
 
 def find_decimal(cells: Iterable[str]) -> str | None:

@@ -54,43 +54,49 @@ def find_header(rows: Sequence[Sequence[str]], needed: str | None = None) -> Hea
     >>> header.names, header.notes, header.first_row
     (('time', 'LT1'), (('', 'm'),), 4)
     """
-    if needed is not None:
-        places = [place for place, row in enumerate(rows) if needed in {cell.strip() for cell in row}]
-        if needed.isdecimal() and not places:
-            return _header(rows, None, _first_data(rows, 0))
-        if not places:
-            first = next((row for row in rows if sum(bool(cell.strip()) for cell in row) > 1), [])
-            raise ValueError(
-                f"columns.time: '{needed}' is in no line at the top; there is {', '.join(map(repr, first[:8]))}"
-            )
-        return _header(rows, places[0], _first_data(rows, places[0] + 1))
-    data = _first_data(rows, 0)
-    width = len(rows[data]) if data < len(rows) else 0
-    if not width:
-        raise ValueError("no line with a date and values was found at the top")
-    full = [place for place in range(data) if _filled(rows[place]) >= max(2, width / 2)]
-    return _header(rows, full[0] if full else None, data)
+    if needed is None:
+        data = _first_data(rows, 0, None)
+        if data >= len(rows):
+            raise ValueError("no line with a date and values was found at the top")
+        full = [place for place in range(data) if _filled(rows[place]) >= max(2, len(rows[data]) / 2)]
+        return _header(rows, full[0] if full else None, data)
+    found = [(place, row.index(needed)) for place, row in enumerate(map(_trimmed, rows)) if needed in row]
+    if found:
+        place, column = found[0]
+        return _header(rows, place, _first_data(rows, place + 1, column))
+    if needed.isdecimal():
+        return _header(rows, None, _first_data(rows, 0, int(needed) - 1))
+    first = next((row for row in rows if _filled(row) > 1), [])
+    there = ", ".join(map(repr, first[:8]))
+    raise ValueError(f"columns.time: '{needed}' is in no line at the top; there is {there}")
+
+
+def _trimmed(row: Sequence[str]) -> list[str]:
+    return [cell.strip() for cell in row]
 
 
 def _filled(row: Sequence[str]) -> int:
     return sum(bool(cell.strip()) for cell in row)
 
 
-def _first_data(rows: Sequence[Sequence[str]], begin: int) -> int:
-    """Place of the first row that is data, and so is the next; `len(rows)` if there is none."""
+def _first_data(rows: Sequence[Sequence[str]], begin: int, column: int | None) -> int:
+    """Place of the first row that is data; without a known column the next must be so too; `len(rows)` if none is."""
     for place in range(begin, len(rows)):
-        if _is_data(rows[place]) and (place + 1 >= len(rows) or _is_data(rows[place + 1])):
+        following = rows[place + 1 : place + 2] if column is None else []
+        if all(_is_data(row, column) for row in [rows[place], *following]):
             return place
     return len(rows)
 
 
-def _is_data(row: Sequence[str]) -> bool:
-    """Whether a row holds a stamp, or begins with a number and has no other words than a tag and a status."""
-    cells = [cell.strip() for cell in row if cell.strip()]
-    if len(cells) < 2:
-        return False
-    numbers = sum(_NUMBER.fullmatch(cell) is not None for cell in cells)
-    return any(map(looks_like_time, cells)) or (_NUMBER.fullmatch(cells[0]) is not None and numbers >= len(cells) / 2)
+def _is_data(row: Sequence[str], column: int | None) -> bool:
+    """Whether a row has a stamp, in its column if that is known, or begins with a number and has more of them."""
+    cells = _trimmed(row)
+    if column is not None:
+        return column < len(cells) and (cells[column][:1].isdigit() or looks_like_time(cells[column]))
+    known = [cell for cell in cells if cell]
+    numbers = sum(_NUMBER.fullmatch(cell) is not None for cell in known)
+    is_table = numbers > 1 and numbers >= len(known) / 2 and _NUMBER.fullmatch(known[0]) is not None
+    return len(cells) > 1 and (is_table or any(map(looks_like_time, known)))
 
 
 def _header(rows: Sequence[Sequence[str]], place: int | None, data: int) -> Header:

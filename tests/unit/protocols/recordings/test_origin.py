@@ -6,7 +6,13 @@ import pyarrow.parquet
 import pytest
 
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.recordings.recording import SUFFIXES, Recording, read_recording, recording_writer, write_recording
+from wetwell.protocols.recordings.recording import (
+    SUFFIXES,
+    Recording,
+    read_recording,
+    recording_writer,
+    write_recording,
+)
 
 ROWS = {"time_ns": np.array([0, 10**9]), "columns": {"pump1_flow_m3h": np.array([1.0, 2.0])}}
 
@@ -54,5 +60,7 @@ def test_an_unknown_kind_of_value_is_refused(tmp_path, suffix):
     if suffix == ".parquet":
         table = pa.table({"time": pa.array([0], pa.timestamp("ns", "UTC")), "pump1_flow_m3h": [1.0]})
         pa.parquet.write_table(table.replace_schema_metadata({"wetwell.value": "guess"}), path)
-    with pytest.raises(RecordingError, match=r"r\.(csv|parquet): value: got 'guess', must be one of instant, mean, held"):
+    with pytest.raises(
+        RecordingError, match=r"r\.(csv|parquet): value: got 'guess', must be one of instant, mean, held"
+    ):
         read_recording(path)

@@ -1,11 +1,13 @@
 """Exports as systems write them: what is made of them, what is told, and what is refused in one line."""
 
+import datetime as dt
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
+from workbook import write_workbook
 
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.recordings.importers import conversion
@@ -238,7 +240,7 @@ def test_an_offset_in_the_stamp_wins(bench):
 def test_forms_of_stamps(bench, stamp, said):
     done = bench.convert(long_rows(f"{stamp};LT1;1;G", f"{stamp};P1;EIN;G"), top=said)
     (time_ns,) = done.recording.time_ns.tolist()
-    assert time_ns // 10**9 in {from_iso("2024-11-15T10:00:00Z") // 10**9}
+    assert time_ns // 10**9 == from_iso("2024-11-15T10:00:00Z") // 10**9
 
 
 def test_date_and_time_of_day_in_two_columns(bench):
@@ -261,7 +263,8 @@ def test_files_of_a_day_each_and_of_a_tag_each_are_one_recording(bench):
 
 
 def test_title_unit_and_trailing_delimiters_are_no_rows(bench):
-    text = "Report;;;\nfrom 1.1.2024;;;\n\nZeit;LT1;FT1;\n;m;m³/h;\n15.11.2024 12:00;1,5;1.234,5;\n15.11.2024 12:10;1,6;7;\n"
+    titles = "Report;;;\nfrom 1.1.2024;;;\n\nZeit;LT1;FT1;\n;m;m³/h;\n"
+    text = f"{titles}15.11.2024 12:00;1,5;1.234,5;\n15.11.2024 12:10;1,6;7;\n"
     done = bench.convert(text.encode("iso-8859-1"), WIDE)
     assert done.recording.columns["pump1_flow_m3h"].tolist() == [1234.5, 7.0]
     assert done.assumed["lines"] == "header 4, first row 6"
@@ -282,7 +285,7 @@ def test_percent_of_a_span_and_of_the_nominal_frequency(bench):
     assert done.recording.columns["level_m"].tolist() == [3.0, 5.0]
     assert done.recording.columns["pump1_frequency_hz"].tolist() == [54.0, 60.0]
     with pytest.raises(
-        ConfigError, match="signal.pump1_frequency_hz: unit '%' is of the nominal frequency; give --station"
+        ConfigError, match=r"signal\.pump1_frequency_hz: unit '%' is of the nominal frequency; give --station"
     ):
         convert([path], mapping)
 
@@ -347,7 +350,7 @@ def test_a_file_that_does_not_do_is_refused_in_one_line(bench, content, parts, s
 
 def test_more_than_the_memory_is_refused_before_it_begins(bench, monkeypatch):
     monkeypatch.setattr(conversion.os, "sysconf", lambda _: 1)
-    with pytest.raises(RecordingError, match="needs about .* GB of memory, this machine has .*: convert its days"):
+    with pytest.raises(RecordingError, match=r"needs about .* GB of memory, this machine has .*: convert its days"):
         bench.convert("Zeit;LT1;FT1\n2024-11-15 12:00;1;2\n", WIDE)
 
 
@@ -359,3 +362,23 @@ def test_a_file_that_is_none_is_one_line(bench, name):
     with pytest.raises(RecordingError) as caught:
         convert([path], bench.mapping(WIDE))
     assert "\n" not in str(caught.value)
+
+
+def test_a_workbook_with_times_texts_and_empty_cells(bench):
+    """Midnight comes as a date alone, and a number that somebody typed as text has the comma of his country."""
+    times = [dt.datetime(2024, 11, day, hour) for day, hour in ((15, 23), (16, 0), (16, 1))]  # noqa: DTZ001
+    rows = [
+        ["Report"],
+        ["Zeit", "LT1", "FT1"],
+        ["", "m", "m³/h"],
+        [times[0], 1.5, 10],
+        [times[1], "1,25", ""],
+        [times[2], 2, 7.5],
+    ]
+    write_workbook(bench.folder / "export.xlsx", rows)
+    done = convert([bench.folder / "export.xlsx"], bench.mapping(WIDE))
+    assert iso(done.recording) == ["2024-11-15T21:00:00Z", "2024-11-15T22:00:00Z", "2024-11-15T23:00:00Z"]
+    assert done.recording.columns["level_m"].tolist() == [1.5, 1.25, 2.0]
+    np.testing.assert_array_equal(done.recording.columns["pump1_flow_m3h"], [10.0, np.nan, 7.5])
+    with pytest.raises(RecordingError, match=r"sheet: got 'Tabelle2', there are Daten"):
+        convert([bench.folder / "export.xlsx"], bench.mapping(WIDE, top='sheet = "Tabelle2"'))
