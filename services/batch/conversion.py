@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.quantities import pump_of
 from wetwell.protocols.recordings.importers.conversion import Conversion, convert
 from wetwell.protocols.recordings.importers.draft.draft import draft_of
 from wetwell.protocols.recordings.importers.mapping import TagMapping, load_mapping
@@ -40,6 +41,11 @@ def convert_files(
     if station is not None and station.name != mapping.station:
         raise ConfigError(
             f"{mapping_path}: station: got '{mapping.station}', the station file is of '{station.name}'"
+        )
+    pumps = max(map(pump_of, mapping.signal))
+    if station is not None and pumps > len(station.pump):
+        raise ConfigError(
+            f"{mapping_path}: signal: got pump {pumps}, station '{station.name}' has {len(station.pump)}"
         )
     nominal_hz = [pump.nominal_frequency_hz for pump in station.pump] if station else []
     try:

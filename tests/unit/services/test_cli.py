@@ -57,6 +57,10 @@ STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-
             ["convert", "{bad}", "--mapping", "{mapping}", "--out", "{tmp}/v.csv", "--station", "alpha"],
             "{mapping}: station: got 'north', the station file is of 'alpha'",
         ),
+        (
+            ["convert", "{bad}", "--mapping", "{pumps}", "--out", "{tmp}/v.csv", "--station", "alpha"],
+            "{pumps}: signal: got pump 4, station 'alpha' has 3",
+        ),
         (["convert", "{tmp}/no.csv", "--draft", "{tmp}/m.toml"], "{tmp}/no.csv: cannot be read: No such file"),
         (["up", "--for", "soon"], "--for: got 'soon', must be a time such as 90s, 10m or 2h"),
         (["up", "--modbus", "here"], "--modbus: got 'here', must be HOST:PORT such as 127.0.0.1:5020"),
@@ -91,6 +95,7 @@ def test_an_error_is_one_line(
         "settings": "[modbus]\nprot = 1\n",
         "mapping": 'station = "north"\nlayout = "wide"\ncolumns.time = "time"\n'
         'signal.pump1_flow_m3h.tag = "pump1_flow_m3h"\n',
+        "pumps": 'station = "alpha"\nlayout = "wide"\ncolumns.time = "time"\nsignal.pump4_flow_m3h.tag = "x"\n',
     }
     paths = {name: tmp_path / f"{name}.{'csv' if name == 'bad' else 'toml'}" for name in files}
     for name, text in files.items():

@@ -19,6 +19,7 @@ from wetwell.protocols.units import house_unit
 _GOOD = ("good", "192", "ok", "valid", "gut", "hyvä", "bon", "bonne", "bueno", "1", "0")
 """Qualities that are taken for good, the surest first."""
 
+_PRESSURES = frozenset({"kPa", "Pa", "bar", "mbar", "psi"})
 _STEADY = 0.6
 """A tag of which fewer steps are the usual one is stored on change."""
 _ORDER = ("level_m", "inflow_m3h", "frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
@@ -163,6 +164,10 @@ def _signal_lines(name: str, signal: _Signal, assumed: dict[str, str]) -> list[s
     lines.append(f"unit = {_quoted(unit.unit)}  # assumed{_because(why)}")
     if unit.scale != 1.0:
         lines.append(f"scale = {unit.scale!r}")
+    if unit.unit in _PRESSURES and name.endswith("_head_m"):
+        lines.append(
+            "# offset = 0.0  # CHECK: a gauge in the discharge is not yet the head; take off the suction side, in m"
+        )
     if unit.unit == "%" and name.endswith("_frequency_hz"):
         lines.append(
             "span = [0.0, 50.0]  # assumed; without it and with --station FILE it is of the nominal frequency"

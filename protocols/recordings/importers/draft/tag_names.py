@@ -74,7 +74,7 @@ _LETTERS = {
     "level_m": "lt lit lic li niv lvl",
     "flow_m3h": "ft fit fic fi q",
     "head_m": "pt pit pic",
-    "frequency_hz": "hz st sit sic vfd fu vsd",
+    "frequency_hz": "hz st sit sic spd vfd fu vsd",
     "power_kw": "kw jt jit jic",
     "running": "on ein xs ys run sts zs",
 }
@@ -82,8 +82,8 @@ _LETTERS = {
 
 _QUANTITY_OF_HOUSE = {"m³/h": "flow_m3h", "Hz": "frequency_hz", "kW": "power_kw"}
 _PUMP_WORD = r"(?:pumpe|pumppu|pump|pompe|pompa|bomba|pmp|pu|agg|p)"
-_PUMP = re.compile(rf"(?:^|[^a-z0-9]){_PUMP_WORD}[\s_.#:-]*(?:no|nr|n°)?[\s_.#:-]*0*(\d+(?:\.\d+)?)(?![0-9])")
-_PUMP_LATER = re.compile(r"(?:pump|pompe|pompa|bomba)\D*?(?<![a-z])(\d+(?:\.\d+)?)\D*$")
+_PUMP_NUMBER = re.compile(rf"(?:^|[^a-z0-9]){_PUMP_WORD}[\s_.#:-]*(?:no|nr|n°)?[\s_.#:-]*0*(\d+(?:\.\d+)?)(?![0-9])")
+_PUMP_LATER_NUMBER = re.compile(r"(?:pump|pompe|pompa|bomba)\D*?(?<![a-z])(\d+(?:\.\d+)?)\D*$")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +124,7 @@ def recognise(tag: str, unit: UnitGuess | None) -> TagGuess | None:
     of_unit = _QUANTITY_OF_HOUSE.get(unit.house) if unit else None
     if of_unit and quantity not in {of_unit, "inflow_m3h" if of_unit == "flow_m3h" else of_unit}:
         quantity, why = of_unit, f"unit {unit.unit if unit else ''}"
-    match = _PUMP.search(text) or _PUMP_LATER.search(text)
+    match = _PUMP_NUMBER.search(text) or _PUMP_LATER_NUMBER.search(text)
     pump = match[1] if match else ""
     if quantity == "head_m" and unit and not pump:
         quantity = ""

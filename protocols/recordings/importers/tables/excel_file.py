@@ -15,10 +15,9 @@ from wetwell.protocols.recordings.importers.mapping import TagMapping
 from wetwell.protocols.recordings.importers.refusals import Refusals
 from wetwell.protocols.recordings.importers.tables.block import Block, ExportFile
 from wetwell.protocols.recordings.importers.tables.dialect import find_decimal
-from wetwell.protocols.recordings.importers.tables.header import find_header
+from wetwell.protocols.recordings.importers.tables.header import MOST_LOOKED, find_header
 
-_BLOCK_ROWS = 20_000
-_MOST_LOOKED = 100
+_SHEET_ROWS = 20_000
 
 
 class ExcelFile(ExportFile):
@@ -40,7 +39,7 @@ class ExcelFile(ExportFile):
             raise RecordingError(f"{path}: is no workbook that can be read: {error}") from error
         if len(book.sheet_names) > 1 and not (mapping and mapping.sheet):
             self.assumed["sheet"] = f"'{name}', the first of {len(book.sheet_names)}"
-        rows = [[_text(cell, ".") for cell in row] for row in islice(self._sheet.iter_rows(), _MOST_LOOKED)]
+        rows = [[_text(cell, ".") for cell in row] for row in islice(self._sheet.iter_rows(), MOST_LOOKED)]
         try:
             header = find_header(rows, mapping.columns.time if mapping else None)
         except ValueError as error:
@@ -48,7 +47,7 @@ class ExcelFile(ExportFile):
         self.names, self.notes, self._first_row = header.names, header.notes, header.first_row
         texts = [
             cell
-            for row in islice(self._sheet.iter_rows(), header.first_row - 1, _MOST_LOOKED)
+            for row in islice(self._sheet.iter_rows(), header.first_row - 1, MOST_LOOKED)
             for cell in row
             if isinstance(cell, str)
         ]
@@ -65,7 +64,7 @@ class ExcelFile(ExportFile):
         places = {name: place for place, name in enumerate(self.names) if name in wanted}
         rows = islice(self._sheet.iter_rows(), self._first_row - 1, None)
         line = self._first_row + (self._sheet.start or (0, 0))[0]
-        while chunk := list(islice(rows, _BLOCK_ROWS)):
+        while chunk := list(islice(rows, _SHEET_ROWS)):
             columns = {name: self._column([row[place] for row in chunk]) for name, place in places.items()}
             yield Block(columns=columns, lines=np.arange(line, line + len(chunk)))
             line += len(chunk)

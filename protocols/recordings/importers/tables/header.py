@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from wetwell.protocols.recordings.importers.tables.block import without_doubles
 from wetwell.protocols.recordings.importers.times.time_format import looks_like_time
 
+MOST_LOOKED = 400
+"""Rows of the beginning that tell how a file is written."""
+
 _NUMBER = re.compile(r"[+-]?\d[\d.,]*([eE][+-]?\d+)?")
 
 

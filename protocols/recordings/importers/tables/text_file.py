@@ -24,12 +24,10 @@ from wetwell.protocols.recordings.importers.tables.dialect import (
     find_encoding,
     lines_of,
 )
-from wetwell.protocols.recordings.importers.tables.header import find_header
+from wetwell.protocols.recordings.importers.tables.header import MOST_LOOKED, find_header
 
 _BLOCK_BYTES = 1 << 22
 _LOOK_BYTES = 1 << 18
-_MOST_LOOKED = 400
-"""Lines of the beginning that tell how the file is written."""
 _MOST_RAGGED = 0.01
 _MOST_RAGGED_ROWS = 10
 """A file in which more rows, and a larger part of them, have another number of fields changes its columns."""
@@ -50,7 +48,7 @@ class TextFile(ExportFile):
             text = codecs.getincrementaldecoder(self._encoding)().decode(head).removeprefix(_MARK)
         except UnicodeDecodeError as error:
             raise RecordingError(f"{path}: is not {self._encoding}: {error.reason} at byte {error.start}") from error
-        lines = lines_of(text)[:_MOST_LOOKED]
+        lines = lines_of(text)[:MOST_LOOKED]
         self._delimiter = (mapping.delimiter if mapping else None) or find_delimiter(lines)
         if self._delimiter is None:
             raise RecordingError(f"{path}: no delimiter was found, neither tab nor ; nor | nor ,; is this a table?")

@@ -94,16 +94,17 @@ def _first_times(local_ns: Integers, after: Integers, doubles: Integers) -> tupl
     """Which of the doubled stamps are of the first time, and how many of them nobody can tell."""
     is_first = np.ones(doubles.size, dtype=bool)
     undecided = 0
-    is_backward = local_ns[-1] < local_ns[0]
+    steps_ns = np.diff(local_ns)
+    is_backward = np.sum(steps_ns < 0) > np.sum(steps_ns > 0)
     for change in np.unique(after[doubles]):
         members = np.flatnonzero(after[doubles] == change)
         members = members[::-1] if is_backward else members
         times_ns = local_ns[doubles[members]]
         back = np.flatnonzero(np.diff(times_ns) < 0)
         _, places, counts = np.unique(times_ns, return_index=True, return_counts=True)
-        if back.size:
+        if back.size == 1:
             is_first[members[back[0] + 1 :]] = False
-        elif np.all(counts == 2):
+        elif back.size == 0 and np.all(counts == 2):
             is_first[np.delete(members, places)] = False
         else:
             undecided += members.size

@@ -191,6 +191,18 @@ def test_the_hour_that_comes_twice(bench, zone, before, doubled, after, minutes,
     assert done.undecided == 0
 
 
+def test_the_doubled_hour_in_files_that_are_given_in_any_order(bench):
+    second = bench.file("28.csv", both(*(f"28.10.2024 {hour:02}:00" for hour in range(24))))
+    first = bench.file("27.csv", both("27.10.2024 02:30", *[f"27.10.2024 03:{m}" for m in ("00", "30")] * 2))
+    done = convert([second, first], bench.mapping())
+    assert iso(done.recording)[:5] == [
+        f"2024-10-2{t}:00Z" for t in ("6T23:30", "7T00:00", "7T00:30", "7T01:00", "7T01:30")
+    ]
+    assert done.undecided == 0
+    done = convert([first, first, second], bench.mapping())
+    assert done.undecided == 16
+
+
 def test_a_lonely_stamp_in_the_doubled_hour_is_the_first_and_is_told(bench):
     done = bench.convert(both("27.10.2024 02:50", "27.10.2024 03:30", "27.10.2024 05:00"))
     assert iso(done.recording)[1] == "2024-10-27T00:30:00Z"
