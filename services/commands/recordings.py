@@ -104,7 +104,6 @@ def convert(
     from wetwell.protocols.recordings.importers import IMPORTERS
     from wetwell.protocols.recordings.recording import write_recording
     from wetwell.services.batch.conversion import convert_files, draft_mapping
-    from wetwell.services.stations import find_station
 
     if (out is None) == (draft is None) or (draft is not None and mapping is not None):
         raise ConfigError("convert: give --mapping FILE and --out FILE, or --draft FILE")
@@ -112,7 +111,11 @@ def convert(
         return print_result(draft_mapping(sources, draft), as_json=as_json)
     out = cast("Path", out)
     if mapping is not None:
-        plant = None if station is None else find_station(station)
+        plant = None
+        if station is not None:
+            from wetwell.services.stations import find_station  # brings the compiled simulator, which takes seconds
+
+            plant = find_station(station)
         return print_result(convert_files(sources, mapping, out, plant), as_json=as_json)
     if len(sources) > 1:
         raise ConfigError(f"convert: got {len(sources)} files, without --mapping it takes one")

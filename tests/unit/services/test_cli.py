@@ -267,14 +267,14 @@ def test_a_file_of_plcs_is_checked_and_a_plc_that_is_away_is_told(
 
 
 def test_an_export_is_drafted_and_converted(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    run_wetwell: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     export, mapping, out = (tmp_path / name for name in ("export.csv", "mapping.toml", "north.csv"))
     rows = "2024-11-15T12:00:00Z;120;10;dry\n" * 9
     export.write_text(f"Time;Wet well level [cm];P1 flow [l/s];Weather\n{rows}?;1;2;-\n")
-    assert run(monkeypatch, "convert", export, "--draft", mapping) == 0
+    assert run_wetwell("convert", export, "--draft", mapping) == 0
     assert "level_m: 'Wet well level [cm]' by 'level' in cm: in the header" in capsys.readouterr().out
-    assert run(monkeypatch, "convert", export, "--mapping", mapping, "--out", out, "--json") == 0
+    assert run_wetwell("convert", export, "--mapping", mapping, "--out", out, "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert told["rows"] == 1
     assert told["unreadable"] == [

@@ -26,7 +26,7 @@ _NO_SIGNAL_OF_ITS_UNIT = ("volume", "volumen", "temp", "efficiency", "current", 
 """Words of other quantities, which count unless the unit is that of a signal."""
 
 _NO_LETTERS = frozenset(["sp", "ha", "hh", "ll", "it", "ie", "ct", "tt", "yt", "zt", "kwh"])
-_WORDS = {
+_QUANTITY_WORDS = {
     "inflow_m3h": (
         "inflow",
         "influent",
@@ -70,7 +70,7 @@ _WORDS = {
 }
 """Words of each quantity; the first quantity of which a word is met counts, so that an inflow is no flow."""
 
-_LETTERS = {
+_QUANTITY_LETTERS = {
     "level_m": "lt lit lic li niv lvl",
     "flow_m3h": "ft fit fic fi q",
     "head_m": "pt pit pic",
@@ -134,11 +134,11 @@ def recognise(tag: str, unit: UnitGuess | None) -> TagGuess | None:
 
 
 def _quantity(text: str, tokens: set[str]) -> tuple[str, str]:
-    for quantity, words in _WORDS.items():
+    for quantity, words in _QUANTITY_WORDS.items():
         word = next((word for word in words if word in text), None)
         if word is not None:
             return quantity, f"'{word}'"
-    for quantity, letters in _LETTERS.items():
+    for quantity, letters in _QUANTITY_LETTERS.items():
         met = sorted(tokens & set(letters.split()))
         if met:
             return quantity, f"'{met[0].upper()}'"
