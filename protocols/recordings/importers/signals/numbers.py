@@ -63,6 +63,10 @@ def read_cells(column: pa.Array, decimal: str) -> Cells:
         no_words = np.zeros(len(column), dtype=bool)
         return Cells(numbers=typed, is_empty=np.isnan(typed), is_word=no_words, column=column)
     texts = pc.fill_null(texts_of(column), "")
+    quick = _all_numbers(texts, decimal)
+    if quick is not None:
+        none = np.zeros(len(column), dtype=bool)
+        return Cells(numbers=quick, is_empty=none, is_word=none, column=texts)
     pattern = rf"^[+-]?(\d+{re.escape(decimal)}?\d*|{re.escape(decimal)}\d+)([eE][+-]?\d+)?$"
     is_plain = pc.match_substring_regex(texts, pattern)
     plain = pc.if_else(is_plain, texts, "nan")
@@ -78,6 +82,19 @@ def read_cells(column: pa.Array, decimal: str) -> Cells:
         is_empty[others] = np.array([word.lower() in EMPTY for word in words])[places]
         is_word[others] = np.isnan(numbers[others]) & ~is_empty[others]
     return Cells(numbers=numbers, is_empty=is_empty, is_word=is_word, column=texts)
+
+
+def _all_numbers(texts: pa.Array, decimal: str) -> Floats | None:
+    """Numbers of texts that are numbers throughout, without signs between thousands; None if one is not."""
+    if decimal != ".":
+        if pc.any(pc.match_substring(texts, ".")).as_py():
+            return None
+        texts = pc.replace_substring(texts, decimal, ".")
+    try:
+        numbers: Floats = texts.cast(pa.float64()).to_numpy()
+    except pa.ArrowInvalid:
+        return None
+    return None if np.isnan(numbers).any() else numbers
 
 
 def _number(text: str, decimal: str) -> float:
