@@ -35,6 +35,7 @@ from wetwell.protocols.quantities import (
     pump_of,
     pumps_of,
 )
+from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
 from wetwell.protocols.timestamps import from_iso, to_iso_array
 
 TRUTH_PREFIX = "truth_"
@@ -55,12 +56,18 @@ class Recording:
         Columns that start with `truth_`: numbers or texts. No diagnosis may read them.
     ignored : tuple of str
         Columns of the file that are none of these.
+    station : str, optional
+        Name of the station, where it is known.
+    value : "instant", "mean" or "held"
+        What a stored value stands for.
     """
 
     time_ns: Integers
     columns: Mapping[str, Floats]
     truth: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
     ignored: tuple[str, ...] = ()
+    station: str | None = None
+    value: StoredValue = "instant"
 
     def __len__(self) -> int:
         return len(self.time_ns)
@@ -130,7 +137,7 @@ def read_recording(path: Path) -> Recording:
         If the file cannot be read, its ending is not one of `SUFFIXES`, a needed column is missing or a value is
         not of its column's kind; one line with file, column and rule.
     """
-    table = _read_table(path)
+    table, origin = _read_table(path)
     if "time" not in table.column_names:
         raise RecordingError(f"{path}: column 'time' is missing")
     columns: dict[str, Floats] = {}
@@ -145,7 +152,14 @@ def read_recording(path: Path) -> Recording:
             truth[name] = table[name].to_numpy()
         else:
             ignored.append(name)
-    recording = Recording(time_ns=_stamps(table["time"], path), columns=columns, truth=truth, ignored=tuple(ignored))
+    recording = Recording(
+        time_ns=_stamps(table["time"], path),
+        columns=columns,
+        truth=truth,
+        ignored=tuple(ignored),
+        station=origin.station,
+        value=origin.value,
+    )
     if recording.pumps == 0:
         raise RecordingError(f"{path}: no pump column such as 'pump1_flow_m3h' found")
     return recording
@@ -158,42 +172,49 @@ def _suffix(path: Path) -> str:
     raise RecordingError(f"{path}: a recording ends in one of {', '.join(SUFFIXES)}")
 
 
-def _read_table(path: Path) -> pa.Table:
+def _read_table(path: Path) -> tuple[pa.Table, Origin]:
     suffix = _suffix(path)
     header: list[str] = []
+    mark = ""
     try:
         if suffix == ".parquet":
-            return pa.parquet.read_table(path)
-        header = _csv_header(path)
+            table = pa.parquet.read_table(path)
+            return table, Origin.of_metadata(table.schema.metadata or {})
+        mark, header = _csv_header(path)
         types = {name: pa.float64() for name in header if name in STATION_QUANTITIES or pump_of(name)}
-        return pa.csv.read_csv(
+        table = pa.csv.read_csv(
             path,
-            read_options=pa.csv.ReadOptions(use_threads=False),
+            read_options=pa.csv.ReadOptions(use_threads=False, skip_rows=int(bool(mark))),
             convert_options=pa.csv.ConvertOptions(
                 column_types=types | {"time": pa.string()}, strings_can_be_null=False
             ),
         )
+        return table, Origin.of_mark(mark)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error) as error:
-        raise RecordingError(f"{path}: {_csv_fault(str(error), header)}") from error
+    except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error, ValueError) as error:
+        raise RecordingError(f"{path}: {_csv_fault(str(error), header, 2 if mark else 1)}") from error
 
 
-def _csv_fault(message: str, header: list[str]) -> str:
+def _csv_fault(message: str, header: list[str], header_rows: int) -> str:
     """First line of an Arrow message, with the column's name for its number and rows counted from 1 as elsewhere."""
     line = next(iter(message.splitlines()), "not a recording")
     line = re.sub(r"In CSV column #(\d+): ", lambda match: f"column '{header[int(match[1])]}', ", line)
-    return re.sub(r"Row #(\d+)", lambda match: f"row {int(match[1]) - 1}", line)
+    return re.sub(r"Row #(\d+)", lambda match: f"row {int(match[1]) - header_rows}", line)
 
 
-def _csv_header(path: Path) -> list[str]:
+def _csv_header(path: Path) -> tuple[str, list[str]]:
+    """Line that says where the recording comes from, empty if there is none, and the names of the columns."""
     opener = gzip.open if path.name.endswith(".gz") else open
     with opener(path, "rt", encoding="utf-8") as file:
-        header = [name.strip('"') for name in str(file.readline()).rstrip("\r\n").split(",")]
+        mark, line = "", str(file.readline())
+        if line.startswith(MARK):
+            mark, line = line, str(file.readline())
+    header = [name.strip('"') for name in line.rstrip("\r\n").split(",")]
     repeated = sorted({name for name in header if header.count(name) > 1})
     if repeated:
         raise RecordingError(f"{path}: column '{repeated[0]}' stands twice")
-    return header
+    return mark, header
 
 
 def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
@@ -267,7 +288,9 @@ def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
 def _table(recording: Recording, suffix: str) -> pa.Table:
     time: Any = recording.time_ns
     time = pa.array(time, pa.timestamp("ns", tz="UTC")) if suffix == ".parquet" else to_iso_array(time)
-    return pa.table({"time": time, **recording.columns, **recording.truth})
+    origin = Origin(station=recording.station, value=recording.value)
+    table = pa.table({"time": time, **recording.columns, **recording.truth})
+    return table.replace_schema_metadata(origin.metadata)
 
 
 def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitStack) -> Callable[[pa.Table], None]:
@@ -284,6 +307,7 @@ def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitSt
             parquet.write_table(table)
         else:
             if not is_begun:
+                file.write(Origin.of_metadata(table.schema.metadata or {}).mark.encode())
                 file.write(",".join(table.column_names).encode() + b"\n")
             pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))
         is_begun = True

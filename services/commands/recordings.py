@@ -84,18 +84,44 @@ def dataset(
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(help="File in a foreign form.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
-    form: Annotated[Literal["skab"], typer.Option("--from", help="Form of the file.")] = "skab",
+    sources: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Export, of one file or of several.")],
+    mapping: Annotated[
+        Path | None, typer.Option("--mapping", metavar="FILE", help="TOML file: which tag is which signal.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")] = None,
+    draft: Annotated[
+        Path | None,
+        typer.Option("--draft", metavar="FILE", help="Look at the export and write a mapping."),
+    ] = None,
+    station: Annotated[
+        str | None,
+        typer.Option("--station", metavar="FILE", help="Station file, for drives in % of their nominal frequency."),
+    ] = None,
+    form: Annotated[Literal["skab"], typer.Option("--from", help="Form of a file without mapping.")] = "skab",
     as_json: JsonOption = False,
 ) -> None:
-    """Turn a file of another origin into a recording."""
+    """Turn an export of another system into a recording."""
     from wetwell.protocols.recordings.importers import IMPORTERS
     from wetwell.protocols.recordings.recording import write_recording
+    from wetwell.services.batch.conversion import convert_files, draft_mapping
 
-    recording = IMPORTERS[form](source)
+    if (out is None) == (draft is None) or (draft is not None and mapping is not None):
+        raise ConfigError("convert: give --mapping FILE and --out FILE, or --draft FILE")
+    if draft is not None:
+        return print_result(draft_mapping(sources, draft), as_json=as_json)
+    out = cast("Path", out)
+    if mapping is not None:
+        plant = None
+        if station is not None:
+            from wetwell.services.stations import find_station  # brings the compiled simulator, which takes seconds
+
+            plant = find_station(station)
+        return print_result(convert_files(sources, mapping, out, plant), as_json=as_json)
+    if len(sources) > 1:
+        raise ConfigError(f"convert: got {len(sources)} files, without --mapping it takes one")
+    recording = IMPORTERS[form](sources[0])
     write_recording(recording, out)
-    print_result(
+    return print_result(
         {"recording": str(out), "rows": len(recording), "columns": sorted(recording.columns)}, as_json=as_json
     )
 

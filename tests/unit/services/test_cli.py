@@ -39,6 +39,29 @@ STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-
         (["detect", "--recording", "{tmp}/no.csv", "--out", "{tmp}/v"], "{tmp}/no.csv: cannot be read: No such file"),
         (["detect", "--recording", "{bad}", "--out", "{tmp}/v"], "{bad}: column 'pump1_flow_m3h', row 2: CSV conv"),
         (["convert", "{bad}", "--out", "{tmp}/v.csv"], "{bad}: column 'datetime' is missing, is this a SKAB file?"),
+        (["convert", "{bad}"], "convert: give --mapping FILE and --out FILE, or --draft FILE"),
+        (
+            ["convert", "{bad}", "{bad}", "--out", "{tmp}/v.csv"],
+            "convert: got 2 files, without --mapping it takes one",
+        ),
+        (["convert", "{bad}", "--draft", "{settings}"], "--draft: {settings} is there already, give another name"),
+        (
+            ["convert", "{bad}", "--mapping", "{settings}", "--out", "{tmp}/v.csv"],
+            "{settings}: modbus: unknown key",
+        ),
+        (
+            ["convert", "{bad}", "--mapping", "{mapping}", "--out", "{tmp}/v.csv"],
+            "{mapping}: time_zone: missing, the stamp of {bad}, line 2, has no offset",
+        ),
+        (
+            ["convert", "{bad}", "--mapping", "{mapping}", "--out", "{tmp}/v.csv", "--station", "alpha"],
+            "{mapping}: station: got 'north', the station file is of 'alpha'",
+        ),
+        (
+            ["convert", "{bad}", "--mapping", "{pumps}", "--out", "{tmp}/v.csv", "--station", "alpha"],
+            "{pumps}: signal: got pump 4, station 'alpha' has 3",
+        ),
+        (["convert", "{tmp}/no.csv", "--draft", "{tmp}/m.toml"], "{tmp}/no.csv: cannot be read: No such file"),
         (["up", "--for", "soon"], "--for: got 'soon', must be a time such as 90s, 10m or 2h"),
         (["up", "--modbus", "here"], "--modbus: got 'here', must be HOST:PORT such as 127.0.0.1:5020"),
         (["up", "--page", "here"], "--page: got 'here', must be HOST:PORT such as 127.0.0.1:8080"),
@@ -70,6 +93,9 @@ def test_an_error_is_one_line(
         "scenario": 'name = "wrong"\n[[fault]]\nkind = "blockage"\npump = 9\nstart_s = 1\nend_s = 2\n',
         "bad": "time,pump1_flow_m3h\n2025-01-01,1\n2025-01-01,abc\n",
         "settings": "[modbus]\nprot = 1\n",
+        "mapping": 'station = "north"\nlayout = "wide"\ncolumns.time = "time"\n'
+        'signal.pump1_flow_m3h.tag = "pump1_flow_m3h"\n',
+        "pumps": 'station = "alpha"\nlayout = "wide"\ncolumns.time = "time"\nsignal.pump4_flow_m3h.tag = "x"\n',
     }
     paths = {name: tmp_path / f"{name}.{'csv' if name == 'bad' else 'toml'}" for name in files}
     for name, text in files.items():
@@ -238,3 +264,22 @@ def test_a_file_of_plcs_is_checked_and_a_plc_that_is_away_is_told(
     ):
         assert run_wetwell(*arguments) == 2
         assert capsys.readouterr().err.startswith(said)
+
+
+def test_an_export_is_drafted_and_converted(
+    run_wetwell: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export, mapping, out = (tmp_path / name for name in ("export.csv", "mapping.toml", "north.csv"))
+    rows = "2024-11-15T12:00:00Z;120;10;dry\n" * 9
+    export.write_text(f"Time;Wet well level [cm];P1 flow [l/s];Weather\n{rows}?;1;2;-\n")
+    assert run_wetwell("convert", export, "--draft", mapping) == 0
+    assert "level_m: 'Wet well level [cm]' by 'level' in cm: in the header" in capsys.readouterr().out
+    assert run_wetwell("convert", export, "--mapping", mapping, "--out", out, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["rows"] == 1
+    assert told["unreadable"] == [
+        {"rows": 1, "why": "time is not %Y-%m-%d %H:%M:%S", "first": f"{export}, line 11: '?'"},
+    ]
+    assert told["unmapped"] == [{"tag": "Weather"}]
+    assert told["stamps_that_came_again"] == 8
+    assert out.read_text().splitlines()[0] == "# wetwell station=export"

@@ -1,0 +1,1 @@
+"""Files of an export as columns: text in any encoding, Excel, Parquet."""
