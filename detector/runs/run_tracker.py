@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -82,7 +81,7 @@ class RunTracker:
     def newly_blind_runs(self) -> list[Run]:
         """Open runs that have lacked a needed signal since their start, `BLIND_S` ago; each is given once."""
         blind = np.flatnonzero(self.state.pumps["is_blind"]).tolist()
-        return [self._handed_over(self._open_run(pump)) for pump in blind]
+        return [self._handed_over(pump) for pump in blind]
 
     def gathered_pumps(self) -> list[int]:
         """Pumps that lack signals, and have just filled a segment of what is left."""
@@ -93,7 +92,7 @@ class RunTracker:
         """Pumps that have just filled a segment."""
         pumps = self.state.pumps
         is_full = (pumps["is_steady"] != 0) & (pumps["samples"] % self._segment_samples == 0)
-        full: list[int] = np.flatnonzero(is_full).tolist()
+        full: list[int] = is_full.nonzero()[0].tolist()
         return full
 
     def last_segments(self, pump: int, segments: int) -> Run:
@@ -151,18 +150,19 @@ class RunTracker:
 
     def _take_ended(self, time_ns: int) -> list[Run]:
         pumps = self.state.pumps
-        ended = [self._handed_over(self._finished(pump)) for pump in np.flatnonzero(pumps["is_ending"]).tolist()]
+        ended = [self._finished(pump) for pump in np.flatnonzero(pumps["is_ending"]).tolist()]
         drop_ended(pumps, self.state.steady_samples, time_ns)
         needed = LEAST_ROOM * (1 + count_steady(pumps) // LEAST_ROOM)
         if needed < len(self.state.steady_samples):
             self.state = self.state._replace(steady_samples=self.state.steady_samples[:needed].copy())
         return ended
 
-    def _handed_over(self, run: Run) -> Run:
-        """The run with the drawdown, which is told once, as are the readings that were stuck."""
-        own = self.state.pumps[run.pump]
-        log_ratio, own["log_ratio"], own["stuck"] = float(own["log_ratio"]), math.nan, 0
-        return replace(run, log_ratio=log_ratio)
+    def _handed_over(self, pump: int) -> Run:
+        """The open run with its drawdown, which is told once, as are the readings that were stuck."""
+        own = self.state.pumps[pump]
+        run = self._open_run(pump, log_ratio=float(own["log_ratio"]))
+        own["log_ratio"], own["stuck"] = math.nan, 0
+        return run
 
     def _finished(self, pump: int) -> Run:
         """The whole open run; its period says how many samples a segment has from now on."""
@@ -171,9 +171,9 @@ class RunTracker:
             period_s = float(median(np.diff(time_s)))
             samples = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
             self.state.sampling_period["segment_samples"] = samples
-        return self._open_run(pump)
+        return self._handed_over(pump)
 
-    def _open_run(self, pump: int, first: int = 0) -> Run:
+    def _open_run(self, pump: int, first: int = 0, *, log_ratio: float = math.nan) -> Run:
         """The open run from a steady sample on; where that is not the first, its window begins there."""
         own, steady = self.state.pumps[pump], self._steady_of(pump)[first:]
         part_ns, seen, time_s = int(own["part_ns"]), int(own["seen"]), steady["time_s"]
@@ -190,6 +190,7 @@ class RunTracker:
             segments=self._segments(pump, steady),
             missing=frozenset(name for bit, name in enumerate(SIGNALS) if not seen >> bit & 1),
             stuck=stuck_names(pump, int(own["stuck"])),
+            log_ratio=log_ratio,
             run_s=float(own["run_s"]),
             seen_s=float(self.state.gate["seen_s"][0]),
             running=int(self.state.missing_signals["running"][pump]),
@@ -197,7 +198,7 @@ class RunTracker:
 
     def _steady_of(self, pump: int) -> Records:
         steady = self.state.steady_samples[: count_steady(self.state.pumps)]
-        own: Records = steady[steady["pump"] == pump]
+        own: Records = steady.compress(steady["pump"] == pump)  # a third of the time of indexing with a mask
         return own
 
     def _segments(self, pump: int, steady: Records) -> Segments:

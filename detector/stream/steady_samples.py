@@ -35,7 +35,7 @@ STEADY_SAMPLE = np.dtype(
 """Time since the start of the part of the run; `duty_m3h` as Q/N and `duty_total_m3h` are by the datasheet."""
 SEGMENT_MEANS = ("flow_m3h", "total_m3h", "duty_m3h", "duty_total_m3h", "level_m", "speed_ratio")
 """What the mean of a segment is known of, beside both residuals; named as in `Segments`."""
-SEGMENT_SUM = np.dtype([(name, np.float64) for name in ("pump_m", "system_m", *SEGMENT_MEANS)])
+SEGMENT_SUM = np.dtype([("residual_m", np.float64, (2,)), *((name, np.float64) for name in SEGMENT_MEANS)])
 
 
 def new_steady_samples(room: int = LEAST_ROOM) -> Records:
@@ -55,8 +55,8 @@ def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Any) -> Non
                 *(own["c0"], own["c1"], own["c2"], own["static_head_m"], own["friction_h2_m5"]),
             )
             is_closed = steady["total_m3h"] < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
-            total["pump_m"] += pump_m
-            total["system_m"] += 0.0 if is_closed else system_m
+            total["residual_m"][0] += pump_m
+            total["residual_m"][1] += 0.0 if is_closed else system_m
             total["flow_m3h"] += steady["flow_m3h"] / steady["speed_ratio"]
             total["total_m3h"] += steady["total_m3h"]
             total["duty_m3h"] += steady["duty_m3h"]
@@ -69,5 +69,4 @@ def segment_averages(own: Any, steady_samples: Any, samples: int) -> tuple[Float
     """(m, 2) mean residuals of the segments of so many samples, and their other means by name; a rest is left out."""
     sums = np.zeros(len(steady_samples) // samples, dtype=SEGMENT_SUM)
     _sum_segments(own, steady_samples, samples, sums)
-    residual_m = np.column_stack((sums["pump_m"], sums["system_m"])) / samples
-    return residual_m, {name: sums[name] / samples for name in SEGMENT_MEANS}
+    return sums["residual_m"] / samples, {name: sums[name] / samples for name in SEGMENT_MEANS}
