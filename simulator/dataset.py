@@ -14,7 +14,9 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from wetwell.protocols.quantities import STATION_QUANTITIES
-from wetwell.protocols.station.station_file import Control, EffectTable, Pump, Station
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.pump import Pump
+from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.simulator.duty import check_operable
 from wetwell.simulator.effects import effective_parameters

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from wetwell.protocols.station.curve_fit import fit_error_m
-from wetwell.protocols.station.station_file import Pump, Station
+from wetwell.protocols.station.pump import Pump
+from wetwell.protocols.station.station_file import Station
 from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
 from wetwell.simulator.parameters import PlantParameters, plant_parameters
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_ANALOGUES, pump_column
 from wetwell.protocols.recordings.recording import Recording
-from wetwell.protocols.station.station_file import Station, check_levels
+from wetwell.protocols.station.control import check_levels
+from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import Fault

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from wetwell.protocols.station.station_file import Control, EffectTable, Station, Sump
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.station_file import EffectTable, Station
+from wetwell.protocols.station.sump import Sump
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, pump_head_m

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from wetwell.protocols.station.station_file import RisingMain
+from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.simulator.duty import duty_table
 from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, individual_flows, pump_head_m
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw

@@ -8,8 +8,10 @@ import pytest
 from pydantic import ValidationError
 
 from wetwell.protocols.errors import ConfigError, first_fault
+from wetwell.protocols.station.control import check_levels
 from wetwell.protocols.station.curve_fit import fit_error_m, fit_pump_curve
-from wetwell.protocols.station.station_file import Pump, Station, check_levels, load_station, load_toml
+from wetwell.protocols.station.pump import Pump
+from wetwell.protocols.station.station_file import Station, load_station, load_toml
 
 FULL = """\
 name = "alpha"
