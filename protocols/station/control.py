@@ -1,11 +1,15 @@
 """How a station starts and stops its pumps."""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from wetwell.protocols.station.table import Finite, NonNegative, Positive, Table
+
+DEFAULT_START_LEVELS_M = (1.6, 1.8, 2.0)
+DEFAULT_STOP_LEVELS_M = (0.5, 0.8, 1.0)
+"""The paper's. [m]"""
 
 
 def check_levels(start_levels_m: tuple[float, ...], stop_levels_m: tuple[float, ...]) -> None:
@@ -33,13 +37,14 @@ def check_levels(start_levels_m: tuple[float, ...], stop_levels_m: tuple[float, 
 class Control(Table):
     """Start and stop by level, with ramps. Fewer levels than pumps: the others stand by in rotation.
 
-    Mode "pid" starts and stops by the same levels, and holds `setpoint_m` by the speed of the running pumps.
+    Mode "pid" starts and stops by the same levels, and holds `setpoint_m` by the speed of the running pumps. Mode
+    "external" has no levels: an optimiser or an operator starts and stops the pumps, and nobody knows why.
     `max_starts_per_hour` is for each pump, 0 sets no limit; `out_of_service` counts pumps from 1.
     """
 
-    mode: Literal["on_off", "pid"] = "on_off"
-    start_levels_m: Annotated[tuple[Finite, ...], Field(min_length=1)] = (1.6, 1.8, 2.0)
-    stop_levels_m: Annotated[tuple[Finite, ...], Field(min_length=1)] = (0.5, 0.8, 1.0)
+    mode: Literal["on_off", "pid", "external"] = "on_off"
+    start_levels_m: tuple[Finite, ...] = DEFAULT_START_LEVELS_M
+    stop_levels_m: tuple[Finite, ...] = DEFAULT_STOP_LEVELS_M
     ramp_s: Positive = 10.0
     min_frequency_hz: NonNegative = 0.0
     dwell_s: NonNegative = 0.0
@@ -51,7 +56,27 @@ class Control(Table):
     integral_s: Positive = 120.0
     derivative_s: NonNegative = 0.0
 
+    @model_validator(mode="before")
+    @classmethod
+    def _leave_out_levels(cls, data: Any) -> Any:
+        """Of an external control take no level."""
+        if not isinstance(data, dict) or data.get("mode") != "external":
+            return data
+        given = [key for key in ("start_levels_m", "stop_levels_m") if data.get(key)]
+        if given:
+            raise ValueError(f"{given[0]}: mode 'external' has no levels")
+        return {**data, "start_levels_m": (), "stop_levels_m": ()}
+
     @model_validator(mode="after")
     def _check_levels(self) -> Self:
+        if self.is_external:
+            return self
+        if not self.start_levels_m:
+            raise ValueError("start_levels_m: at least one level is needed")
         check_levels(self.start_levels_m, self.stop_levels_m)
         return self
+
+    @property
+    def is_external(self) -> bool:
+        """Whether nobody knows why pumps start and stop."""
+        return self.mode == "external"

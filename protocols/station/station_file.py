@@ -1,13 +1,14 @@
 """Station file: what the owner of a pump station knows of it, in TOML, checked to the last key."""
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.control import DEFAULT_START_LEVELS_M, DEFAULT_STOP_LEVELS_M, Control
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.sump import Sump
@@ -55,12 +56,16 @@ class EffectTable(BaseModel):
 
 
 class Station(Table):
-    """A pump station. Pumps are in rotation order."""
+    """A pump station. Pumps are in rotation order.
+
+    A file has one `[rising_main]` or several `[[main]]`; code asks for `mains`, and for the main of each pump.
+    """
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]
     sump: Sump
     pump: Annotated[tuple[Pump, ...], Field(min_length=1, max_length=32)]
-    rising_main: RisingMain = RisingMain()
+    rising_main: RisingMain | None = None
+    main: Annotated[tuple[RisingMain, ...], Field(min_length=1)] | None = None
     control: Control = Control()
     electrical: Electrical = Electrical()
     sensors: Sensors = Sensors()
@@ -68,16 +73,23 @@ class Station(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _fit_default_levels(cls, data: Any) -> Any:
-        """Without levels in the file, take as many of the default ones as there are pumps."""
-        if not isinstance(data, dict) or not isinstance(data.get("pump"), list | tuple):
+    def _fill_defaults(cls, data: Any) -> Any:
+        """Without a main in the file take the default one; without levels, as many of them as there are pumps."""
+        if not isinstance(data, dict):
             return data
+        if data.get("rising_main") is data.get("main") is None:
+            data = {**data, "rising_main": RisingMain()}
         control = data.get("control", {})
-        if not isinstance(control, dict):
+        if not isinstance(data.get("pump"), list | tuple) or not isinstance(control, dict):
+            return data
+        if control.get("mode") == "external":
             return data
         defaults = {
-            key: Control.model_fields[key].default[: len(data["pump"])]
-            for key in ("start_levels_m", "stop_levels_m")
+            key: levels_m[: len(data["pump"])]
+            for key, levels_m in (
+                ("start_levels_m", DEFAULT_START_LEVELS_M),
+                ("stop_levels_m", DEFAULT_STOP_LEVELS_M),
+            )
             if key not in control
         }
         if len(defaults) == 1 and len(data["pump"]) > 0:
@@ -94,18 +106,104 @@ class Station(Table):
         absent = [number for number in self.control.out_of_service if number > pumps]
         if absent:
             raise ValueError(f"control.out_of_service: got {absent[0]}, there are {pumps} pumps")
+        check_names(self.pump_names, "pump")
+        self._check_mains()
         for number, pump in enumerate(self.pump, start=1):
-            if pump.coefficients[0] <= self.rising_main.static_head_m:
-                raise ValueError(
-                    f"pump[{number}]: shut-off head {pump.coefficients[0]:g} m must exceed "
-                    f"rising_main.static_head_m = {self.rising_main.static_head_m:g} m, or no water flows"
-                )
-            if self.control.min_frequency_hz >= pump.nominal_frequency_hz:
-                raise ValueError(
-                    f"control.min_frequency_hz: got {self.control.min_frequency_hz:g}, must lie under "
-                    f"pump[{number}].nominal_frequency_hz = {pump.nominal_frequency_hz:g}"
-                )
+            self._check_pump(number, pump)
         return self
+
+    def _check_mains(self) -> None:
+        if self.rising_main is not None and self.main is not None:
+            raise ValueError("main: give either [rising_main] or [[main]]")
+        names = [main.name for main in self.main or ()]
+        if None in names:
+            raise ValueError(f"main[{names.index(None) + 1}].name: missing")
+        check_names(names, "main")
+        known = [main.name for main in self.mains if main.name is not None]
+        told = f"there are {', '.join(map(repr, known))}" if known else "no main has a name"
+        for number, pump in enumerate(self.pump, start=1):
+            if pump.main is None and len(self.mains) > 1:
+                raise ValueError(f"pump[{number}].main: missing, {told}")
+            if pump.main is not None and pump.main not in known:
+                raise ValueError(f"pump[{number}].main: got {pump.main!r}, {told}")
+        idle = sorted(set(range(len(self.mains))) - set(self.main_of_pump))
+        if idle:
+            raise ValueError(f"main[{idle[0] + 1}]: no pump has main = {names[idle[0]]!r}")
+
+    def _check_pump(self, number: int, pump: Pump) -> None:
+        main = self.mains[self.main_of_pump[number - 1]]
+        place = "rising_main" if self.main is None else f"main[{self.main_of_pump[number - 1] + 1}]"
+        if pump.coefficients[0] <= main.static_head_at_m(self.middle_level_m):
+            lift = (
+                f"{place}.static_head_m = {main.lift_at_zero_m:g} m"
+                if main.delivery_level_m is None
+                else f"{place}.delivery_level_m = {main.delivery_level_m:g} less a level of {self.middle_level_m:g} m"
+            )
+            raise ValueError(
+                f"pump[{number}]: shut-off head {pump.coefficients[0]:g} m must exceed {lift}, or no water flows"
+            )
+        if self.control.min_frequency_hz >= pump.nominal_frequency_hz:
+            raise ValueError(
+                f"control.min_frequency_hz: got {self.control.min_frequency_hz:g}, must lie under "
+                f"pump[{number}].nominal_frequency_hz = {pump.nominal_frequency_hz:g}"
+            )
+        key = "power_points" if pump.power_points is not None else "efficiency_points"
+        if getattr(pump, key) is not None and self.electrical.power_model != "load":
+            raise ValueError(f"pump[{number}].{key}: electrical.power_model must be 'load', or they mean nothing")
+
+    @property
+    def mains(self) -> tuple[RisingMain, ...]:
+        """Rising mains, at least one."""
+        return self.main or (self.rising_main or RisingMain(),)
+
+    @property
+    def main_of_pump(self) -> tuple[int, ...]:
+        """Place of each pump's main in `mains`, from 0."""
+        places = {main.name: place for place, main in enumerate(self.mains)}
+        return tuple(places.get(pump.main, 0) for pump in self.pump)
+
+    @property
+    def pump_names(self) -> tuple[str, ...]:
+        """What people call the pumps; a number where the file has no name."""
+        return tuple(pump.name or str(number) for number, pump in enumerate(self.pump, start=1))
+
+    @property
+    def middle_level_m(self) -> float:
+        """Level at which rated duties are told: between first stop and start level, or that of the sump. [m]."""
+        if self.control.is_external:
+            return self.sump.middle_level_m
+        return 0.5 * (self.control.start_levels_m[0] + self.control.stop_levels_m[0])
+
+    def with_mains(self, mains: Sequence[RisingMain]) -> Self:
+        """The same station with other values of its mains, as many as before; checked.
+
+        Raises
+        ------
+        ValueError
+            If a rule is broken; also pydantic's.
+        """
+        table = {"rising_main": mains[0]} if self.main is None else {"main": tuple(mains)}
+        return type(self).model_validate(self.model_dump(exclude_none=True) | table)
+
+
+def check_names(names: Sequence[str | None], what: str) -> None:
+    """Refuse two equal names.
+
+    Raises
+    ------
+    ValueError
+        Names both places.
+
+    Examples
+    --------
+    >>> check_names(["1", "1"], "pump")
+    Traceback (most recent call last):
+    ...
+    ValueError: pump[2].name: '1' is that of pump[1] already
+    """
+    for number, name in enumerate(names, start=1):
+        if (first := names.index(name) + 1) < number:
+            raise ValueError(f"{what}[{number}].name: {name!r} is that of {what}[{first}] already")
 
 
 def load_toml(path: Path) -> dict[str, Any]:
