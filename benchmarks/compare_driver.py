@@ -30,8 +30,8 @@ PACKAGES = ("protocols", "simulator", "detector", "sim2real", "services")
 STEP_S = 1500
 """Most time of a step."""
 WARM = (
-    ("simulate", "--days", ".02", "--out", "warm.csv"),
-    ("detect", "--recording", "warm.csv", "--out", "warm.jsonl"),
+    ("simulate", "--station", "alpha", "--days", ".02", "--out", "warm.csv"),
+    ("detect", "--station", "alpha", "--recording", "warm.csv", "--out", "warm.jsonl"),
 )
 """Commands that load what is compiled before the first step."""
 

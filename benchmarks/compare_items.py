@@ -203,23 +203,23 @@ BAD_COMMANDS = (
     (),
     ("fly",),
     ("simulate",),
-    ("simulate", "--out", "a.csv", "--days", "-1"),
-    ("simulate", "--out", "a.csv", "--seed", "x"),
-    ("simulate", "--out", "no/such/folder/a.csv", "--days", ".01"),
+    ("simulate", "--station", "alpha", "--out", "a.csv", "--days", "-1"),
+    ("simulate", "--station", "alpha", "--out", "a.csv", "--seed", "x"),
+    ("simulate", "--station", "alpha", "--out", "no/such/folder/a.csv", "--days", ".01"),
     ("simulate", "--out", "a.csv", "--station", "gamma"),
-    ("detect", "--recording", "none.csv", "--out", "a.jsonl"),
+    ("detect", "--station", "alpha", "--recording", "none.csv", "--out", "a.jsonl"),
     ("detect", "--recording", "none.csv", "--out", "a.jsonl", "--station", "none.toml"),
     ("gap", "diagnose", "--out", "a"),
-    ("gap", "diagnose", "--out", "a", "--recording", "none.csv", "--only", "gremlins"),
+    ("gap", "diagnose", "--station", "alpha", "--out", "a", "--recording", "none.csv", "--only", "gremlins"),
     ("gap", "trial", "--out", "a", "--kinds", "gremlins"),
-    ("backtest", "--out", "a", "--detectors", "gremlins", "--scenario", "nominal"),
+    ("backtest", "--station", "alpha", "--out", "a", "--detectors", "gremlins", "--scenario", "nominal"),
     ("backtest", "--out", "a"),
     ("dataset", "--check", "none"),
     ("config", "check", "none.toml"),
     ("config", "show", "--config", "bad.toml"),
     ("gateway", "check", "bad.toml"),
     ("history", "--kind", "gremlins"),
-    ("export", "--out", "a.csv", "--from", "yesterday"),
+    ("export", "--station", "alpha", "--out", "a.csv", "--from", "yesterday"),
     ("convert", "none.csv", "--out", "a.csv"),
 )
 
@@ -364,7 +364,7 @@ def _batches() -> Iterator[Item]:
     swmm = ("--seed", "8", "--cases", "1", "--days", ".2", "--plant", "swmm", "--kinds", "single", "--out", "trial")
     yield Item("trial-swmm", (_command("gap", "trial", *swmm, name="trial", codes=("0", "2")),))
     station = {"station.toml": _station("plant", ("friction_bias",)), "preparation.toml": PREPARATION}
-    source = ("--recording", "recording.parquet")
+    source, plant, alpha = ("--recording", "recording.parquet"), ("--station", "station.toml"), ("--station", "alpha")
     prepared = ("--preparation", "preparation.toml")
     yield Item(
         "field-data",
@@ -373,26 +373,46 @@ def _batches() -> Iterator[Item]:
             _act("derive", "whole.parquet", "recording.parquet", {"is_disordered": True, "gap": [9000, 9900]}),
             _command("prepare", *source, *prepared, "--out", "prepared.csv", "--json"),
             _command("kpi", *source),
-            _command("calibrate", "--recording", "prepared.csv", "--out", "fitted.toml"),
-            _command("calibrate", *source, "--out", "again.toml", "--json", name="calibrate-json"),
-            _command("validate", "--recording", "prepared.csv", "--out", "simulated.csv", "--html", "page.html"),
-            _command("validate", *source, "--station", "fitted.toml", *prepared, "--json", name="validate-json"),
-            _command("gap", "replay", *source, "--out", "replayed.csv", name="replay"),
+            _command("calibrate", *plant, "--recording", "prepared.csv", "--out", "fitted.toml"),
+            _command("calibrate", *plant, *source, "--out", "again.toml", "--json", name="calibrate-json"),
             _command(
-                "gap", "replay", *source, "--out", "closed.parquet", "--closed-loop", "--json", name="replay-closed"
+                "validate", *plant, "--recording", "prepared.csv", "--out", "simulated.csv", "--html", "page.html"
+            ),
+            _command("validate", *source, "--station", "fitted.toml", *prepared, "--json", name="validate-json"),
+            _command("gap", "replay", *plant, *source, "--out", "replayed.csv", name="replay"),
+            _command(
+                "gap",
+                "replay",
+                *plant,
+                *source,
+                "--out",
+                "closed.parquet",
+                "--closed-loop",
+                "--json",
+                name="replay-closed",
             ),
         ),
         station,
         is_recording=True,
     )
-    many = ("--count", "4", "--seed", "3", "--days", ".3", "--workers", "1")
+    many = (*alpha, "--count", "4", "--seed", "3", "--days", ".3", "--workers", "1")
     yield Item(
         "dataset",
         (
             _command("dataset", "--out", "set", *many),
             _command("dataset", "--check", "set", "--json", name="check"),
             _command(
-                "dataset", "--out", "csv", *many[2:], "--count", "2", "--format", "csv.gz", "--json", name="csv"
+                "dataset",
+                "--out",
+                "csv",
+                *alpha,
+                *many[4:],
+                "--count",
+                "2",
+                "--format",
+                "csv.gz",
+                "--json",
+                name="csv",
             ),
             _command("backtest", "--dataset", "set", "--out", "test", "--workers", "1", "--learning-h", "1"),
         ),
@@ -401,9 +421,19 @@ def _batches() -> Iterator[Item]:
     yield Item(
         "backtest",
         (
-            _command("backtest", "--scenario", "demo", "--days", ".75", "--out", "test", *methods),
+            _command("backtest", *alpha, "--scenario", "demo", "--days", ".75", "--out", "test", *methods),
             _command(
-                "backtest", "--scenario", "paper", "--days", "1", "--out", "two", *methods, "--json", name="again"
+                "backtest",
+                *alpha,
+                "--scenario",
+                "paper",
+                "--days",
+                "1",
+                "--out",
+                "two",
+                *methods,
+                "--json",
+                name="again",
             ),
         ),
     )
@@ -411,9 +441,9 @@ def _batches() -> Iterator[Item]:
         "history",
         (
             _simulated("alpha", "paper", 141, 1.2),
-            _command("import", *source, "--data", "history"),
-            _command("export", "--data", "../../old/history/history", "--out", "all.csv"),
-            _command("export", "--data", "history", "--out", "all.parquet", "--json", name="export-json"),
+            _command("import", *alpha, *source, "--data", "history"),
+            _command("export", *alpha, "--data", "../../old/history/history", "--out", "all.csv"),
+            _command("export", *alpha, "--data", "history", "--out", "all.parquet", "--json", name="export-json"),
         ),
     )
     yield Item(
@@ -463,13 +493,14 @@ def _refusals() -> Iterator[Item]:
         steps.append(_command("station", "check", f"{name}.toml", name=f"station-{name}", codes=refused))
     for name, text in BAD_SCENARIOS.items():
         files[f"{name}.toml"] = PLAIN.format(name="x", inflow='kind = "empirical"') + text
-        given = ("--scenario", f"{name}.toml", "--out", "a.csv", "--days", ".01")
+        given = ("--station", "alpha", "--scenario", f"{name}.toml", "--out", "a.csv", "--days", ".01")
         steps.append(_command("simulate", *given, name=f"scenario-{name}", codes=refused))
     for name, text in BAD_RECORDINGS.items():
         files[name] = text
         codes = ("0", "2") if name == "short.csv" else refused
         for command, out in (("detect", "a.jsonl"), ("prepare", "a.csv"), ("calibrate", "a.toml")):
             given = ("--recording", name, "--out", out)
+            given += () if command == "prepare" else ("--station", "alpha")
             steps.append(_command(command, *given, name=f"{command}-{name}", codes=codes))
         steps.append(_command("kpi", "--recording", name, name=f"kpi-{name}", codes=codes))
     yield Item("refusals", tuple(steps), files)

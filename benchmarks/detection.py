@@ -20,7 +20,7 @@ import numpy as np
 
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
-from wetwell.protocols.timestamps import LEARNING_S
+from wetwell.protocols.timestamps import LEARNING_S, NS_PER_S
 from wetwell.services.batch.backtest import SimulatedRecording, detector_names, run_backtest
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.faults import Fault
@@ -31,6 +31,20 @@ from wetwell.simulator.inflow.surges import Surges
 from wetwell.simulator.scenario import Scenario
 
 DAY_S = 86_400
+GAPS_PER_DAY = 4
+LONGEST_GAP_S = 2400
+STEPS = {
+    "m": 0.01,
+    "m3h": 0.5,
+    "frequency_hz": 0.1,
+    "flow_m3h": 0.5,
+    "head_m": 0.05,
+    "power_kw": 0.05,
+    "running": 1.0,
+}
+"""What the readings of a historian are rounded to, by quantity; `level_m` and `inflow_m3h` end in the first two."""
+LONG_RUNS_AREA_M2 = 600.0
+"""Of a wet well in which a pump runs for hours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +81,56 @@ class PolledRecording(SimulatedRecording):
 
 
 @dataclass(frozen=True, slots=True)
+class StoredRecording(PolledRecording):
+    """The same as a historian has it: rounded, with gaps, with stamps that are late and rows out of order."""
+
+    def load(self) -> Recording:
+        """Simulate, thin, round, tear."""
+        recording = PolledRecording.load(self)
+        rng = np.random.default_rng([self.seed, self.period_s])
+        rows, day_rows = len(recording), DAY_S // self.period_s
+        is_kept = np.ones(rows, dtype=bool)
+        for _ in range(max(round(GAPS_PER_DAY * rows / day_rows), 1)):
+            begin = int(rng.integers(rows))
+            is_kept[begin : begin + int(rng.integers(1, LONGEST_GAP_S // self.period_s))] = False
+        late_s = rng.integers(0, max(self.period_s // 4, 2), rows)
+        place = np.arange(rows) + np.where(rng.random(rows) < 0.01, rng.integers(1, 4, rows), 0)
+        order = np.argsort(place + 0.5 * (place > np.arange(rows)), kind="stable")
+        order = order[is_kept[order]]
+        columns = {
+            name: np.round(values / STEPS[name.partition("_")[2]]) * STEPS[name.partition("_")[2]]
+            for name, values in recording.columns.items()
+        }
+        return replace(
+            recording,
+            time_ns=(recording.time_ns + late_s * NS_PER_S)[order],
+            columns={name: values[order] for name, values in columns.items()},
+            truth={name: values[order] for name, values in recording.truth.items()},
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class MeanRecording(PolledRecording):
+    """A station of which means are stored; truth is that of the end of each interval."""
+
+    def load(self) -> Recording:
+        """Simulate, then average."""
+        recording = SimulatedRecording.load(self)
+        rows = len(recording) // self.period_s
+        last = np.arange(1, rows + 1) * self.period_s - 1
+        return replace(
+            recording,
+            time_ns=recording.time_ns[last],
+            columns={
+                name: values[: rows * self.period_s].reshape(rows, -1).mean(axis=1)
+                for name, values in recording.columns.items()
+            },
+            truth={name: values[last] for name, values in recording.truth.items()},
+            value="mean",
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Configuration:
     """Stations and scenarios of one row of the table."""
 
@@ -85,6 +149,12 @@ def configurations() -> dict[str, Configuration]:
         paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=148_000, after="clear"), clogging(0.25)
     )
     later = faults(paper, blockage(90_000, 0.4), *paper.fault[1:])
+    slow = altered(alpha, sump=alpha.sump.model_dump(exclude_none=True) | {"area_m2": LONG_RUNS_AREA_M2})
+    week = faults(
+        paper.model_copy(update={"duration_s": 7 * DAY_S, "name": "paper week"}),
+        Blockage(pump=1, speed_loss=0.1, start_s=3 * DAY_S, end_s=4 * DAY_S, after="clear"),
+        PipeClogging(friction_rise=0.5, start_s=5 * DAY_S, end_s=6 * DAY_S, after="clear"),
+    )
     correlated = with_sensors(alpha, correlation=0.95)
     return {
         "paper": Configuration(alpha, paper),
@@ -109,6 +179,20 @@ def configurations() -> dict[str, Configuration]:
             )
             for period_s in (5, 10, 30, 60)
             for scenario in (paper, nominal)
+        },
+        **{
+            f"{scenario.name}, stored every {period_s} s, rounded, with gaps and late stamps": Configuration(
+                alpha, scenario, partial(StoredRecording, period_s=period_s)
+            )
+            for period_s in (10, 60)
+            for scenario in (paper, nominal)
+        },
+        **{
+            f"{scenario.name}, {kind} of 15 min, long runs": Configuration(
+                slow, scenario, partial(cls, period_s=900), 2 * DAY_S
+            )
+            for kind, cls in (("means", MeanRecording), ("instants", PolledRecording))
+            for scenario in (week, nominal.model_copy(update={"duration_s": 7 * DAY_S, "name": "nominal week"}))
         },
     }
 

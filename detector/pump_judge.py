@@ -9,6 +9,7 @@ import numpy as np
 
 from wetwell.detector.baseline.healthy_reference import HealthyReference
 from wetwell.detector.baseline.learning import Learning, sibling_rejection
+from wetwell.detector.baseline.model import MIN_SEGMENTS
 from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.inference.decision import decide, onset_component
 from wetwell.detector.inference.observation import observe
@@ -27,7 +28,7 @@ from wetwell.detector.runs.run import Run, Segments
 from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, silencing_sensors
 from wetwell.detector.statistics.robust import median
 from wetwell.detector.stream.run_state import NEEDED
-from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE
+from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE, SEGMENT_SAMPLES
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
 from wetwell.detector.verdict.severity import severity
@@ -106,9 +107,10 @@ class PumpJudge:
         rng = _generator(run)
         evidence |= run_evidence(run, self._datasheet, rng)
         if memory.reference is None:
-            memory.state = "learning"
-            evidence["reason"] = memory.learning.reason if memory.learning is not None else ""
-            return self._judgement(run.window_ns, {"learning": 1.0}, evidence)
+            hidden = self._hidden_by_rate(run)
+            memory.state = "unknown" if hidden else "learning"
+            evidence["reason"] = hidden or (memory.learning.reason if memory.learning is not None else "")
+            return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
         return self._compare(run, memory.reference, system, evidence, rng)
 
     def segments_since_change(self, last: Segments) -> int:
@@ -172,7 +174,20 @@ class PumpJudge:
             memory.tell("unknown", run.window_ns, None)
         if lacking:
             evidence |= memory.missing_signals.evidence(run.running)
+        hidden = self._hidden_by_rate(run)
+        if hidden and not lacking:
+            evidence["reason"] = hidden
+            memory.tell("unknown", run.window_ns, None)
         return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
+
+    def _hidden_by_rate(self, run: Run) -> str | None:
+        """Why nothing can be learnt of a pump: a slow feed has shown no run in a day that is long enough."""
+        learning = self.memory.learning
+        is_slow = run.segments.samples < SEGMENT_SAMPLES
+        if not is_slow or learning is None or not learning.is_empty(run.seen_s - self.memory.began_s):
+            return None
+        rows = MIN_SEGMENTS * run.segments.samples
+        return f"no run of the last day had {rows} steady rows, with one in {run.step_s:.0f} s"
 
     def _sensor_fault(self, run: Run, evidence: dict[str, Any]) -> Judgement:
         """Judge a run of which a sensor is wrong without doubt."""

@@ -61,6 +61,22 @@ def from_iso(text: str) -> int:
     return stamp_ns
 
 
+def has_zone(text: str) -> bool:
+    """Whether an ISO 8601 text says its zone.
+
+    Raises
+    ------
+    ValueError
+        If the text is not ISO 8601.
+
+    Examples
+    --------
+    >>> has_zone("2025-01-01T01:00:00+01:00"), has_zone("2025-01-01T00:00:00Z"), has_zone("2025-01-01T00:00:00")
+    (True, True, False)
+    """
+    return text.endswith("Z") or datetime.fromisoformat(text).tzinfo is not None
+
+
 def to_iso_array(stamps_ns: Integers) -> npt.NDArray[np.str_]:
     """ISO 8601 texts of (n,) stamps, all with the same number of decimals."""
     unit: Literal["s", "ms", "ns"] = (

@@ -130,6 +130,7 @@ class Simulation:
             time_ns=stamps_ns,
             columns=_measured(measured, len(self.station.pump)),
             truth=self._truth_columns(true, forcing, time_s) if truth else {},
+            station=self.station.name,
         )
 
     def _truth_columns(self, true: Truth, forcing: Forcing, time_s: Floats) -> dict[str, npt.NDArray[Any]]:

@@ -10,10 +10,13 @@ from wetwell.detector.curves.datasheet import Curve
 from wetwell.detector.curves.sensor_signatures import flow_meter_direction
 from wetwell.detector.runs.run import Segments
 from wetwell.detector.statistics.robust import step_variance
+from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.timestamps import LEARNING_S
 
 DAY_S = 24.0 * 3600.0
+LEAST_SEGMENTS = 24
+"""Segments of a slow feed to learn from: they tell a standard deviation within 15 %."""
 DRIFT_SIGMAS = 5.0
 WANDERING_SHARE = 0.02
 """A flow meter may wander by this standard deviation over a day and still be a healthy one."""
@@ -25,9 +28,10 @@ class Learning:
     """Collects the runs of one pump until they can serve as a baseline.
 
     Only the last `LEARNING_S` in which the station was seen count, whatever its clock was set to (but always
-    `MIN_RUNS`), so that a disturbance passes out of sight when it is over. While the runs disagree, learning goes on
-    and `reason` says why. A flow meter that wanders a little over the day moves both residuals in a direction of its
-    own: then learning takes a whole day, and the wandering becomes part of the scatter.
+    `MIN_RUNS`, and of a slow feed `LEAST_SEGMENTS`), so that a disturbance passes out of sight when it is over. While
+    the runs disagree, learning goes on and `reason` says why. A flow meter that wanders a little over the day moves
+    both residuals in a direction of its own: then learning takes a whole day, and the wandering becomes part of the
+    scatter.
 
     Memory: the segments of a day.
     """
@@ -52,13 +56,20 @@ class Learning:
         if len(segments) < MIN_SEGMENTS:
             return
         self._runs.append((seen_s, segments))
-        while len(self._runs) > MIN_RUNS and seen_s - self._runs[0][0] > DAY_S:
+        while seen_s - self._runs[0][0] > DAY_S and _are_enough([run for _, run in self._runs][1:]):
             self._runs.popleft()
 
     def runs(self, seen_s: float, window_s: float) -> list[Segments]:
-        """The runs of the last so many seconds, at least `MIN_RUNS` if there are."""
-        recent = [run for at_s, run in self._runs if seen_s - at_s <= window_s]
-        return recent if len(recent) >= MIN_RUNS else [run for _, run in list(self._runs)[-MIN_RUNS:]]
+        """The runs of the last so many seconds, or of more where those are too few."""
+        runs = [run for _, run in self._runs]
+        first = sum(seen_s - at_s > window_s for at_s, _ in self._runs)
+        while first and not _are_enough(runs[first:]):
+            first -= 1
+        return runs[first:]
+
+    def is_empty(self, seen_s: float) -> bool:
+        """Whether a day of station time has brought no run that can be used."""
+        return seen_s > DAY_S and not self._runs
 
     def baseline(self, seen_s: float, curve: Curve, friction_h2_m5: float) -> tuple[Baseline, list[Segments]] | None:
         """The baseline and the runs that it comes from, or None while learning has to go on."""
@@ -67,6 +78,9 @@ class Learning:
             return None
         if len(self._runs) < MIN_RUNS:
             self.reason = f"{len(self._runs)} of {MIN_RUNS} usable runs"
+            return None
+        if not _are_enough([run for _, run in self._runs]):
+            self.reason = f"{sum(len(run) for _, run in self._runs)} of {LEAST_SEGMENTS} usable segments"
             return None
         if self._is_wandering:
             return self._over_a_day(seen_s, curve, friction_h2_m5)
@@ -99,6 +113,12 @@ class Learning:
         self.reason = doubt or f"the flow meter wanders by {np.std(gains):.1%}"
         self._is_wandering = doubt is None
         return None
+
+
+def _are_enough(runs: Sequence[Segments]) -> bool:
+    """Whether runs can serve as a baseline by their number, and of a slow feed by that of their segments."""
+    is_slow = bool(runs) and runs[-1].samples < SEGMENT_SAMPLES
+    return len(runs) >= MIN_RUNS and (not is_slow or sum(map(len, runs)) >= LEAST_SEGMENTS)
 
 
 def stationarity_rejection(

@@ -61,6 +61,8 @@ class Run:
         Time that the pump has run in all, and that the station has been seen. [s]
     running : int
         Number of pumps that ran in its last segment without a signal.
+    step_s : float
+        Usual step of the feed; 0 where it is not known. [s]
     """
 
     pump: int
@@ -79,3 +81,4 @@ class Run:
     run_s: float = 0.0
     seen_s: float = 0.0
     running: int = 0
+    step_s: float = 0.0

@@ -16,6 +16,7 @@ from wetwell.detector.stream.block import Block
 from wetwell.detector.stream.loop import Stop, process_samples
 from wetwell.detector.stream.missing_signals import new_missing_signals
 from wetwell.detector.stream.run_state import SIGNALS, count_steady, drop_ended
+from wetwell.detector.stream.sampling_steps import USUAL
 from wetwell.detector.stream.state import new_state
 from wetwell.detector.stream.steady_samples import (
     LEAST_ROOM,
@@ -148,6 +149,10 @@ class RunTracker:
     def _segment_samples(self) -> int:
         return int(self.state.sampling_period["segment_samples"][0])
 
+    @property
+    def _step_s(self) -> float:
+        return float(self.state.sampling_steps[USUAL])
+
     def _take_ended(self, time_ns: int) -> list[Run]:
         pumps = self.state.pumps
         ended = [self._finished(pump) for pump in np.flatnonzero(pumps["is_ending"]).tolist()]
@@ -167,8 +172,8 @@ class RunTracker:
     def _finished(self, pump: int) -> Run:
         """The whole open run; its period says how many samples a segment has from now on."""
         time_s = self._steady_of(pump)["time_s"]
-        if len(time_s) > 1:
-            period_s = float(median(np.diff(time_s)))
+        period_s = float(median(np.diff(time_s))) if len(time_s) > 1 else self._step_s
+        if period_s > 0.0:
             samples = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
             self.state.sampling_period["segment_samples"] = samples
         return self._handed_over(pump)
@@ -194,6 +199,7 @@ class RunTracker:
             run_s=float(own["run_s"]),
             seen_s=float(self.state.gate["seen_s"][0]),
             running=int(self.state.missing_signals["running"][pump]),
+            step_s=self._step_s,
         )
 
     def _steady_of(self, pump: int) -> Records:

@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.messages.readings import Readings, row_values
 from wetwell.protocols.quantities import columns_of
 from wetwell.protocols.recordings.recording import Recording
 
 BLOCK_ROWS = 4096
+MISSING_STEPS = 1.5
+"""Rows of a recording that lie further apart than so many of its usual steps have others missing between them."""
 
 
 class Block(NamedTuple):
@@ -21,6 +23,8 @@ class Block(NamedTuple):
     time_ns, seq : (n,) int64
     values : (n, 2 + 5 pumps) array
         Level, inflow, then frequency, flow, head, power and running (0 or more) of each pump; NaN is "no value".
+    is_switched : (n,) bool
+        Whether a pump may have started or stopped within the interval that a value is the mean of.
     pumps : int
         How many pumps the source speaks of.
     is_bad : bool
@@ -30,6 +34,7 @@ class Block(NamedTuple):
     time_ns: Integers
     seq: Integers
     values: Floats
+    is_switched: Flags
     pumps: int
     is_bad: bool
 
@@ -37,12 +42,36 @@ class Block(NamedTuple):
 def blocks(recording: Recording, pumps: int) -> Iterator[Block]:
     """Yield the rows of a recording for a station with so many pumps, `seq` counting from 0."""
     columns = [recording.column(name) for name in columns_of(pumps)]
+    is_switched = switched_rows(recording)
     for first in range(0, len(recording), BLOCK_ROWS):
         last = min(first + BLOCK_ROWS, len(recording))
         values = np.empty((last - first, len(columns)))
         for number, column in enumerate(columns):
             values[:, number] = column[first:last]
-        yield Block(np.array(recording.time_ns[first:last]), np.arange(first, last), values, recording.pumps, False)
+        time_ns, seq = np.array(recording.time_ns[first:last]), np.arange(first, last)
+        yield Block(time_ns, seq, values, np.array(is_switched[first:last]), recording.pumps, False)
+
+
+def switched_rows(recording: Recording) -> Flags:
+    """(n,) rows of means in whose interval a pump may have started or stopped; none where values are not means.
+
+    A pump that runs in a row, and not in the one before or in the one after, was switched within it, or no one knows:
+    a row at the edge of a gap is one of them.
+    """
+    if recording.value != "mean" or len(recording) == 0:
+        return np.zeros(len(recording), dtype=bool)
+    order = np.argsort(recording.time_ns, kind="stable")
+    said = [recording.of_pumps(name)[:, order] for name in ("running", "frequency_hz", "flow_m3h")]
+    known = [np.where(np.isnan(values), 0.0, values) > 0.0 for values in said]
+    is_on = np.where(np.isnan(said[0]), np.where(np.isnan(said[1]), known[2], known[1]), known[0])
+    step_ns = np.diff(recording.time_ns[order])
+    is_next = (step_ns > 0) & (step_ns < MISSING_STEPS * np.median(step_ns)) if step_ns.size else step_ns > 0
+    goes_on = is_on[:, 1:] & is_on[:, :-1] & is_next
+    edge = np.zeros((recording.pumps, 1), dtype=bool)
+    through = np.hstack((edge, goes_on)) & np.hstack((goes_on, edge))
+    switched = np.zeros(len(recording), dtype=bool)
+    switched[order] = np.any(is_on & ~through, axis=0)
+    return switched
 
 
 class LiveBlock:
@@ -51,6 +80,7 @@ class LiveBlock:
     def __init__(self, pumps: int) -> None:
         self._time_ns, self._seq = np.zeros((2, 1), dtype=np.int64)
         self._values = np.full((1, len(columns_of(pumps))), np.nan)
+        self._is_switched = np.zeros(1, dtype=bool)
 
     def fill(self, sample: Readings) -> Block:
         """The sample as a block, until the next one is filled in."""
@@ -59,4 +89,5 @@ class LiveBlock:
         values = row_values(sample)
         del values[self._values.shape[1] :]
         self._values[0, : len(values)] = values
-        return Block(self._time_ns, self._seq, self._values, len(sample.pumps), sample.quality == "bad")
+        is_bad = sample.quality == "bad"
+        return Block(self._time_ns, self._seq, self._values, self._is_switched, len(sample.pumps), is_bad)

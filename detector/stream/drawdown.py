@@ -105,7 +105,14 @@ def _add(phase: Any, time_ns: int, level_m: float, inflow_m_s: float, flow_m3h: 
 
 @compiled
 def draw_down(
-    phases: Any, area_m2: float, period: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any
+    phases: Any,
+    area_m2: float,
+    period: Any,
+    time_ns: int,
+    gap_s: float,
+    frame: Floats,
+    is_switched: bool,
+    pumps: Any,
 ) -> None:
     """Take a frame into account.
 
@@ -118,6 +125,8 @@ def draw_down(
         Before this frame.
     time_ns, gap_s, frame
         A sample that has passed the gate.
+    is_switched : bool
+        Whether a pump may have started or stopped within the interval that the sample stands for.
     pumps : (pumps,) records
         `is_running` is read; `log_ratio` becomes the ρ of a run that ends.
     """
@@ -132,7 +141,7 @@ def draw_down(
     elif time_ns - phase["begin_ns"] >= MAX_NS and running == 0:
         _end(phases, area_m2, pumps)
         _begin(phase, running, time_ns - SETTLED_NS)
-    if time_ns - phase["begin_ns"] < SETTLED_NS or math.isnan(frame[LEVEL]):
+    if time_ns - phase["begin_ns"] < SETTLED_NS or is_switched or math.isnan(frame[LEVEL]):
         return
     flow_m3h = 0.0
     for pump in range(pumps.shape[0]):

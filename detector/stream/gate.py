@@ -2,10 +2,11 @@
 
 It lets samples through in the order of their time, with values that can be. A value that is absent, NaN or outside
 its range becomes NaN and is counted. A sample that is doubled or late is dropped and counted. A sample that jumps
-more than `MAX_JUMP_S` ahead ("future"), and samples that are behind, may come from a source whose clock was set:
-after `CONFIRMATIONS` such samples in a row that agree with one another, the gate follows them and counts a clock
-step. Those that are behind with old numbers are most likely sent again after a lost link, and it takes more than
-`RESENT_SAMPLES` of them: then the source has begun anew.
+more than `MAX_JUMP_S` and `MAX_JUMP_STEPS` usual steps ahead ("future"), and samples that are behind, may come from
+a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another, the gate
+follows them and counts a clock step. The usual step is learnt from the stream; before the second sample it may be
+any up to `SLOWEST_STEP_S`. Those that are behind with old numbers are most likely sent again after a lost link, and
+it takes more than `RESENT_SAMPLES` of them: then the source has begun anew.
 
 `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has passed
 over; a sample that comes late after all is counted there too.
@@ -17,6 +18,8 @@ from typing import Any
 import numpy as np
 
 from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.stream.run_state import USUAL_GAPS
+from wetwell.detector.stream.sampling_steps import SLOWEST_STEP_S, USUAL, note_step
 from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, INFLOW, LEVEL, POWER, PUMP_VALUES, RUNNING
@@ -24,6 +27,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 
 MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
+MAX_JUMP_STEPS = 10.0
 MIN_GAP_S = 0.05
 """Samples nearer to each other are taken for one that is doubled."""
 MAX_LOST = 1_000_000
@@ -96,16 +100,19 @@ def seconds_between(earlier_ns: int, later_ns: int) -> float:
 
 
 @compiled
-def _is_in_order(state: Any, time_ns: int, seq: int) -> bool:
+def _is_in_order(state: Any, steps: Floats, time_ns: int, seq: int) -> bool:
     """Whether a sample is let through; its gap is noted."""
     if not state["is_begun"]:
         state["gap_s"] = 0.0
         return True
     gap_s = seconds_between(state["time_ns"], time_ns)
-    if MIN_GAP_S <= gap_s <= MAX_JUMP_S:
+    since_other_s = seconds_between(state["other_ns"], time_ns)
+    if state["other_count"] > 0 and since_other_s >= MIN_GAP_S:
+        note_step(steps, since_other_s)
+    max_jump_s = max(MAX_JUMP_S, MAX_JUMP_STEPS * steps[USUAL]) if steps[USUAL] > 0.0 else SLOWEST_STEP_S
+    if MIN_GAP_S <= gap_s <= max_jump_s:
         state["gap_s"] = gap_s
         return True
-    since_other_s = seconds_between(state["other_ns"], time_ns)
     if 0.0 <= gap_s < MIN_GAP_S or (state["other_count"] > 0 and 0.0 <= since_other_s < MIN_GAP_S):
         state["doubled"] += 1
         return False
@@ -113,7 +120,7 @@ def _is_in_order(state: Any, time_ns: int, seq: int) -> bool:
         state["late"] += 1
     else:
         state["future"] += 1
-    follows = state["other_count"] > 0 and 0.0 < since_other_s <= MAX_JUMP_S
+    follows = state["other_count"] > 0 and 0.0 < since_other_s <= max_jump_s
     state["other_count"] = state["other_count"] + 1 if follows else 1
     state["other_ns"] = time_ns
     may_be_resent = gap_s < 0.0 and seq <= state["seq"]
@@ -147,19 +154,28 @@ def _checked(state: Any, value: float, low: float, high: float) -> float:
 
 @compiled
 def let_through(
-    state: Any, ranges: Any, time_ns: int, seq: int, values: Floats, pumps: int, is_bad: bool, frame: Floats
+    state: Any,
+    steps: Floats,
+    ranges: Any,
+    time_ns: int,
+    seq: int,
+    values: Floats,
+    pumps: int,
+    is_bad: bool,
+    frame: Floats,
 ) -> bool:
     """Whether a sample passes; then `frame` holds its values."""
     state["samples"] += 1
-    is_let_through = _is_in_order(state, time_ns, seq)
+    is_let_through = _is_in_order(state, steps, time_ns, seq)
     _count_lost(state, seq, is_let_through)
     if not is_let_through:
         return False
     state["is_begun"] = 1
     state["time_ns"] = time_ns
     state["other_count"] = 0
-    if state["gap_s"] > MAX_GAP_S:
+    if state["gap_s"] > MAX_GAP_S and steps[USUAL] > 0.0 and state["gap_s"] > USUAL_GAPS * steps[USUAL]:
         state["gaps"] += 1
+    note_step(steps, state["gap_s"])
     if math.isfinite(state["gap_s"]):
         state["seen_s"] += state["gap_s"]
     frame[:] = math.nan

@@ -16,8 +16,9 @@ from wetwell.detector.stream.drawdown import draw_down
 from wetwell.detector.stream.gate import let_through
 from wetwell.detector.stream.missing_signals import gather_segments
 from wetwell.detector.stream.run_state import collect, count_steady, note_gap, note_running
+from wetwell.detector.stream.sampling_steps import USUAL
 from wetwell.detector.stream.stuck_sensors import watch_sensors
-from wetwell.protocols.arrays import Floats, Integers, Records
+from wetwell.protocols.arrays import Flags, Floats, Integers, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -43,6 +44,7 @@ def process_samples(
     time_ns: Integers,
     seq: Integers,
     values: Floats,
+    is_switched: Flags,
     sample_pumps: int,
     is_bad: bool,
     table: Records,
@@ -59,17 +61,19 @@ def process_samples(
     windows: Floats,
     moments: Floats,
     counts: Integers,
+    sampling_steps: Floats,
 ) -> tuple[int, int]:
     """Row of a block to go on at and why the loop stops, from a row and a stop on; changes the `StreamState`."""
     state, period = gate[0], sampling_period[0]
     while row < time_ns.shape[0]:
         now_ns = time_ns[row]
         if stop <= Stop.SEGMENT_FULL:
-            if not let_through(state, ranges, now_ns, seq[row], values[row], sample_pumps, is_bad, frame):
+            told = now_ns, seq[row], values[row], sample_pumps, is_bad
+            if not let_through(state, sampling_steps, ranges, *told, frame):
                 row += 1
                 continue
             is_ending = note_running(table, pumps, period, now_ns, state["gap_s"], frame)
-            draw_down(phases, area_m2, period, now_ns, state["gap_s"], frame, pumps)
+            draw_down(phases, area_m2, period, now_ns, state["gap_s"], frame, is_switched[row], pumps)
             note_gap(period, state["gap_s"])
             stop = Stop.RUNS_ENDED.value
             if is_ending:
@@ -78,11 +82,10 @@ def process_samples(
             if count_steady(pumps) + pumps.shape[0] > steady_samples.shape[0]:
                 return row, Stop.ROOM_FULL.value
             stop = Stop.RUN_BLIND.value
-            if collect(table, pumps, now_ns, frame, steady_samples):
+            if collect(table, pumps, now_ns, frame, is_switched[row], steady_samples):
                 return row, stop
-        if stop <= Stop.RUN_BLIND and _watch(
-            table, stuck_sensors, missing_signals, now_ns, state["gap_s"], frame, pumps
-        ):
+        watched = now_ns, state["gap_s"], sampling_steps[USUAL], frame, is_switched[row]
+        if stop <= Stop.RUN_BLIND and _watch(table, stuck_sensors, missing_signals, *watched, pumps):
             return row, Stop.SEGMENT_GATHERED.value
         segment_samples = period["segment_samples"]
         if _test_steady(pumps, segment_samples, now_ns, state["gap_s"], steady_samples, windows, moments, counts):
@@ -99,12 +102,14 @@ def _watch(
     missing_signals: Any,
     now_ns: int,
     gap_s: float,
+    usual_s: float,
     frame: Floats,
+    is_switched: bool,
     pumps: Any,
 ) -> bool:
     """Look at the readings by themselves; whether there is a full segment of a pump without head."""
-    watch_sensors(stuck_sensors, now_ns, gap_s, frame, pumps)
-    is_full: bool = gather_segments(table, missing_signals, now_ns, gap_s, frame, pumps)
+    watch_sensors(stuck_sensors, now_ns, gap_s, usual_s, frame, pumps)
+    is_full: bool = gather_segments(table, missing_signals, now_ns, gap_s, frame, is_switched, pumps)
     return is_full
 
 

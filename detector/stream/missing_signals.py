@@ -27,7 +27,13 @@ def new_missing_signals(pumps: int) -> Records:
 
 @compiled
 def gather_segments(
-    table: Records, missing_signals: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any
+    table: Records,
+    missing_signals: Any,
+    time_ns: int,
+    gap_s: float,
+    frame: Floats,
+    is_switched: bool,
+    pumps: Any,
 ) -> bool:
     """Gather the readings of pumps that run, are being learnt, and lack flow, head or frequency.
 
@@ -37,6 +43,8 @@ def gather_segments(
     missing_signals : new_missing_signals(pumps)
     time_ns, gap_s, frame
         A sample that has passed the gate.
+    is_switched : bool
+        Whether a pump may have started or stopped within the interval that the sample stands for.
     pumps : (pumps,) records
         `is_running` and `is_learning` are read.
 
@@ -62,7 +70,7 @@ def gather_segments(
             segment["settled_ns"] = time_ns + WARM_UP_NS
             segment["samples"] = 0
             segment["is_apart"] = 1
-        if time_ns < segment["settled_ns"]:
+        if time_ns < segment["settled_ns"] or is_switched:
             continue
         if segment["samples"] == 0:
             segment["begin_ns"] = time_ns

@@ -192,7 +192,9 @@ def _totals(table: Records, pumps: Any, main: int, frame: Floats) -> tuple[float
 
 
 @compiled
-def _collect(table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, steady: Any) -> bool:
+def _collect(
+    table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, is_switched: bool, steady: Any
+) -> bool:
     """Take the frame into the open run of a pump; whether it is steady, and so has become this record."""
     pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
     flow_m3h, head_m = frame[at + FLOW], frame[at + HEAD]
@@ -204,7 +206,7 @@ def _collect(table: Records, pumps: Any, number: int, time_ns: int, frame: Float
         pump["speed_ratio"] = speed_ratio
         _settle(pump, time_ns, SETTLING_NS)
     is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
-    if time_ns < pump["steady_from_ns"] or not is_usable or math.isnan(flow_m3h + head_m):
+    if time_ns < pump["steady_from_ns"] or is_switched or not is_usable or math.isnan(flow_m3h + head_m):
         return False
     if math.isnan(static_head_at_m(own, frame[LEVEL])):
         return False
@@ -228,8 +230,11 @@ def _collect(table: Records, pumps: Any, number: int, time_ns: int, frame: Float
 
 
 @compiled
-def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, steady_samples: Any) -> bool:
-    """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind."""
+def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, is_switched: bool, steady_samples: Any) -> bool:
+    """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind.
+
+    A frame in whose interval a pump may have started or stopped (`is_switched`) is steady for none.
+    """
     at = count_steady(pumps)
     any_blind = False
     for number in range(pumps.shape[0]):
@@ -244,7 +249,7 @@ def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, steady_samp
             pump["steady_from_ns"] = time_ns + WARM_UP_NS
             pump["speed_ratio"] = math.nan
         pump["last_ns"] = time_ns
-        if _collect(table, pumps, number, time_ns, frame, steady_samples[at]):
+        if _collect(table, pumps, number, time_ns, frame, is_switched, steady_samples[at]):
             pump["is_steady"] = 1
             pump["samples"] += 1
             at += 1

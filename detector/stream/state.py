@@ -12,6 +12,7 @@ from wetwell.detector.stream.drawdown import new_phases
 from wetwell.detector.stream.gate import gate_ranges, new_gate
 from wetwell.detector.stream.missing_signals import new_missing_signals
 from wetwell.detector.stream.run_state import new_pumps, new_sampling_period
+from wetwell.detector.stream.sampling_steps import new_sampling_steps
 from wetwell.detector.stream.steady_samples import new_steady_samples
 from wetwell.detector.stream.stuck_sensors import new_stuck_sensors
 from wetwell.protocols.arrays import Floats, Integers, Records
@@ -31,6 +32,8 @@ class StreamState(NamedTuple):
         Each as the `new_...` of its module makes it.
     windows, moments, counts : arrays
         Of `RollingFTest`.
+    sampling_steps : (6,) array
+        As `new_sampling_steps` makes it.
     """
 
     table: Records
@@ -47,6 +50,7 @@ class StreamState(NamedTuple):
     windows: Floats
     moments: Floats
     counts: Integers
+    sampling_steps: Floats
 
     def remembered(self) -> dict[str, npt.NDArray[Any]]:
         """The arrays from which the stream goes on, by name."""
@@ -71,4 +75,5 @@ def new_state(datasheet: Datasheet, rolling: RollingFTest) -> StreamState:
         windows=rolling.windows,
         moments=rolling.moments,
         counts=rolling.counts,
+        sampling_steps=new_sampling_steps(),
     )

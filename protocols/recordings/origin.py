@@ -39,7 +39,7 @@ class Origin:
         >>> Origin.of_mark("# wetwell station=north value=mean")
         Origin(station='north', value='mean')
         """
-        return cls._of(dict(re.findall(r"(\w+)=(\S+)", line)) if line.startswith(MARK) else {})
+        return cls._of(dict(re.findall(r"(\w+)=([^\s,]+)", line)) if line.startswith(MARK) else {})
 
     @classmethod
     def of_metadata(cls, metadata: Mapping[bytes, bytes]) -> Self:

@@ -1,6 +1,6 @@
 """Recordings: one station's samples as columns, in CSV, CSV.gz or Parquet, the same columns everywhere.
 
-Columns: `time` (ISO 8601, UTC), `level_m`, optional `inflow_m3h`, and for each pump i from 1
+Columns: `time` (ISO 8601 with a Z or an offset), `level_m`, optional `inflow_m3h`, and for each pump i from 1
 `pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
 Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
 """
@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from itertools import count, repeat
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +23,10 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.local_time import to_utc
 from wetwell.protocols.messages.readings import PumpRow, Row
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import (
@@ -36,7 +38,7 @@ from wetwell.protocols.quantities import (
     pumps_of,
 )
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
-from wetwell.protocols.timestamps import from_iso, to_iso_array
+from wetwell.protocols.timestamps import from_iso, has_zone, to_iso_array
 
 TRUTH_PREFIX = "truth_"
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
@@ -128,14 +130,20 @@ def _reading(pump: PumpRow) -> PumpReading:
     return PumpReading(**dict(zip(PUMP_QUANTITIES, map(_value, pump), strict=True)))
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path, time_zone: ZoneInfo | None = None) -> Recording:
     """Read a recording.
+
+    Parameters
+    ----------
+    path : Path
+    time_zone : ZoneInfo, optional
+        Of the clock whose stamps have no zone; those that have one keep it.
 
     Raises
     ------
     RecordingError
-        If the file cannot be read, its ending is not one of `SUFFIXES`, a needed column is missing or a value is
-        not of its column's kind; one line with file, column and rule.
+        If the file cannot be read, its ending is not one of `SUFFIXES`, it has no rows, a needed column is missing, a
+        value is not of its column's kind, or a stamp has no zone; one line with file, column and rule.
     """
     table, origin = _read_table(path)
     if "time" not in table.column_names:
@@ -153,7 +161,7 @@ def read_recording(path: Path) -> Recording:
         else:
             ignored.append(name)
     recording = Recording(
-        time_ns=_stamps(table["time"], path),
+        time_ns=_stamps(table["time"], time_zone, path),
         columns=columns,
         truth=truth,
         ignored=tuple(ignored),
@@ -162,6 +170,8 @@ def read_recording(path: Path) -> Recording:
     )
     if recording.pumps == 0:
         raise RecordingError(f"{path}: no pump column such as 'pump1_flow_m3h' found")
+    if len(recording) == 0:
+        raise RecordingError(f"{path}: has no rows")
     return recording
 
 
@@ -206,7 +216,7 @@ def _csv_fault(message: str, header: list[str], header_rows: int) -> str:
 def _csv_header(path: Path) -> tuple[str, list[str]]:
     """Line that says where the recording comes from, empty if there is none, and the names of the columns."""
     opener = gzip.open if path.name.endswith(".gz") else open
-    with opener(path, "rt", encoding="utf-8") as file:
+    with opener(path, "rt", encoding="utf-8-sig") as file:
         mark, line = "", str(file.readline())
         if line.startswith(MARK):
             mark, line = line, str(file.readline())
@@ -225,24 +235,47 @@ def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
     return values
 
 
-def _stamps(column: pa.ChunkedArray, path: Path) -> Integers:
+def _stamps(column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path) -> Integers:
     if pa.types.is_timestamp(column.type):
         if column.null_count:
             row = int(np.argmax(column.is_null().to_numpy())) + 1
             raise RecordingError(f"{path}: column 'time', row {row}: is empty")
         try:
-            stamps: Integers = column.cast(pa.timestamp("ns")).cast(pa.int64()).to_numpy()
+            stamps: Integers = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).to_numpy()
         except pa.ArrowInvalid as error:
             raise RecordingError(f"{path}: column 'time': {error}") from error
-        return stamps
-    texts = column.to_numpy()
-    try:
-        return np.array([from_iso(text) for text in texts], dtype=np.int64)
-    except (TypeError, ValueError):
-        row = next(row for row, text in enumerate(texts, start=1) if not _is_stamp(text))
-        raise RecordingError(
-            f"{path}: column 'time', row {row}: got {texts[row - 1]!r}, must be ISO 8601 such as 2025-01-31T06:00:00Z"
-        ) from None
+        is_local = np.full(stamps.size, column.type.tz is None)
+    else:
+        texts = column.to_numpy()
+        try:
+            stamps = np.array([from_iso(text) for text in texts], dtype=np.int64)
+        except (TypeError, ValueError):
+            row = next(row for row, text in enumerate(texts, start=1) if not _is_stamp(text))
+            rule = "must be ISO 8601 such as 2025-01-31T06:00:00Z"
+            raise RecordingError(f"{path}: column 'time', row {row}: got {texts[row - 1]!r}, {rule}") from None
+        is_local = np.array([not has_zone(text) for text in texts], dtype=bool)
+    return _utc(stamps, is_local, column, time_zone, path) if is_local.any() else stamps
+
+
+def _utc(
+    stamps_ns: Integers, is_local: Flags, column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path
+) -> Integers:
+    """Stamps of which some are those of a local clock, in UTC."""
+    local = np.flatnonzero(is_local)
+    if time_zone is None:
+        row, ways = int(local[0]), "give --time-zone such as Europe/Helsinki, or use wetwell convert"
+        raise RecordingError(f"{path}: column 'time', row {row + 1}: got '{column[row]}' without a zone: {ways}")
+    times = to_utc(stamps_ns[local], time_zone)
+    if times.is_missing.any():
+        row, rule = int(local[np.argmax(times.is_missing)]), f"in an hour that clocks of {time_zone.key} leave out"
+        raise RecordingError(f"{path}: column 'time', row {row + 1}: got '{column[row]}', {rule}")
+    if times.undecided:
+        rule = f"lie in an hour that comes twice in {time_zone.key}, and the rows do not say which it is"
+        way = "wetwell convert takes the first"
+        raise RecordingError(f"{path}: column 'time': {times.undecided} stamps {rule}: {way}")
+    stamps_ns = stamps_ns.copy()
+    stamps_ns[local] = times.time_ns
+    return stamps_ns
 
 
 def _is_stamp(text: Any) -> bool:

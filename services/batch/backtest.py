@@ -20,7 +20,8 @@ from wetwell.detector.stream.block import blocks
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.protocols.recordings.recording import Recording, read_recording
+from wetwell.protocols.recordings.reading import PLAIN, Reading
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station, load_station
 from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.dataset import MANIFEST, read_manifest
@@ -60,16 +61,17 @@ class RecordingFile:
     station: Station
     path: Path
     name: str
+    reading: Reading = PLAIN
 
     def load(self) -> Recording:
         """Read the file."""
-        return read_recording(self.path)
+        return self.reading.read_of(self.path, self.station)
 
     def identity(self) -> object:
-        """Place, size and time of change."""
+        """Place, size and time of change, and how it is read."""
         with contextlib.suppress(OSError):
             stat = self.path.stat()
-            return [str(self.path), stat.st_size, stat.st_mtime_ns]
+            return [str(self.path), stat.st_size, stat.st_mtime_ns, self.reading.identity]
         return str(self.path)
 
 
@@ -125,31 +127,27 @@ def sources_of(
     scenarios: Iterable[Scenario],
     seeds: Sequence[int],
     length_s: int | None,
-    dataset: Path | None,
+    reading: Reading = PLAIN,
 ) -> list[Source]:
-    """Recordings to judge: files, then every seed of every scenario, then the items of a dataset.
-
-    Raises
-    ------
-    ConfigError
-        If there is none.
-    RecordingError
-        If the folder holds no dataset.
-    """
-    sources: list[Source] = [_recording_file(station, path) for path in recordings]
+    """Recordings of a station to judge: files, then every seed of every scenario."""
+    sources: list[Source] = [RecordingFile(station, path.absolute(), str(path), reading) for path in recordings]
     sources += [SimulatedRecording(station, plan, seed, length_s) for plan in scenarios for seed in seeds]
-    if dataset is not None:
-        items = read_manifest(dataset / MANIFEST)["items"]
-        sources += [
-            _recording_file(load_station(dataset / item["station_file"]), dataset / item["file"]) for item in items
-        ]
-    if not sources:
-        raise ConfigError("backtest: give at least one --recording, --scenario or --dataset")
     return sources
 
 
-def _recording_file(station: Station, path: Path) -> RecordingFile:
-    return RecordingFile(station, path.absolute(), str(path))
+def items_of(dataset: Path) -> list[RecordingFile]:
+    """Recordings of a dataset, each with its own station.
+
+    Raises
+    ------
+    RecordingError
+        If the folder holds no dataset.
+    ConfigError
+        If a station file cannot be used.
+    """
+    items = read_manifest(dataset / MANIFEST)["items"]
+    paths = [(dataset / item["station_file"], dataset / item["file"]) for item in items]
+    return [RecordingFile(load_station(station), path.absolute(), str(path)) for station, path in paths]
 
 
 def run_backtest(
@@ -273,13 +271,9 @@ def judge(source: Source, detectors: Sequence[str], learning_s: float = LEARNING
     Raises
     ------
     RecordingError
-        If the recording has no truth or not the pumps of the station.
+        If the recording has no truth, or is not of the station.
     """
     recording = source.load()
-    if recording.pumps != len(source.station.pump):
-        raise RecordingError(
-            f"{source.name}: has {recording.pumps} pumps, station '{source.station.name}' {len(source.station.pump)}"
-        )
     for column in (f"truth_pump{pump}_state" for pump in range(1, recording.pumps + 1)):
         if column not in recording.truth:
             raise RecordingError(f"{source.name}: column '{column}' is missing, so nothing can be scored")

@@ -11,6 +11,7 @@ from typing import Any
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, WetwellError
+from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.batch.gap import diagnose_file
 from wetwell.services.batch.journal import Journal, fingerprint, open_journal
@@ -31,37 +32,45 @@ class Case:
     name: str
     recording: Path
     station: Station | Failure
+    reading: Reading = PLAIN
 
     def identity(self, *options: object) -> str:
         """Another one where version, station, recording or options are."""
         stat = self.recording.stat() if self.recording.exists() else None
         file = None if stat is None else [stat.st_size, stat.st_mtime_ns]
         station = self.station.model_dump(mode="json") if isinstance(self.station, Station) else None
-        return fingerprint(version("wetwell"), station, str(self.recording), file, options)
+        return fingerprint(version("wetwell"), station, str(self.recording), file, self.reading.identity, options)
 
 
-def cases_of(station: str, recordings: Sequence[Path], table: Path | None) -> list[Case]:
+def cases_of(
+    station: str | None, recordings: Sequence[Path], table: Path | None, reading: Reading = PLAIN
+) -> list[Case]:
     """Cases of recordings under one station, and of the rows of a table.
 
     Parameters
     ----------
-    station : str
+    station : str, optional
         Of the single recordings.
     recordings : sequence of Path
     table : Path, optional
         CSV file with columns `station_file` and `recording`, whose paths count from its place.
+    reading : Reading
+        Of all of them.
 
     Raises
     ------
     ConfigError
-        If the station or the table cannot be used, or two recordings have one name.
+        If there are single recordings without a station, if the station or the table cannot be used, or two
+        recordings have one name.
     """
     cases: list[Case] = []
     if recordings:
+        if station is None:
+            raise ConfigError("gap diagnose: give --station FILE with --recording")
         plant = find_station(station)
-        cases = [Case(_name(path), path.absolute(), plant) for path in recordings]
+        cases = [Case(_name(path), path.absolute(), plant, reading) for path in recordings]
     if table is not None:
-        cases += [_row_case(row, table) for row in _rows(table)]
+        cases += [_row_case(row, table, reading) for row in _rows(table)]
     names = [case.name for case in cases]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ConfigError(f"gap diagnose: two recordings are called '{twice[0]}', which names their folder")
@@ -137,7 +146,7 @@ def _has_report(out: Path, name: str) -> bool:
 def _diagnose(out: Path, only: Sequence[str] | None, without: Sequence[str], case: Case) -> dict[str, Any]:
     if isinstance(case.station, Failure):
         raise ConfigError(case.station.error)
-    report = diagnose_file(case.station, case.recording, out / case.name, only=only, without=without)
+    report = diagnose_file(case.station, case.recording, out / case.name, case.reading, only=only, without=without)
     return {
         "name": case.name,
         "station": report.station,
@@ -166,10 +175,10 @@ def _rows(table: Path) -> list[dict[str, str]]:
         raise ConfigError(f"{table}: cannot be read: {error}") from error
 
 
-def _row_case(row: dict[str, str], table: Path) -> Case:
+def _row_case(row: dict[str, str], table: Path, reading: Reading) -> Case:
     recording = table.parent.absolute() / row["recording"]
     try:
         station: Station | Failure = find_station(str(table.parent / row["station_file"]))
     except WetwellError as error:
         station = Failure(str(error))
-    return Case(_name(recording), recording, station)
+    return Case(_name(recording), recording, station, reading)

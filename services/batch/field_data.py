@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
-from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
+from wetwell.protocols.recordings.reading import PLAIN, Reading
+from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station, load_toml
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.validation_page import validation_page
@@ -19,29 +20,34 @@ from wetwell.sim2real.calibration.validation import validate
 from wetwell.sim2real.recording.preparation import Preparation, PreparationReport, prepare
 
 
-def prepared(recording: Path, preparation: Path | None) -> tuple[Recording, PreparationReport]:
-    """Recording in a file, prepared as a TOML file says, or only sorted and without doubles.
+def prepared(
+    recording: Path, preparation: Path | None, station: Station | None, reading: Reading
+) -> tuple[Recording, PreparationReport]:
+    """Recording of a station in a file, prepared as a TOML file says, or only sorted and without doubles.
 
     Raises
     ------
     ConfigError
         If the preparation breaks a rule or does not fit the recording.
     RecordingError
-        If the recording cannot be read.
+        If the recording cannot be read, or is not of the station.
     """
     table = load_toml(preparation) if preparation is not None else {}
     place = preparation if preparation is not None else recording
     try:
-        return prepare(read_recording(recording), Preparation.model_validate(table))
+        rows = reading.read(recording) if station is None else reading.read_of(recording, station)
+        return prepare(rows, Preparation.model_validate(table))
     except ValidationError as error:
         raise ConfigError(f"{place}: {first_fault(error)}") from error
     except ValueError as error:
         raise ConfigError(f"{place}: {error}") from error
 
 
-def prepare_file(recording: Path, preparation: Path | None, out: Path) -> dict[str, Any]:
+def prepare_file(
+    recording: Path, preparation: Path | None, out: Path, station: Station | None, reading: Reading
+) -> dict[str, Any]:
     """Write a prepared recording; what was found and done."""
-    rows, report = prepared(recording, preparation)
+    rows, report = prepared(recording, preparation, station, reading)
     write_recording(rows, out)
     return {
         "recording": str(out),
@@ -53,7 +59,9 @@ def prepare_file(recording: Path, preparation: Path | None, out: Path) -> dict[s
     }
 
 
-def calibrate_file(station: Station, recording: Path, preparation: Path | None, out: Path) -> dict[str, Any]:
+def calibrate_file(
+    station: Station, recording: Path, preparation: Path | None, out: Path, reading: Reading = PLAIN
+) -> dict[str, Any]:
     """Write a station file fitted to a recording; the estimates with their intervals.
 
     Raises
@@ -61,7 +69,7 @@ def calibrate_file(station: Station, recording: Path, preparation: Path | None, 
     RecordingError
         If the recording cannot be used or the station file cannot be written.
     """
-    rows, _ = prepared(recording, preparation)
+    rows, _ = prepared(recording, preparation, station, reading)
     try:
         estimates = calibrate(rows, station)
         fitted = with_estimates(station, estimates)
@@ -85,7 +93,12 @@ def calibrate_file(station: Station, recording: Path, preparation: Path | None, 
 
 
 def validate_file(
-    station: Station, recording: Path, preparation: Path | None, out: Path | None, html: Path | None = None
+    station: Station,
+    recording: Path,
+    preparation: Path | None,
+    out: Path | None,
+    html: Path | None = None,
+    reading: Reading = PLAIN,
 ) -> dict[str, Any]:
     """Compare the free-running simulator with a recording; write the simulated recording and a page where asked.
 
@@ -94,7 +107,7 @@ def validate_file(
     RecordingError
         If the recording cannot be used, or a file cannot be written.
     """
-    rows, _ = prepared(recording, preparation)
+    rows, _ = prepared(recording, preparation, station, reading)
     try:
         result, simulated = validate(rows, station)
     except ValueError as error:

@@ -10,6 +10,7 @@ import numpy as np
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.quantities import PUMP_METERS, pump_column
+from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.batch.field_data import prepared, write_station
@@ -31,6 +32,7 @@ def diagnose_file(
     station: Station,
     recording: Path,
     out: Path,
+    reading: Reading = PLAIN,
     *,
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
@@ -48,7 +50,7 @@ def diagnose_file(
     for name in [*(only or ()), *without]:
         if name not in EFFECTS:
             raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
-    rows, preparation = prepared(recording, None)
+    rows, preparation = prepared(recording, None, station, reading)
     try:
         with ThreadPoolExecutor(THREADS) as pool:
             diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
@@ -71,7 +73,9 @@ def diagnose_file(
     return report
 
 
-def replay_file(station: Station, recording: Path, out: Path, *, closed_loop: bool) -> dict[str, object]:
+def replay_file(
+    station: Station, recording: Path, out: Path, reading: Reading = PLAIN, *, closed_loop: bool
+) -> dict[str, object]:
     """Write what the simulator says for a recording.
 
     Teacher-forced, frequency, inflow and level come from the recording, second by second; in a closed loop only the
@@ -82,7 +86,7 @@ def replay_file(station: Station, recording: Path, out: Path, *, closed_loop: bo
     RecordingError
         If the recording cannot be used or the result not be written.
     """
-    rows, _ = prepared(recording, None)
+    rows, _ = prepared(recording, None, station, reading)
     try:
         predicted = validate(rows, station)[1] if closed_loop else _teacher_forced(rows, station)
     except ValueError as error:
@@ -104,7 +108,7 @@ def _teacher_forced(rows: Recording, station: Station) -> Recording:
             if name in prediction.signals:
                 columns[pump_column(i + 1, name)] = prediction.signals[name][i, second]
         columns[pump_column(i + 1, "running")] = (traces.frequency_hz[i, second] > 0.0).astype(np.float64)
-    return Recording(time_ns=rows.time_ns, columns=columns)
+    return Recording(time_ns=rows.time_ns, columns=columns, station=station.name)
 
 
 def _notes(preparation: PreparationReport) -> tuple[str, ...]:

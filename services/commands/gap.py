@@ -7,12 +7,15 @@ from typing import Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.recordings.reading import Reading
 from wetwell.services.commands.options import (
+    AsStationOption,
     JsonOption,
     RecordingOption,
     SchedulerOption,
     SeedOption,
     StationOption,
+    TimeZoneOption,
     positive,
     print_batch,
     print_result,
@@ -83,7 +86,10 @@ def gap_diagnose(
         Path | None,
         typer.Option("--recordings", metavar="TABLE", help="CSV file with columns station_file and recording."),
     ] = None,
-    station: StationOption = "alpha",
+    station: Annotated[
+        str | None,
+        typer.Option("--station", metavar="FILE", help="Of the recordings; a table names those of its own."),
+    ] = None,
     without: Annotated[
         list[str] | None, typer.Option("--without", metavar="NAME", help="Leave this effect out; may be given again.")
     ] = None,
@@ -94,29 +100,33 @@ def gap_diagnose(
         int | None, typer.Option(min=1, help="Processes for several recordings; default: as many as cores.")
     ] = None,
     scheduler: SchedulerOption = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Say where a recording departs from the simulator, which effect causes it, and how far that closes the gap."""
     from wetwell.services.batch.executors import check_scheduler
     from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
-    from wetwell.services.stations import find_station
 
-    given = recording or []
+    given, reading = recording or [], Reading.said(time_zone, as_station=as_station)
     if not given and table is None:
         raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
     check_scheduler(scheduler)
     if len(given) > 1 or table is not None or scheduler is not None:
         from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 
-        cases = cases_of(station, given, table)
+        cases = cases_of(station, given, table, reading)
         processes = min(workers or os.cpu_count() or 1, max(len(cases), 1))
         result = diagnose_all(cases, out, processes, scheduler, only=only, without=without or ())
         return print_batch(result, as_json=as_json)
     from wetwell.services.batch.gap import diagnose_file
+    from wetwell.services.stations import find_station
 
+    if station is None:
+        raise ConfigError("gap diagnose: give --station FILE with --recording")
     plant = find_station(station)
     with progress_bar("diagnosis") as progress:
-        report = diagnose_file(plant, given[0], out, only=only, without=without or (), progress=progress)
+        report = diagnose_file(plant, given[0], out, reading, only=only, without=without or (), progress=progress)
     return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
 
 
@@ -124,15 +134,18 @@ def gap_diagnose(
 def gap_replay(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
-    station: StationOption = "alpha",
+    station: StationOption,
     closed_loop: Annotated[
         bool,
         typer.Option("--closed-loop", help="Take only the inflow from the recording, not frequencies and level."),
     ] = False,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write what the simulator says for a recording, second by second."""
     from wetwell.services.batch.gap import replay_file
     from wetwell.services.stations import find_station
 
-    print_result(replay_file(find_station(station), recording, out, closed_loop=closed_loop), as_json=as_json)
+    reading, plant = Reading.said(time_zone, as_station=as_station), find_station(station)
+    print_result(replay_file(plant, recording, out, reading, closed_loop=closed_loop), as_json=as_json)

@@ -10,9 +10,11 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.protocols.timestamps import from_iso
 from wetwell.services.commands.options import (
+    AsStationOption,
     ConfigOption,
     JsonOption,
     RecordingOption,
+    TimeZoneOption,
     ZenohOption,
     parse_duration_s,
     print_result,
@@ -83,7 +85,7 @@ def history(
 @app.command()
 def export(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
-    station: NameOption = "alpha",
+    station: NameOption,
     start: FromOption = None,
     end: ToOption = None,
     data: DataOption = None,
@@ -103,19 +105,29 @@ def export(
 @app.command("import")
 def import_(
     recording: RecordingOption,
-    station: NameOption = "alpha",
+    station: Annotated[
+        str | None, typer.Option("--station", metavar="NAME", help="Name of the station; default: the recording's.")
+    ] = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     data: DataOption = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fill the history from a recording; what is there already stays as it is."""
+    from wetwell.protocols.recordings.reading import Reading
     from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import import_recording
 
+    reading = Reading.said(time_zone, as_station=as_station)
+    read = reading.read(recording)
+    name = reading.name_for(read, station, recording)
     settings = with_history(settings_of(config), data)
     with open_store(settings.historian, alone=False) as store:
-        rows, new = import_recording(store, station, recording)
-    print_result({"station": station, "rows": rows, "new": new, "doubled": rows - new}, as_json=as_json)
+        rows, new = import_recording(store, name, read, recording)
+    if read.value != "instant":
+        typer.echo(f"{recording}: the history keeps values as instants, these are '{read.value}'", err=True)
+    print_result({"station": name, "rows": rows, "new": new, "doubled": rows - new}, as_json=as_json)
 
 
 def _span(start: str | None, end: str | None) -> tuple[int, int]:

@@ -6,10 +6,14 @@ from typing import Annotated
 
 import typer
 
+from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.recordings.reading import Reading
 from wetwell.services.commands.options import (
+    AsStationOption,
     JsonOption,
     SchedulerOption,
     StationOption,
+    TimeZoneOption,
     positive,
     print_batch,
     print_result,
@@ -22,16 +26,17 @@ app = typer.Typer()
 def detect(
     recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Verdicts, one JSON object a line.")],
-    station: StationOption = "alpha",
+    station: StationOption,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Judge a recording with the streaming detector."""
-    from wetwell.protocols.recordings.recording import read_recording
     from wetwell.services.batch.recordings import detect as judge
     from wetwell.services.stations import find_station
 
     plant = find_station(station)
-    rows = read_recording(recording)
+    rows = Reading.said(time_zone, as_station=as_station).read_of(recording, plant)
     for name in rows.ignored:
         typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
     print_result(judge(plant, rows, out), as_json=as_json)
@@ -40,7 +45,10 @@ def detect(
 @app.command()
 def backtest(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for backtest.json and backtest.html.")],
-    station: StationOption = "alpha",
+    station: Annotated[
+        str | None,
+        typer.Option("--station", metavar="FILE", help="Of the recordings and scenarios; a dataset has its own."),
+    ] = None,
     recording: Annotated[
         list[Path] | None, typer.Option("--recording", metavar="FILE", help="With truth columns; may be given again.")
     ] = None,
@@ -61,20 +69,37 @@ def backtest(
     ] = 6.0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
     scheduler: SchedulerOption = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Score verdicts against truth: ours, the paper's two methods and others; run again to resume."""
-    from wetwell.services.batch.backtest import detector_names, overview, sources_of, write_backtest
+    from wetwell.services.batch.backtest import (
+        Source,
+        detector_names,
+        items_of,
+        overview,
+        sources_of,
+        write_backtest,
+    )
     from wetwell.services.batch.executors import check_scheduler
     from wetwell.services.stations import find_scenario, find_station
 
     check_scheduler(scheduler)
     names = detector_names(detectors)
     length_s = None if days is None else max(round(positive(days, "--days") * 86_400.0), 1)
-    plans = [find_scenario(name) for name in scenario or []]
-    sources = sources_of(
-        find_station(station), recording or [], plans, range(first_seed, first_seed + seeds), length_s, dataset
-    )
+    reading = Reading.said(time_zone, as_station=as_station)
+    sources: list[Source] = []
+    if station is not None:
+        plans = [find_scenario(name) for name in scenario or []]
+        trials = range(first_seed, first_seed + seeds)
+        sources = sources_of(find_station(station), recording or [], plans, trials, length_s, reading)
+    elif recording or scenario:
+        raise ConfigError("backtest: give --station FILE with --recording and --scenario")
+    if dataset is not None:
+        sources += items_of(dataset)
+    if not sources:
+        raise ConfigError("backtest: give at least one --recording, --scenario or --dataset")
     processes = min(workers or os.cpu_count() or 1, len(sources))
     result = write_backtest(sources, names, out, processes, learning_h * 3600.0, scheduler)
     print_batch(result if as_json else overview(result), as_json=as_json)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from wetwell.services.commands.options import (
+    AsStationOption,
     ConfigOption,
     JsonOption,
     ModbusOption,
@@ -16,6 +17,7 @@ from wetwell.services.commands.options import (
     SeedOption,
     SpeedOption,
     StationOption,
+    TimeZoneOption,
     WordOrderOption,
     ZenohOption,
     live_plant,
@@ -191,19 +193,22 @@ def release(
 @app.command()
 def replay(
     recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
-    station: StationOption = "alpha",
+    station: StationOption,
     speed: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
 ) -> None:
     """Publish a recording on Zenoh as if it were live, then end."""
-    from wetwell.protocols.recordings.recording import read_recording
+    from wetwell.protocols.recordings.reading import Reading
     from wetwell.services.replay.daemon import serve_replay
     from wetwell.services.stations import find_station
 
     settings = settings_of(config, zenoh)
-    rows = read_recording(recording)
-    run(settings, serve_replay(settings, rows, find_station(station).name, positive(speed, "--speed")))
+    plant = find_station(station)
+    rows = Reading.said(time_zone, as_station=as_station).read_of(recording, plant)
+    run(settings, serve_replay(settings, rows, plant.name, positive(speed, "--speed")))
 
 
 @app.command()

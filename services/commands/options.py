@@ -40,6 +40,12 @@ WordOrderOption = Annotated[
     Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
 ]
 RecordingOption = Annotated[Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.")]
+TimeZoneOption = Annotated[
+    str | None, typer.Option("--time-zone", metavar="ZONE", help="Of stamps that have none, such as Europe/Helsinki.")
+]
+AsStationOption = Annotated[
+    bool, typer.Option("--as-station", help="Take the recording for one of this station, whatever name it carries.")
+]
 PreparationOption = Annotated[
     Path | None, typer.Option("--preparation", metavar="FILE", help="TOML file: scale, offset, max_gap_s.")
 ]

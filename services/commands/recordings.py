@@ -2,12 +2,14 @@
 
 import os
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.recordings.reading import Reading
 from wetwell.services.commands.options import (
+    AsStationOption,
     JsonOption,
     PreparationOption,
     RecordingOption,
@@ -15,19 +17,27 @@ from wetwell.services.commands.options import (
     SchedulerOption,
     SeedOption,
     StationOption,
+    TimeZoneOption,
     plant_of,
     positive,
     print_batch,
     print_result,
 )
 
+if TYPE_CHECKING:
+    from wetwell.protocols.station.station_file import Station
+
 app = typer.Typer()
+
+StationCheckOption = Annotated[
+    str | None, typer.Option("--station", metavar="FILE", help="Station that the recording has to be of.")
+]
 
 
 @app.command()
 def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
-    station: StationOption = "alpha",
+    station: StationOption,
     scenario: ScenarioOption = "nominal",
     days: Annotated[float | None, typer.Option(help="Length; default: the scenario's.")] = None,
     seed: SeedOption = 1,
@@ -76,7 +86,9 @@ def dataset(
     if check is not None:
         return print_result(check_dataset(check), as_json=as_json)
     check_scheduler(scheduler)
-    bases = [find_station(name) for name in station or ["alpha"]]
+    if not station:
+        raise ConfigError("dataset: give at least one --station FILE")
+    bases = [find_station(name) for name in station]
     plan = plan_of(bases, seed, count, positive(days, "--days"), form)
     processes = min(workers or os.cpu_count() or 1, count)
     return print_batch(make_dataset(plan, cast("Path", out), processes, scheduler), as_json=as_json)
@@ -111,12 +123,7 @@ def convert(
         return print_result(draft_mapping(sources, draft), as_json=as_json)
     out = cast("Path", out)
     if mapping is not None:
-        plant = None
-        if station is not None:
-            from wetwell.services.stations import find_station  # brings the compiled simulator, which takes seconds
-
-            plant = find_station(station)
-        return print_result(convert_files(sources, mapping, out, plant), as_json=as_json)
+        return print_result(convert_files(sources, mapping, out, _station(station)), as_json=as_json)
     if len(sources) > 1:
         raise ConfigError(f"convert: got {len(sources)} files, without --mapping it takes one")
     recording = IMPORTERS[form](sources[0])
@@ -131,33 +138,40 @@ def prepare(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
     preparation: PreparationOption = None,
+    station: StationCheckOption = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Prepare a recording from the field: units, offsets, order, doubles; list its gaps."""
     from wetwell.services.batch.field_data import prepare_file
 
-    print_result(prepare_file(recording, preparation, out), as_json=as_json)
+    reading = Reading.said(time_zone, as_station=as_station)
+    print_result(prepare_file(recording, preparation, out, _station(station), reading), as_json=as_json)
 
 
 @app.command()
 def calibrate(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Station file that is written.")],
-    station: StationOption = "alpha",
+    station: StationOption,
     preparation: PreparationOption = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fit a station file to a recording, with intervals; says what the recording cannot tell."""
     from wetwell.services.batch.field_data import calibrate_file
     from wetwell.services.stations import find_station
 
-    print_result(calibrate_file(find_station(station), recording, preparation, out), as_json=as_json)
+    reading = Reading.said(time_zone, as_station=as_station)
+    print_result(calibrate_file(find_station(station), recording, preparation, out, reading), as_json=as_json)
 
 
 @app.command()
 def validate(
     recording: RecordingOption,
-    station: StationOption = "alpha",
+    station: StationOption,
     preparation: PreparationOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Simulated recording that is written.")
@@ -165,20 +179,39 @@ def validate(
     html: Annotated[
         Path | None, typer.Option("--html", metavar="FILE", help="Page with plots that is written; needs no network.")
     ] = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run the simulator under the inflow of a recording and compare level, starts and run time."""
     from wetwell.services.batch.field_data import validate_file
     from wetwell.services.stations import find_station
 
-    print_result(validate_file(find_station(station), recording, preparation, out, html), as_json=as_json)
+    reading = Reading.said(time_zone, as_station=as_station)
+    plant = find_station(station)
+    print_result(validate_file(plant, recording, preparation, out, html, reading), as_json=as_json)
 
 
 @app.command()
-def kpi(recording: RecordingOption, as_json: JsonOption = False) -> None:
+def kpi(
+    recording: RecordingOption,
+    station: StationCheckOption = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Print energy, starts, run time and volume of a recording, by day and in total."""
     from wetwell.protocols.recordings.kpi import kpis
-    from wetwell.protocols.recordings.recording import read_recording
     from wetwell.services.reports.tables import kpi_table
 
-    print_result(kpi_table(kpis(read_recording(recording)), with_hours=as_json), as_json=as_json)
+    reading, plant = Reading.said(time_zone, as_station=as_station), _station(station)
+    rows = reading.read(recording) if plant is None else reading.read_of(recording, plant)
+    print_result(kpi_table(kpis(rows), with_hours=as_json), as_json=as_json)
+
+
+def _station(name: str | None) -> "Station | None":
+    if name is None:
+        return None
+    from wetwell.services.stations import find_station  # brings the compiled simulator, which takes seconds
+
+    return find_station(name)

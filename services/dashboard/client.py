@@ -15,6 +15,7 @@ from wetwell.protocols.messages.message import MessageError, Number
 from wetwell.protocols.messages.readings import row_values
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import columns_of
+from wetwell.protocols.recordings.origin import Origin
 from wetwell.protocols.timestamps import to_iso
 
 ANSWER_S = 10.0
@@ -96,7 +97,7 @@ async def recording_pieces(bus: Bus, station: str, query: Mapping[str, str]) -> 
             if not time_ns:
                 raise RefusalError(404, "nothing was kept of that time")
             names = list(columns)
-            yield ",".join(["time", *names]) + "\n"
+            yield Origin(station=station).mark + ",".join(["time", *names]) + "\n"
         blank = [None] * len(time_ns)
         rows = zip(map(to_iso, time_ns), *(columns.get(name, blank) for name in names), strict=True)
         yield "".join(",".join("" if value is None else str(value) for value in row) + "\n" for row in rows)

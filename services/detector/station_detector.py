@@ -144,6 +144,7 @@ class StationDetector:
             time_ns=np.array(message.time, dtype=np.int64),
             seq=np.array(message.seq, dtype=np.int64),
             values=message.values(len(self._publishers)),
+            is_switched=np.zeros(len(message.time), dtype=bool),
             pumps=len(message.pumps),
             is_bad=message.quality == "bad",
         )

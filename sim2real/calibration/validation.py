@@ -93,7 +93,9 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
     free = Simulation(station, scenario, seed, int(recording.time_ns[0])).advance(seconds, truth=False)
     rows = np.minimum(time_s.astype(np.int64), seconds - 1)
     simulated = Recording(
-        time_ns=recording.time_ns, columns={name: values[rows] for name, values in free.columns.items()}
+        time_ns=recording.time_ns,
+        columns={name: values[rows] for name, values in free.columns.items()},
+        station=station.name,
     )
     known_level = np.isfinite(level_m)
     spread_m = float(np.ptp(level_m[known_level]))

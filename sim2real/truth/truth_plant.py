@@ -40,6 +40,7 @@ class Passage:
             time_ns=self._stamps_ns,
             columns=columns,
             truth=_truth_columns(self.case, self.made.around, self.station_record, self.pump_record) if truth else {},
+            station=self.case.station.name,
         )
 
     def oracle(self) -> Recording:
@@ -49,7 +50,7 @@ class Passage:
         station_record[kernel.LEVEL_READING] -= self.made.level_noise_m
         case = replace(self.case, station=station)
         columns = self._columns(case, station_record, np.random.default_rng(0))
-        return Recording(time_ns=self._stamps_ns, columns=columns)
+        return Recording(time_ns=self._stamps_ns, columns=columns, station=self.case.station.name)
 
     @property
     def _stamps_ns(self) -> Integers:

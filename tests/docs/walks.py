@@ -85,7 +85,7 @@ WALKS = (
     Walk(
         ("docs/fleet.md",),
         given="""mkdir -p stations && cp "$ROOT"/simulator/stations/alpha.toml stations/
-wetwell dataset --out set --count 2 --days 0.5
+wetwell dataset --station alpha --out set --count 2 --days 0.5
 wetwell simulate --station alpha --days 0.5 --seed 5 --out a.parquet
 printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
         before=("wetwell router",),

@@ -70,7 +70,7 @@ def cut(block, rng):
     first = 0
     while first < len(block.time_ns):
         last = first + int(rng.choice([1, 2, 100, 3000]))
-        yield Block(*(values[first:last] for values in block[:3]), *block[3:])
+        yield Block(*(values[first:last] for values in block[:4]), *block[4:])
         first = last
 
 

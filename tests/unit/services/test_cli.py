@@ -20,11 +20,20 @@ STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-
         (["station", "check", "{station}"], "{station}: sump.area_m2: got -8.0, input should be greater than 0"),
         (["station", "check", "nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory"),
         (["station", "check", "nosuch"], "station 'nosuch' is neither a file nor one of alpha"),
-        (["simulate", "--out", "{tmp}/x.txt"], "{tmp}/x.txt: a recording ends in one of .csv, .csv.gz, .parquet"),
-        (["simulate", "--out", "{tmp}/no/x.csv"], "{tmp}/no/x.csv: cannot be written: No such file or directory"),
-        (["simulate", "--out", "{tmp}/x.csv", "--days", "-1"], "--days: got -1, must be positive"),
         (
-            ["simulate", "--out", "{tmp}/x.csv", "--scenario", "{scenario}"],
+            ["simulate", "--station", "alpha", "--out", "{tmp}/x.txt"],
+            "{tmp}/x.txt: a recording ends in one of .csv, .csv.gz, .parquet",
+        ),
+        (
+            ["simulate", "--station", "alpha", "--out", "{tmp}/no/x.csv"],
+            "{tmp}/no/x.csv: cannot be written: No such file or directory",
+        ),
+        (
+            ["simulate", "--station", "alpha", "--out", "{tmp}/x.csv", "--days", "-1"],
+            "--days: got -1, must be positive",
+        ),
+        (
+            ["simulate", "--station", "alpha", "--out", "{tmp}/x.csv", "--scenario", "{scenario}"],
             "scenario 'wrong': fault[1].pump: got 9, station 'alpha' has 3 pumps",
         ),
         (
@@ -36,8 +45,14 @@ STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-
             ["station", "check", "{levels}"],
             "{levels}: station 's': effect[1]: threshold_shift: with start_m = -1.2, stop_m = 0: stop_levels_m[1]",
         ),
-        (["detect", "--recording", "{tmp}/no.csv", "--out", "{tmp}/v"], "{tmp}/no.csv: cannot be read: No such file"),
-        (["detect", "--recording", "{bad}", "--out", "{tmp}/v"], "{bad}: column 'pump1_flow_m3h', row 2: CSV conv"),
+        (
+            ["detect", "--station", "alpha", "--recording", "{tmp}/no.csv", "--out", "{tmp}/v"],
+            "{tmp}/no.csv: cannot be read: No such file",
+        ),
+        (
+            ["detect", "--station", "alpha", "--recording", "{bad}", "--out", "{tmp}/v"],
+            "{bad}: column 'pump1_flow_m3h', row 2: CSV conv",
+        ),
         (["convert", "{bad}", "--out", "{tmp}/v.csv"], "{bad}: column 'datetime' is missing, is this a SKAB file?"),
         (["convert", "{bad}"], "convert: give --mapping FILE and --out FILE, or --draft FILE"),
         (
@@ -70,9 +85,12 @@ STATION = 'name = "s"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-
             "dashboard.host: refuses to listen on 0.0.0.0, where others reach it",
         ),
         (["up", "--zenoh", "udp"], "settings: zenoh.endpoint: got 'udp', string should match pattern"),
-        (["export", "--data", "{tmp}/no", "--out", "{tmp}/x.csv"], "historian.folder: {tmp}/no: there is no history"),
         (
-            ["export", "--from", "soon", "--out", "{tmp}/x.csv"],
+            ["export", "--station", "alpha", "--data", "{tmp}/no", "--out", "{tmp}/x.csv"],
+            "historian.folder: {tmp}/no: there is no history",
+        ),
+        (
+            ["export", "--station", "alpha", "--from", "soon", "--out", "{tmp}/x.csv"],
             "--from: got 'soon', must be ISO 8601 such as 2025-01",
         ),
         (["history", "--last", "ever"], "--last: got 'ever', must be a time such as 90s, 10m or 2h"),
@@ -187,9 +205,9 @@ def test_simulate_then_detect(
     run_wetwell: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recording, verdicts = tmp_path / "r.parquet", tmp_path / "v.jsonl"
-    assert run_wetwell("simulate", "--days", "0.05", "--out", recording, "--json") == 0
+    assert run_wetwell("simulate", "--station", "alpha", "--days", "0.05", "--out", recording, "--json") == 0
     assert json.loads(capsys.readouterr().out)["rows"] == 4320
-    assert run_wetwell("detect", "--recording", recording, "--out", verdicts, "--json") == 0
+    assert run_wetwell("detect", "--station", "alpha", "--recording", recording, "--out", verdicts, "--json") == 0
     summary = json.loads(capsys.readouterr().out)
     lines = [json.loads(line) for line in verdicts.read_text().splitlines()]
     assert summary["counts"]["samples"] == 4320

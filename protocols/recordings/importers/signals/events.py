@@ -8,8 +8,8 @@ from zoneinfo import ZoneInfo
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.local_time import to_utc
 from wetwell.protocols.recordings.importers.refusals import Refusals
-from wetwell.protocols.recordings.importers.times.local_time import to_utc
 from wetwell.protocols.recordings.importers.times.stamps import Stamps
 from wetwell.protocols.timestamps import to_iso
 

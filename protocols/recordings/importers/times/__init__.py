@@ -1,1 +1,1 @@
-"""Stamps of an export: their form, and local time with daylight saving turned into UTC."""
+"""Stamps of an export, and their form."""

@@ -35,7 +35,7 @@ def test_two_recordings_give_one_report_whatever_the_number_of_workers(recording
     for workers in (1, 2):
         out = tmp_path / str(workers)
         arguments = [argument for path in recordings for argument in ("--recording", path)]
-        arguments += ["--detectors", "wetwell,paper_f_test", "--workers", workers, "--out", out]
+        arguments += ["--station", "alpha", "--detectors", "wetwell,paper_f_test", "--workers", workers, "--out", out]
         assert run_wetwell("backtest", *arguments) == 0
         result = json.loads((out / "backtest.json").read_text())
         for figures in result["detectors"].values():
@@ -60,7 +60,20 @@ def test_two_recordings_give_one_report_whatever_the_number_of_workers(recording
 
 
 def test_a_scenario_is_simulated_and_the_result_printed(run_wetwell, tmp_path, capsys):
-    arguments = ["--scenario", "nominal", "--seeds", 2, "--first-seed", 7, "--days", 0.3, "--workers", 1]
+    arguments = [
+        "--station",
+        "alpha",
+        "--scenario",
+        "nominal",
+        "--seeds",
+        2,
+        "--first-seed",
+        7,
+        "--days",
+        0.3,
+        "--workers",
+        1,
+    ]
     assert run_wetwell("backtest", *arguments, "--detectors", "always_normal", "--out", tmp_path, "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((tmp_path / "backtest.json").read_text())
@@ -75,10 +88,14 @@ def test_what_cannot_be_scored_is_said_in_one_line(alpha, run_wetwell, tmp_path,
     bare = tmp_path / "bare.csv"
     write_recording(replace(Simulation(alpha, SHORT, 1).advance(100), truth={}), bare)
     for arguments, said in (
-        (["--recording", bare], f"{bare}: column 'truth_pump1_state' is missing, so nothing can be scored"),
+        (
+            ["--station", "alpha", "--recording", bare],
+            f"{bare}: column 'truth_pump1_state' is missing, so nothing can be scored",
+        ),
+        (["--recording", bare], "backtest: give --station FILE with --recording and --scenario"),
         ([], "backtest: give at least one --recording, --scenario or --dataset"),
         (["--dataset", tmp_path], f"{tmp_path}/manifest.json: cannot be read"),
-        (["--recording", bare, "--detectors", "oracle"], "detector 'oracle' is none of"),
+        (["--station", "alpha", "--recording", bare, "--detectors", "oracle"], "detector 'oracle' is none of"),
     ):
         assert run_wetwell("backtest", *arguments, "--workers", 1, "--out", tmp_path / "out") == 2
         error = capsys.readouterr().err.strip()

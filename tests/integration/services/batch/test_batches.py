@@ -78,7 +78,16 @@ def test_a_backtest_leaves_out_what_cannot_be_scored_and_resumes(
     alpha, recordings, scheduler, tmp_path, monkeypatch, run_wetwell, capsys
 ):
     monkeypatch.chdir(recordings)
-    options = ["--recording", "bad.csv", "--recording", "good.parquet", "--detectors", "always_normal"]
+    options = [
+        "--station",
+        "alpha",
+        "--recording",
+        "bad.csv",
+        "--recording",
+        "good.parquet",
+        "--detectors",
+        "always_normal",
+    ]
     results = []
     for name, where in (("here", ["--workers", 1]), ("there", ["--scheduler", scheduler])):
         assert run_wetwell("backtest", *options, *where, "--out", tmp_path / name) == 1
@@ -103,7 +112,7 @@ def test_a_backtest_leaves_out_what_cannot_be_scored_and_resumes(
         "judge",
         lambda source, **more: judged.append(source.name) or real(source, **more),
     )
-    sources = sources_of(alpha, [recordings / "good.parquet"], [Scenario(name="new")], [1], 100, None)
+    sources = sources_of(alpha, [recordings / "good.parquet"], [Scenario(name="new")], [1], 100)
     result = write_backtest(sources, ["always_normal"], tmp_path / "there", 1)
     assert judged == ["new, seed 1"]
     assert result["detectors"]["always_normal"]["recordings"] == 2
@@ -118,7 +127,17 @@ def test_diagnoses_are_those_of_single_recordings_and_a_bad_one_is_told(
     (recordings / "table.csv").write_text("station_file,recording\nwrong.toml,other.csv\n")
     monkeypatch.chdir(recordings)
     arguments = ["--recording", "good.parquet", "--recording", "bad.csv", "--recordings", "table.csv"]
-    arguments += ["--only", "friction_bias", "--json", "--scheduler", scheduler, "--out", tmp_path / "there"]
+    arguments += [
+        "--station",
+        "alpha",
+        "--only",
+        "friction_bias",
+        "--json",
+        "--scheduler",
+        scheduler,
+        "--out",
+        tmp_path / "there",
+    ]
     assert run_wetwell("gap", "diagnose", *arguments) == 1
     result = json.loads(capsys.readouterr().out)
     diagnose_file(alpha, recordings / "good.parquet", tmp_path / "here", only=["friction_bias"])
@@ -161,7 +180,7 @@ def test_a_task_that_kills_its_process_is_one_failure(where):
 
 
 def test_what_cannot_be_a_scheduler_is_one_line(tmp_path, monkeypatch, run_wetwell, capsys):
-    assert run_wetwell("dataset", "--out", tmp_path / "set", "--scheduler", "here") == 2
+    assert run_wetwell("dataset", "--station", "alpha", "--out", tmp_path / "set", "--scheduler", "here") == 2
     said = "--scheduler: got 'here', must be tcp://HOST:PORT, tls://HOST:PORT or local"
     assert capsys.readouterr().err.splitlines() == [f"wetwell: {said}"]
     monkeypatch.setattr(executors, "CONNECT_S", 0.5)

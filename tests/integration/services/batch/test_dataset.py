@@ -139,9 +139,13 @@ def test_a_file_outside_of_the_folder_is_not_read(folder) -> None:
     ("arguments", "said"),
     [
         (["dataset"], "dataset: give either --out DIR or --check DIR"),
+        (["dataset", "--out", "{tmp}/d"], "dataset: give at least one --station FILE"),
         (["dataset", "--check", "{tmp}"], "{tmp}/manifest.json: cannot be read: No such file or directory"),
-        (["dataset", "--out", "{tmp}/file"], "{tmp}/file: cannot be written: File exists"),
-        (["dataset", "--out", "{tmp}/d", "--days", "0.1"], "an item must be at least 0.292 days long, got 0.100"),
+        (["dataset", "--station", "alpha", "--out", "{tmp}/file"], "{tmp}/file: cannot be written: File exists"),
+        (
+            ["dataset", "--station", "alpha", "--out", "{tmp}/d", "--days", "0.1"],
+            "an item must be at least 0.292 days long, got 0.100",
+        ),
         (["dataset", "--out", "{tmp}/d", "--station", "none"], "station 'none' is neither a file nor one of alpha"),
     ],
 )
@@ -152,7 +156,17 @@ def test_an_error_is_one_line(run_wetwell, tmp_path, capsys, arguments: list[str
 
 
 def test_ctrl_c_ends_with_130_leaves_no_half_file_and_resumes(tmp_path) -> None:
-    command = [sys.executable, "-m", "wetwell.services", "dataset", "--out", str(tmp_path), *OPTIONS]
+    command = [
+        sys.executable,
+        "-m",
+        "wetwell.services",
+        "dataset",
+        "--station",
+        "alpha",
+        "--out",
+        str(tmp_path),
+        *OPTIONS,
+    ]
     journal = tmp_path / "manifest.part.jsonl"
     deadline = time.monotonic() + 60
     with subprocess.Popen(

@@ -246,6 +246,7 @@ def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkey
     assert recording.column("pump1_running")[-1] == 1.0
     assert recording.column("level_m").tolist() == [1.25] * rows
     assert not recording.ignored
+    assert recording.station == "alpha"
 
 
 def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_path) -> None:

@@ -46,7 +46,7 @@ def rest(alpha):
     recording = Simulation(alpha, find_scenario("paper"), 7).advance(SEEN + 7200, truth=False)
     for block in blocks(recording, len(alpha.pump)):
         is_new = block.seq >= SEEN
-        yield Block(*(column[is_new] for column in block[:3]), *block[3:])
+        yield Block(*(column[is_new] for column in block[:4]), *block[4:])
 
 
 def test_each_form_has_its_upgrade():

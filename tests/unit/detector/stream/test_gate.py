@@ -19,6 +19,7 @@ from wetwell.detector.stream.gate import (
     let_through,
     new_gate,
 )
+from wetwell.detector.stream.sampling_steps import new_sampling_steps
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import FIRST_PUMP, PUMP_VALUES
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
@@ -62,7 +63,7 @@ class Gate:
     """The compiled gate, a sample at a time."""
 
     def __init__(self, datasheet):
-        self.state, self.ranges = new_gate(), gate_ranges(datasheet)
+        self.state, self.steps, self.ranges = new_gate(), new_sampling_steps(), gate_ranges(datasheet)
         self.values = np.full(FIRST_PUMP + PUMP_VALUES * datasheet.pumps, math.nan)
         self.live = LiveBlock(datasheet.pumps)
 
@@ -74,7 +75,7 @@ class Gate:
         """Frame of a sample, or None where it is dropped."""
         block = self.live.fill(sent)
         told = block.time_ns[0], block.seq[0], block.values[0], block.pumps, block.is_bad
-        if not let_through(self.state[0], self.ranges, *told, self.values):
+        if not let_through(self.state[0], self.steps, self.ranges, *told, self.values):
             return None
         pumps = (
             PumpFrame(*readings, None if math.isnan(running) else running > 0.0)
@@ -208,10 +209,42 @@ def test_wild_stamps_that_disagree_are_not_followed(gate):
 
 def test_a_gap_is_told_and_counted(gate):
     gate.update(sample(0))
-    assert gate.update(sample(10)).gap_s == 10.0
+    gate.update(sample(1))
+    assert gate.update(sample(11)).gap_s == 10.0
     assert gate.counts["gaps"] == 0
-    assert gate.update(sample(21)).gap_s == 11.0
+    assert gate.update(sample(22)).gap_s == 11.0
     assert gate.counts["gaps"] == 1
+
+
+@pytest.mark.parametrize("period_s", [10, 60, 300, 900])
+def test_a_slow_feed_has_gaps_where_it_lacks_samples(gate, period_s):
+    seconds = [n * period_s for n in (*range(10), 13, *range(14, 20))]
+    assert None not in [gate.update(sample(second)) for second in seconds]
+    assert gate.counts == {"samples": len(seconds), "gaps": 1, "lost": gate.counts["lost"]}
+
+
+@pytest.mark.parametrize("period_s", [60, 900])
+def test_what_a_slow_feed_calls_the_future_is_some_steps_away(gate, period_s):
+    for n in range(10):
+        gate.update(sample(n * period_s, seq=n))
+    assert gate.update(sample(21 * period_s, seq=10)) is None
+    assert gate.counts["future"] == 1
+    assert gate.update(sample(10 * period_s, seq=11)) is not None
+
+
+@pytest.mark.parametrize("period_s", [60, 900])
+def test_a_clock_of_a_slow_feed_that_was_set_is_followed(gate, period_s):
+    for n in range(10):
+        gate.update(sample(n * period_s, seq=n))
+    later = [gate.update(sample((10 + n) * period_s + 240 * HOUR_S, seq=10 + n)) for n in range(CONFIRMATIONS)]
+    assert [frame is None for frame in later] == [True] * (CONFIRMATIONS - 1) + [False]
+
+
+def test_a_feed_that_becomes_slow_is_followed(gate):
+    for second in range(100):
+        gate.update(sample(second))
+    frames = [gate.update(sample(100 + 900 * n)) for n in range(1, 9)]
+    assert [frame is None for frame in frames] == [True, True, True, *[False] * 5]
 
 
 def test_lost_samples_are_counted_by_seq_and_a_restart_is_no_loss(gate):

@@ -18,7 +18,7 @@ def feed(sensors, *, level_m, flow_m3h, head_m, is_learning=False, is_running=Tr
     pumps["is_learning"], pumps["is_running"] = is_learning, is_running
     for second, (level, flow, head) in enumerate(zip(level_m, flow_m3h, head_m, strict=True)):
         frame = np.array([level, NAN, 50.0, flow, head, NAN, float(is_running)])
-        watch_sensors(sensors, second * NS_PER_S, 1.0, frame, pumps)
+        watch_sensors(sensors, second * NS_PER_S, 1.0, 1.0, frame, pumps)
         bits = sum(int(is_stuck) << bit for bit, is_stuck in enumerate(sensors["is_stuck"]))
         stuck.append(set(stuck_names(0, bits)))
         if is_running:

@@ -1,6 +1,8 @@
 """Station and kind of values that travel with a recording."""
 
+import duckdb
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
@@ -44,6 +46,20 @@ def test_the_first_line_of_a_csv_is_a_comment(tmp_path):
     path = tmp_path / "r.csv"
     write_recording(Recording(**ROWS, station="north", value="mean"), path)
     assert path.read_text(encoding="utf-8").splitlines()[0] == "# wetwell station=north value=mean"
+
+
+def test_a_spreadsheet_may_have_saved_the_first_line(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("\ufeff# wetwell station=north,\ntime,pump1_flow_m3h\n2025-01-31T06:00:00Z,1\n", encoding="utf-8")
+    assert read_recording(path).station == "north"
+
+
+def test_other_readers_pass_over_the_first_line(tmp_path):
+    path = tmp_path / "r.csv"
+    write_recording(Recording(**ROWS, station="north"), path)
+    assert pd.read_csv(path, comment="#")["pump1_flow_m3h"].tolist() == [1.0, 2.0]
+    values = duckdb.read_csv(str(path), comment="#").select("pump1_flow_m3h").fetchall()
+    assert values == [(1.0,), (2.0,)]
 
 
 def test_rows_are_counted_from_the_header_on(tmp_path):

@@ -33,16 +33,16 @@ def same(first: Recording, second: Recording) -> bool:
 
 @pytest.mark.parametrize("suffix", ["csv", "csv.gz", "parquet"])
 def test_what_was_imported_is_exported_and_doubles_are_left_out(tmp_path: Path, suffix: str) -> None:
-    source, out = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
-    write_recording(recording(), source)
+    source, out = Path("a.parquet"), tmp_path / f"b.{suffix}"
     store = FolderStore(tmp_path / "history")
-    assert import_recording(store, "alpha", source) == (432, 432)
-    assert import_recording(store, "alpha", source) == (432, 0)
+    assert import_recording(store, "alpha", recording(), source) == (432, 432)
+    assert import_recording(store, "alpha", recording(), source) == (432, 0)
     while store.maintain(START_NS + 9 * DAY_NS):
         pass
-    assert import_recording(store, "alpha", source) == (432, 0)
+    assert import_recording(store, "alpha", recording(), source) == (432, 0)
     assert export_recording(store, "alpha", START_NS, START_NS + 3 * DAY_NS, out) == 432
     assert same(read_recording(out), recording())
+    assert read_recording(out).station == "alpha"
     assert export_recording(store, "alpha", START_NS + DAY_NS, START_NS + 2 * DAY_NS, out) == 144
     with pytest.raises(ConfigError, match="station 'beta': no samples"):
         export_recording(store, "beta", START_NS, START_NS + DAY_NS, out)
@@ -50,9 +50,8 @@ def test_what_was_imported_is_exported_and_doubles_are_left_out(tmp_path: Path, 
 
 
 def test_a_daily_file_is_a_recording(tmp_path: Path) -> None:
-    write_recording(recording(), tmp_path / "a.parquet")
     store = FolderStore(tmp_path / "history")
-    import_recording(store, "alpha", tmp_path / "a.parquet")
+    import_recording(store, "alpha", recording(), tmp_path / "a.parquet")
     assert store.maintain(START_NS + 9 * DAY_NS) is not None
     filed = read_recording(store.archive.path("samples", "alpha", START_NS))
     assert len(filed) == 144
@@ -63,11 +62,10 @@ def test_a_daily_file_is_a_recording(tmp_path: Path) -> None:
 def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
     store = FolderStore(tmp_path / "history")
     far = Recording(time_ns=np.array([2**63 - 2]), columns={"pump1_flow_m3h": np.zeros(1)})
-    write_recording(far, tmp_path / "far.parquet")
     with pytest.raises(RecordingError, match="column 'time': lies too far from 1970"):
-        import_recording(store, "alpha", tmp_path / "far.parquet")
+        import_recording(store, "alpha", far, Path("far.parquet"))
     with pytest.raises(ConfigError, match=r"--station: got '\.\./alpha', must be a name"):
-        import_recording(store, "../alpha", tmp_path / "far.parquet")
+        import_recording(store, "../alpha", far, Path("far.parquet"))
     assert store.stations() == []
     store.close()
 
