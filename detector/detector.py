@@ -25,8 +25,9 @@ class Detector:
     Gate, pump runs, learning, and for each run the probability of {normal, pump, system, both, wrong meter} from how
     far the level residuals lie from the learnt baseline, with the drawdown of the wet well and the power as further
     witnesses where they are measured. A verdict comes at the end of each run, when a state changes, and once for
-    each pump when the first sample comes. Without flow, head and frequency no state can be told: the verdict is
-    `unknown` and names what is missing.
+    each pump when the first sample comes. Without flow or frequency no state can be told: the verdict is
+    `unknown` and names what is missing. Without head the main's datasheet says what the pump lifts: that pump or main
+    has moved shows in each run, which of them when several pumps of the main have run.
 
     Memory: the segments of at most a day of learning, then the steady samples of one run. Warm-up: six hours of
     station time.
@@ -115,6 +116,7 @@ class Detector:
         """Learn a pump (from 0) anew; what was learnt before is put aside and can be taken back."""
         self._judges[pump].memory.rebaseline(self._runs.seen_s)
         self._runs.begin_anew(pump, is_learning=True)
+        self._runs.set_lacking_head(pump, lacks_head=False)
         self._systems[self._datasheet.main_of_pump[pump]] = SystemPrior()
         return self._told(pump, now_ns, "re-baselined by an operator")
 
@@ -123,6 +125,8 @@ class Detector:
         if not self._judges[pump].memory.revert():
             return self._told(pump, now_ns, "no baseline was put aside")
         self._runs.begin_anew(pump, is_learning=False)
+        reference = self._judges[pump].memory.reference
+        self._runs.set_lacking_head(pump, lacks_head=reference is not None and reference.baseline.lacks_head)
         return self._told(pump, now_ns, "baseline taken back by an operator")
 
     def _judged(self, stop: int) -> list[Verdict]:
@@ -140,6 +144,7 @@ class Detector:
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         judge = self._judges[run.pump]
         judgement = judge.judge(run, time_ns, self._system(run.pump), [each.memory for each in self._judges])
+        self._runs.set_lacking_head(run.pump, lacks_head=judge.does_without_head(run))
         self._runs.set_learning(run.pump, is_learning=judge.memory.reference is None)
         return self._verdict(run.pump, time_ns, judgement)
 

@@ -37,6 +37,12 @@ from wetwell.protocols.messages.verdict import State
 EARLY_PROBABILITY = 0.999
 EARLY_SEGMENTS = 2
 NOISE_WEIGHT = 0.05
+CAUSE_OF: Mapping[str, tuple[State, ...]] = {
+    "speed_loss_percent": ("pump_fault", "pump_and_system_fault", "unknown"),
+    "friction_rise_percent": ("system_fault", "pump_and_system_fault", "unknown"),
+    "static_head_rise_m": ("system_fault", "pump_and_system_fault", "unknown"),
+}
+"""States in which a severity is told that may stand for all that a pump without a head sensor shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +108,8 @@ class PumpJudge:
         wrong = silencing_sensors(run, memory.reference)
         if wrong:
             return self._sensor_fault(run, evidence | wrong)
+        if run.lacks_head and "head_m" not in run.missing:
+            evidence["remark"] = "the head is measured now, and is not used: re-baseline the pump"
         if memory.learning is not None:
             self._learn(run, memory.learning, time_ns, station)
         rng = _generator(run)
@@ -112,6 +120,19 @@ class PumpJudge:
             evidence["reason"] = hidden or (memory.learning.reason if memory.learning is not None else "")
             return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
         return self._compare(run, memory.reference, system, evidence, rng)
+
+    def does_without_head(self, run: Run) -> bool:
+        """Whether what comes after a run is judged without a head sensor.
+
+        So it is where flow and frequency are measured, and no run of the pump has had a head so far; to the end of
+        the baseline that is learnt then. A head that comes while it is being learnt begins the learning anew.
+        """
+        memory, has_head = self.memory, "head_m" not in run.missing
+        if run.lacks_head and has_head and memory.learning is not None:
+            memory.learning = Learning()
+            return False
+        is_new = memory.reference is None and memory.offset_m is None
+        return run.lacks_head or (is_new and run.missing & NEEDED == {"head_m"})
 
     def segments_since_change(self, last: Segments) -> int:
         """Segments of the open run since a change that is worth a look, by the last of them; 0 without one."""
@@ -148,7 +169,7 @@ class PumpJudge:
         memory.tell(state, run.window_ns, onset_component(state))
         memory.recent.pop()
         evidence |= run_evidence(run, self._datasheet, rng)
-        evidence["index"] = memory.limits.figures(run.segments, reference.baseline, rng)
+        evidence |= self._index(run, reference, rng)
         evidence |= self._consequences(run, reference, posterior, posterior.by_state(), state, remark)
         return self._judgement(run.window_ns, posterior.by_state(), evidence)
 
@@ -216,7 +237,7 @@ class PumpJudge:
         """Judge a run by what was learnt."""
         memory = self.memory
         posterior = self._posterior(run, reference, system, evidence)
-        update_prior(posterior.probability, memory.prior, system)
+        update_prior(posterior.probability, memory.prior, system, lacks_head=run.lacks_head)
         state, remark = decide(posterior, float(median(run.head_m)))
         memory.recent.append((sum(run.window_ns) // 2, posterior.shift_m))
         wrong = doubtful_sensors(run, reference)
@@ -224,7 +245,7 @@ class PumpJudge:
         if wrong and state not in FAULT_STATES:
             state, remark = "sensor_fault", in_words(wrong)
         memory.tell(state, run.window_ns, onset_component(state))
-        evidence["index"] = memory.limits.figures(run.segments, reference.baseline, rng)
+        evidence |= self._index(run, reference, rng)
         if state == "normal":
             baseline = reference.baseline.with_noise_of(run.segments, NOISE_WEIGHT, self._curve[0])
             memory.reference = replace(reference, baseline=baseline)
@@ -234,6 +255,12 @@ class PumpJudge:
             probability |= {"normal": 0.0, "sensor_fault": probability["normal"] + probability["sensor_fault"]}
         evidence |= self._consequences(run, reference, posterior, probability, state, remark)
         return self._judgement(run.window_ns, probability, evidence)
+
+    def _index(self, run: Run, reference: HealthyReference, rng: np.random.Generator) -> dict[str, Any]:
+        """The paper's index of a run against its limits; nothing without a head sensor."""
+        if run.lacks_head:
+            return {}
+        return {"index": self.memory.limits.figures(run.segments, reference.baseline, rng)}
 
     def _posterior(
         self, run: Run, reference: HealthyReference, system: SystemPrior, evidence: dict[str, Any]
@@ -261,8 +288,11 @@ class PumpJudge:
         power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
         run_share = run.run_s / max(run.seen_s, 1.0)
         wasted_kwh = power_kw * 24.0 * run_share * max(1.0 - flow_m3h / max(healthy_m3h, 1e-9), 0.0)
+        figures = severity(posterior.shift_m, posterior.deviation_m, self._curve, flow_m3h, friction_m)
+        if run.lacks_head:  # each as if it were the only cause
+            figures = {name: figure for name, figure in figures.items() if state in CAUSE_OF[name]}
         return {
-            "severity": severity(posterior.shift_m, posterior.deviation_m, self._curve, flow_m3h, friction_m),
+            "severity": figures,
             "advice": advice(state, remark),
             "cost": expected_costs(probability, wasted_kwh, self._costs),
         }
@@ -281,4 +311,6 @@ def _generator(run: Run) -> np.random.Generator:
 
 
 def _missing_reason(lacking: list[str]) -> str:
+    if lacking == ["head_m"]:
+        return "without head_m the next runs are judged by flow, speed and the datasheet of the main"
     return f"without {', '.join(lacking)} pump and system cannot be told apart"

@@ -25,6 +25,8 @@ SPREAD_SHARE = 0.01
 """Operating points that lie closer together than this share of the flow say nothing of slopes."""
 MAX_CORRELATION = 0.95
 OUTLIER_SIGMAS = 3.0
+ROUNDING_M = 1e-9
+"""Residual of a head that was worked out from the curve itself, at the most."""
 LEAST_NOISE_SHARE = 1e-4
 """Least noise of a segment, as a share of the shut-off head: readings without any are rounded, not perfect."""
 
@@ -107,6 +109,11 @@ class Baseline:
     def total_m3h(self) -> float:
         """Flow of the main where it was learnt."""
         return float(np.sqrt(self.system.origin[0]))
+
+    @property
+    def lacks_head(self) -> bool:
+        """Whether it was learnt without a head sensor: then the main takes what its datasheet says, to the digit."""
+        return abs(float(self.system.mean[0])) < ROUNDING_M
 
     def shifts(self, segments: Segments) -> Floats:
         """(m, 2) distance of segments from what the baseline expects at their operating points. [m]."""

@@ -28,7 +28,7 @@ class Observation:
     ----------
     mean : (4,) array
         Shift of (r_p, r_s) in m, and of the logarithms of metered flow over drawdown flow and of the power; NaN where
-        it is not known.
+        it is not known, as r_s without a head sensor.
     covariance : (4, 4) array
         Of that mean if nothing has changed: noise, scatter between runs, and what the slopes may be wrong by over the
         way that the flow of a healthy pump goes.
@@ -37,6 +37,9 @@ class Observation:
     flow_meter, head_sensor : (4,) arrays
         Change of the mean with the relative error of the flow meter, and with a metre that the head sensor reads too
         much.
+    system_in_pump : float
+        What a metre of r_s adds to r_p: nothing where the head is measured. Without a head sensor the head comes from
+        the datasheet of the main, and r_p is $r_p - r_s / N^2$ of the pump as it is. [1]
     """
 
     mean: Floats
@@ -44,6 +47,7 @@ class Observation:
     slope_variance: Floats
     flow_meter: Floats
     head_sensor: Floats
+    system_in_pump: float = 0.0
 
     @property
     def sigmas(self) -> Floats:
@@ -88,13 +92,23 @@ def observe(run: Run, reference: HealthyReference, curve: Curve, friction_h2_m5:
     covariance[POWER, POWER] = reference.power.variance
     speed_ratio = float(median(segments.speed_ratio))
     direction = flow_meter_direction(flow_m3h, flow_m3h * speed_ratio, total_m3h, curve, friction_h2_m5)
+    head_direction = head_sensor_direction(speed_ratio)
+    mean_m = median(shifts_m)
+    system_in_pump = 0.0
+    if run.lacks_head:
+        system_in_pump = -1.0 / speed_ratio**2
+        direction[PUMP] += system_in_pump * direction[SYSTEM]
+        direction[SYSTEM] = direction[PUMP] / system_in_pump  # of the main, if it were the cause
+        head_direction[:] = 0.0
+        mean_m[SYSTEM] = np.nan
     drawdown, power = run.log_ratio - reference.drawdown.mean, log_power(run) - reference.power.mean
     return Observation(
-        mean=np.array([*median(shifts_m), drawdown, power]),
+        mean=np.array([*mean_m, drawdown, power]),
         covariance=covariance,
         slope_variance=slope_variance,
         flow_meter=np.array([*direction, 1.0, 0.0]),
-        head_sensor=np.array([*head_sensor_direction(speed_ratio), 0.0, 0.0]),
+        head_sensor=np.array([*head_direction, 0.0, 0.0]),
+        system_in_pump=system_in_pump,
     )
 
 

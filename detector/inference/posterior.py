@@ -38,6 +38,7 @@ RISING_SHARE = 0.9
 """Of system faults: the main takes more head. One that takes less may have burst."""
 
 
+_FAULTS = [PUMP_FAULT, SYSTEM_FAULT, BOTH]
 _CAUSES = (PUMP_FAULT, SYSTEM_FAULT, BOTH, FLOW_METER, HEAD_SENSOR)
 _HYPOTHESES = np.array([NORMAL, *_CAUSES * len(SCALES)])
 _LOG_SCALE = np.where(_HYPOTHESES == NORMAL, 0.0, -np.log(len(SCALES)))
@@ -102,6 +103,8 @@ def _ways(observation: Observation, scales: Scales, known: Flags) -> tuple[Integ
     pump[:, PUMP, PUMP], pump[:, SYSTEM, SYSTEM] = scale * tau_p, v_s
     system[:, PUMP, PUMP], system[:, SYSTEM, SYSTEM] = v_p, scale * tau_s
     both[:, PUMP, PUMP], both[:, SYSTEM, SYSTEM] = scale * tau_p + v_p, scale * tau_s + v_s
+    for fault in (system, both):
+        fault[:, PUMP, PUMP] += scale * tau_s * observation.system_in_pump**2
     scale = scale[:, np.newaxis, np.newaxis]
     flow[:] = scale * FLOW_METER_ERROR**2 * np.outer(observation.flow_meter, observation.flow_meter)
     head[:] = scale * scales.head_m**2 * np.outer(observation.head_sensor, observation.head_sensor)
@@ -147,7 +150,8 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
     all components, and S how usual the sign of the shift is. Each τ stands for large and for small shifts,
     weighed alike. The power may follow the load or not, or drift: it tells a wrong meter from a fault, but no fault
     from health. In a few runs the drawdown is disturbed by something else and says nothing. Components that are not
-    known are left out.
+    known are left out. Without a head sensor a run says that pump or main has moved, and not which: all faults are as
+    likely as that of the pump, and the prior, with what the other pumps of the main have met, tells them apart.
 
     Parameters
     ----------
@@ -160,7 +164,6 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
     """
     known = np.isfinite(observation.mean) & np.isfinite(np.diag(observation.covariance))
     mean = observation.mean[known]
-    tau_p, tau_s = scales.pump_m**2, scales.system_m**2
     hypotheses, log_share, spread = _ways(observation, scales, known)
     every = spread[:, known][:, :, known] + observation.covariance[np.ix_(known, known)]
     _, log_determinant = np.linalg.slogdet(every)
@@ -169,16 +172,16 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
     is_of = hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis]
     log_likelihood = _log_sums(np.where(is_of, log_each, -np.inf))
     inverse = inverse[is_of.argmax(axis=1)]
-    rows = [int(known[:component].sum()) for component in (PUMP, SYSTEM)]
-    estimates = np.array([tau_p, tau_s]) * (inverse[BOTH] @ mean)[rows]
-    variances = np.array([tau_p, tau_s]) - np.array([tau_p, tau_s]) ** 2 * np.diag(inverse[BOTH])[rows]
-    deviations = np.sqrt(np.maximum(variances, 1e-300))
+    estimates, deviations = _shifts(observation, scales, inverse, mean)
     is_losing, is_rising = ndtr(-estimates[PUMP] / deviations[PUMP]), ndtr(estimates[SYSTEM] / deviations[SYSTEM])
     usual_pump = 2.0 * (LOSING_SHARE * is_losing + (1.0 - LOSING_SHARE) * (1.0 - is_losing))
     usual_system = 2.0 * (RISING_SHARE * is_rising + (1.0 - RISING_SHARE) * (1.0 - is_rising))
     log_weight = np.log(prior) + log_likelihood
     log_weight[[PUMP_FAULT, BOTH]] += np.log(usual_pump)
     log_weight[[SYSTEM_FAULT, BOTH]] += np.log(usual_system)
+    if not known[SYSTEM]:
+        log_weight[HEAD_SENSOR] = -np.inf
+        log_weight[_FAULTS] = (np.log(prior) + log_likelihood[PUMP_FAULT])[_FAULTS] + np.log(usual_pump)
     weight = np.exp(log_weight - log_weight.max())
     is_watched = bool(observation.covariance[DRAWDOWN, DRAWDOWN] < FLOW_TRUST**2)
     flow_error, flow_deviation = _meter_error(
@@ -197,6 +200,21 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
         flow_deviation=flow_deviation,
         head_deviation_m=head_deviation_m,
     )
+
+
+def _shifts(observation: Observation, scales: Scales, inverse: Floats, mean: Floats) -> tuple[Floats, Floats]:
+    """Estimates of the shifts of (r_p, r_s) if both may have moved, and their standard deviations. [m].
+
+    Without a head sensor: of each as if it had moved alone.
+    """
+    tau = np.array([scales.pump_m**2, scales.system_m**2])
+    if observation.system_in_pump == 0.0:
+        estimates, shares = (inverse[BOTH] @ mean)[: SYSTEM + 1], np.diag(inverse[BOTH])[: SYSTEM + 1]
+    else:
+        gains = np.array([1.0, observation.system_in_pump])
+        alone = inverse[[PUMP_FAULT, SYSTEM_FAULT]]
+        estimates, shares = gains * (alone @ mean)[:, PUMP], gains**2 * alone[:, PUMP, PUMP]
+    return tau * estimates, np.sqrt(np.maximum(tau - tau**2 * shares, 1e-300))
 
 
 def _meter_error(direction: Floats, prior_variance: float, inverse: Floats, mean: Floats) -> tuple[float, float]:

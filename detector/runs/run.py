@@ -63,6 +63,8 @@ class Run:
         Number of pumps that ran in its last segment without a signal.
     step_s : float
         Usual step of the feed; 0 where it is not known. [s]
+    lacks_head : bool
+        Whether `head_m` is what the main takes by the datasheet, in place of a reading.
     """
 
     pump: int
@@ -82,3 +84,4 @@ class Run:
     seen_s: float = 0.0
     running: int = 0
     step_s: float = 0.0
+    lacks_head: bool = False

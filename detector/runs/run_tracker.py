@@ -128,6 +128,10 @@ class RunTracker:
         """Say whether a pump is being learnt: then there are no looks at its open runs."""
         self.state.pumps["is_learning"][pump] = is_learning
 
+    def set_lacking_head(self, pump: int, *, lacks_head: bool) -> None:
+        """Say whether a pump is judged without a head sensor, from its next sample on."""
+        self.state.lacks_head[pump] = lacks_head
+
     def begin_anew(self, pump: int, *, is_learning: bool) -> None:
         """Forget what the open run has shown under another baseline."""
         self.set_learning(pump, is_learning=is_learning)
@@ -200,6 +204,7 @@ class RunTracker:
             seen_s=float(self.state.gate["seen_s"][0]),
             running=int(self.state.missing_signals["running"][pump]),
             step_s=self._step_s,
+            lacks_head=bool(self.state.lacks_head[pump]),
         )
 
     def _steady_of(self, pump: int) -> Records:

@@ -47,5 +47,5 @@ def noisy_sensors(run: Run, healthy: Floats) -> Mapping[str, float]:
     return {
         name: round(float(factor), 1)
         for name, factor in zip(("flow_m3h", "head_m"), factors, strict=True)
-        if factor > NOISY_FACTOR
+        if factor > NOISY_FACTOR and name not in run.missing
     }

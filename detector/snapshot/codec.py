@@ -49,6 +49,8 @@ _FIELDS: Mapping[str, Mapping[str, str]] = {
     "PumpRecord": {"known": "reference", "belief": "prior", "blind": "missing_signals"},
 }
 """Of these classes, by stored name, where the name is another now."""
+_ADDED: Mapping[str, Mapping[str, Any]] = {"PumpBelief": {"pump_if_system": None}}
+"""Fields that snapshots of form 2 may lack, and what stands for them then."""
 _STORED_FIELDS = {name: {new: old for old, new in fields.items()} for name, fields in _FIELDS.items()}
 _ARRAYS: Mapping[str, str] = {
     "pace": "sampling_period",
@@ -206,9 +208,10 @@ def _array(content: list[Any], _datasheet: Datasheet) -> Any:
 def _object(content: list[Any], datasheet: Datasheet) -> Any:
     name, stored = content
     fields = {_FIELDS.get(name, {}).get(field, field): value for field, value in stored.items()}
-    lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys()
+    lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys() - _ADDED.get(name, {}).keys()
     if lacking:
         raise ValueError(f"a {name} without {', '.join(sorted(lacking))}")
+    fields = {**_ADDED.get(name, {}), **fields}
     made: Any = object.__new__(_CLASSES[name])
     for field, value in fields.items():
         object.__setattr__(made, field, _decoded(value, datasheet))

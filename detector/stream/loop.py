@@ -62,6 +62,7 @@ def process_samples(
     moments: Floats,
     counts: Integers,
     sampling_steps: Floats,
+    lacks_head: Integers,
 ) -> tuple[int, int]:
     """Row of a block to go on at and why the loop stops, from a row and a stop on; changes the `StreamState`."""
     state, period = gate[0], sampling_period[0]
@@ -82,9 +83,9 @@ def process_samples(
             if count_steady(pumps) + pumps.shape[0] > steady_samples.shape[0]:
                 return row, Stop.ROOM_FULL.value
             stop = Stop.RUN_BLIND.value
-            if collect(table, pumps, now_ns, frame, is_switched[row], steady_samples):
+            if collect(table, pumps, now_ns, frame, is_switched[row], lacks_head, steady_samples):
                 return row, stop
-        watched = now_ns, state["gap_s"], sampling_steps[USUAL], frame, is_switched[row]
+        watched = now_ns, state["gap_s"], sampling_steps[USUAL], frame, is_switched[row], lacks_head
         if stop <= Stop.RUN_BLIND and _watch(table, stuck_sensors, missing_signals, *watched, pumps):
             return row, Stop.SEGMENT_GATHERED.value
         segment_samples = period["segment_samples"]
@@ -105,11 +106,12 @@ def _watch(
     usual_s: float,
     frame: Floats,
     is_switched: bool,
+    lacks_head: Integers,
     pumps: Any,
 ) -> bool:
     """Look at the readings by themselves; whether there is a full segment of a pump without head."""
     watch_sensors(stuck_sensors, now_ns, gap_s, usual_s, frame, pumps)
-    is_full: bool = gather_segments(table, missing_signals, now_ns, gap_s, frame, is_switched, pumps)
+    is_full: bool = gather_segments(table, missing_signals, now_ns, gap_s, frame, is_switched, lacks_head, pumps)
     return is_full
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.detector.stream.gate import seconds_between
 from wetwell.detector.stream.run_state import WARM_UP_NS
 from wetwell.detector.stream.steady_samples import SEGMENT_S, SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats, Records
+from wetwell.protocols.arrays import Floats, Integers, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_METERS, PUMP_VALUES
 
@@ -33,9 +33,10 @@ def gather_segments(
     gap_s: float,
     frame: Floats,
     is_switched: bool,
+    lacks_head: Integers,
     pumps: Any,
 ) -> bool:
-    """Gather the readings of pumps that run, are being learnt, and lack flow, head or frequency.
+    """Gather the readings of pumps that run, are being learnt, and lack what they are judged by.
 
     Parameters
     ----------
@@ -45,6 +46,8 @@ def gather_segments(
         A sample that has passed the gate.
     is_switched : bool
         Whether a pump may have started or stopped within the interval that the sample stands for.
+    lacks_head : (pumps,) int64
+        Whether a pump is judged without a head sensor.
     pumps : (pumps,) records
         `is_running` and `is_learning` are read.
 
@@ -57,7 +60,8 @@ def gather_segments(
     for number in range(pumps.shape[0]):
         segment, at = missing_signals[number], FIRST_PUMP + PUMP_VALUES * number
         segment["is_full"] = 0
-        is_seen = not math.isnan(frame[at + FREQUENCY] + frame[at + FLOW] + frame[at + HEAD])
+        is_seen = not math.isnan(frame[at + FREQUENCY] + frame[at + FLOW])
+        is_seen = is_seen and (lacks_head[number] != 0 or not math.isnan(frame[at + HEAD]))
         if is_seen or not pumps[number]["is_running"] or not pumps[number]["is_learning"]:
             continue
         running = 0

@@ -7,7 +7,7 @@ import numpy as np
 
 from wetwell.detector.curves.datasheet import Datasheet, duty_flows, static_head_at_m
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats, Records
+from wetwell.protocols.arrays import Floats, Integers, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
@@ -26,7 +26,8 @@ RUNNING_SHARE = 0.05
 """Share of the run-out flow, or of the nominal frequency, above which a pump that does not say so is running."""
 SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m", "power_kw")
 NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
-"""Without these a pump cannot be told from the system."""
+"""What a pump is judged by; without a head in all of its runs, by the other two."""
+HEAD_BIT = 1 << SIGNALS.index("head_m")
 NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
 BLIND_S = 60.0
 """A run that has lacked one of them for so long is reported at once."""
@@ -193,9 +194,19 @@ def _totals(table: Records, pumps: Any, main: int, frame: Floats) -> tuple[float
 
 @compiled
 def _collect(
-    table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, is_switched: bool, steady: Any
+    table: Records,
+    pumps: Any,
+    number: int,
+    time_ns: int,
+    frame: Floats,
+    is_switched: bool,
+    lacks_head: bool,
+    steady: Any,
 ) -> bool:
-    """Take the frame into the open run of a pump; whether it is steady, and so has become this record."""
+    """Take the frame into the open run of a pump; whether it is steady, and so has become this record.
+
+    A pump that lacks a head sensor has the head that its main takes, by the datasheet, at the flow that is measured.
+    """
     pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
     flow_m3h, head_m = frame[at + FLOW], frame[at + HEAD]
     for bit, value in enumerate((frame[at + FREQUENCY], flow_m3h, head_m, frame[LEVEL], frame[at + POWER])):
@@ -206,9 +217,10 @@ def _collect(
         pump["speed_ratio"] = speed_ratio
         _settle(pump, time_ns, SETTLING_NS)
     is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
-    if time_ns < pump["steady_from_ns"] or is_switched or not is_usable or math.isnan(flow_m3h + head_m):
+    if time_ns < pump["steady_from_ns"] or is_switched or not is_usable:
         return False
-    if math.isnan(static_head_at_m(own, frame[LEVEL])):
+    static_head_m = static_head_at_m(own, frame[LEVEL])
+    if math.isnan(flow_m3h + static_head_m) or (math.isnan(head_m) and not lacks_head):
         return False
     _note_duty(table, pumps, frame)
     total_m3h, duty_total_m3h = flow_m3h, pump["duty_m3h"]
@@ -216,6 +228,8 @@ def _collect(
         total_m3h, duty_total_m3h = _totals(table, pumps, own["main"], frame)
         if math.isnan(total_m3h):
             return False
+    if lacks_head:
+        head_m = static_head_m + own["friction_h2_m5"] * total_m3h * total_m3h
     steady["pump"] = number
     steady["time_s"] = (time_ns - pump["part_ns"]) / NS_PER_S
     steady["flow_m3h"] = flow_m3h
@@ -230,7 +244,15 @@ def _collect(
 
 
 @compiled
-def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, is_switched: bool, steady_samples: Any) -> bool:
+def collect(
+    table: Records,
+    pumps: Any,
+    time_ns: int,
+    frame: Floats,
+    is_switched: bool,
+    lacks_head: Integers,
+    steady_samples: Any,
+) -> bool:
     """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind.
 
     A frame in whose interval a pump may have started or stopped (`is_switched`) is steady for none.
@@ -249,12 +271,14 @@ def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, is_switched
             pump["steady_from_ns"] = time_ns + WARM_UP_NS
             pump["speed_ratio"] = math.nan
         pump["last_ns"] = time_ns
-        if _collect(table, pumps, number, time_ns, frame, is_switched, steady_samples[at]):
+        is_without = lacks_head[number] != 0
+        if _collect(table, pumps, number, time_ns, frame, is_switched, is_without, steady_samples[at]):
             pump["is_steady"] = 1
             pump["samples"] += 1
             at += 1
         if not pump["is_reported_blind"] and time_ns - pump["start_ns"] >= BLIND_NS:
             pump["is_reported_blind"] = 1
-            pump["is_blind"] = pump["seen"] & NEEDED_BITS != NEEDED_BITS
+            needed = NEEDED_BITS & ~HEAD_BIT if is_without else NEEDED_BITS
+            pump["is_blind"] = pump["seen"] & needed != needed
             any_blind = any_blind or pump["is_blind"] != 0
     return any_blind

@@ -34,6 +34,8 @@ class StreamState(NamedTuple):
         Of `RollingFTest`.
     sampling_steps : (6,) array
         As `new_sampling_steps` makes it.
+    lacks_head : (pumps,) int64
+        Whether a pump is judged without a head sensor, by the head that its main takes by the datasheet.
     """
 
     table: Records
@@ -51,6 +53,7 @@ class StreamState(NamedTuple):
     moments: Floats
     counts: Integers
     sampling_steps: Floats
+    lacks_head: Integers
 
     def remembered(self) -> dict[str, npt.NDArray[Any]]:
         """The arrays from which the stream goes on, by name."""
@@ -76,4 +79,5 @@ def new_state(datasheet: Datasheet, rolling: RollingFTest) -> StreamState:
         moments=rolling.moments,
         counts=rolling.counts,
         sampling_steps=new_sampling_steps(),
+        lacks_head=np.zeros(datasheet.pumps, dtype=np.int64),
     )

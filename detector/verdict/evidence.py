@@ -24,9 +24,11 @@ def run_evidence(run: Run, datasheet: Datasheet, rng: np.random.Generator) -> di
     """Figures of both methods of the paper on a run by itself.
 
     `f_test`: drift of either curve within the run. `tangent`: the attribution index of the steps between its
-    segments, with its block-bootstrap interval.
+    segments, with its block-bootstrap interval. None without a head sensor: both set the head against the flow.
     """
     evidence: dict[str, Any] = {}
+    if run.lacks_head:
+        return evidence
     if len(run.time_s) >= MIN_SAMPLES:
         evidence["f_test"] = {
             "pump": f_test_figures(pump_curve_f_test(run.time_s, run.flow_m3h, run.head_m, run.speed_ratio)),
@@ -66,9 +68,11 @@ def shift_evidence(observation: Observation) -> dict[str, Any]:
         for name, mean, sigmas in zip(COMPONENTS, observation.mean, observation.sigmas, strict=True)
         if np.isfinite(sigmas)
     }
-    signals = ["flow", "head", "frequency", *(name for name in ("drawdown", "power") if name in known)]
+    curves = [name for name in ("pump", "system") if name in known]
+    signals = ["flow", "head", "frequency"] if "system" in known else ["flow", "frequency"]
+    signals += [name for name in ("drawdown", "power") if name in known]
     return {
-        "shift_m": {name: round(float(known[name][0]), 4) for name in ("pump", "system")},
+        "shift_m": {name: round(float(known[name][0]), 4) for name in curves},
         "shift_sigmas": {name: round(float(sigmas), 2) for name, (_, sigmas) in known.items()},
         "signals": signals,
     }
