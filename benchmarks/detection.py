@@ -131,6 +131,17 @@ class MeanRecording(PolledRecording):
 
 
 @dataclass(frozen=True, slots=True)
+class HeadlessRecording(PolledRecording):
+    """A station without head sensors."""
+
+    def load(self) -> Recording:
+        """Simulate, then leave the heads out."""
+        recording = PolledRecording.load(self)
+        columns = {name: values for name, values in recording.columns.items() if not name.endswith("head_m")}
+        return replace(recording, columns=columns)
+
+
+@dataclass(frozen=True, slots=True)
 class Configuration:
     """Stations and scenarios of one row of the table."""
 
@@ -178,6 +189,13 @@ def configurations() -> dict[str, Configuration]:
                 alpha, scenario, partial(PolledRecording, period_s=period_s)
             )
             for period_s in (5, 10, 30, 60)
+            for scenario in (paper, nominal)
+        },
+        **{
+            f"{scenario.name}, without head, polled every {period_s} s": Configuration(
+                alpha, scenario, partial(HeadlessRecording, period_s=period_s)
+            )
+            for period_s in (1, 10)
             for scenario in (paper, nominal)
         },
         **{

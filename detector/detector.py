@@ -12,7 +12,6 @@ from wetwell.detector.snapshot.codec import decode_snapshot, encode_snapshot
 from wetwell.detector.stream.block import Block, LiveBlock
 from wetwell.detector.stream.gate import gate_counts
 from wetwell.detector.stream.loop import Stop
-from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.verdict.evidence import rolling_evidence
 from wetwell.detector.verdict.maintenance import Costs
 from wetwell.protocols.messages.readings import Readings
@@ -90,7 +89,7 @@ class Detector:
 
     def finish(self) -> tuple[Verdict, ...]:
         """Verdicts on the runs that are still open at the end of a recording."""
-        open_runs = [run for run in self._runs.finish() if len(run.segments) or run.missing & NEEDED]
+        open_runs = [run for run in self._runs.finish() if len(run.segments) or run.lacking]
         return tuple(self._judge(run, run.window_ns[1]) for run in open_runs)
 
     def snapshot(self) -> bytes:

@@ -27,7 +27,6 @@ from wetwell.detector.pump_memory import PumpMemory
 from wetwell.detector.runs.run import Run, Segments
 from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, silencing_sensors
 from wetwell.detector.statistics.robust import median
-from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE, SEGMENT_SAMPLES
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
@@ -57,7 +56,7 @@ class Judgement:
 
 
 class PumpJudge:
-    """Judges one pump: its runs, looks at one that goes on, and what is left of it without head or frequency.
+    """Judges one pump: its runs, looks at one that goes on, and what is left of it without flow or frequency.
 
     Parameters
     ----------
@@ -132,7 +131,7 @@ class PumpJudge:
             memory.learning = Learning()
             return False
         is_new = memory.reference is None and memory.offset_m is None
-        return run.lacks_head or (is_new and run.missing & NEEDED == {"head_m"})
+        return run.lacks_head or (is_new and run.lacking == {"head_m"})
 
     def segments_since_change(self, last: Segments) -> int:
         """Segments of the open run since a change that is worth a look, by the last of them; 0 without one."""
@@ -185,7 +184,7 @@ class PumpJudge:
 
     def _without_segment(self, run: Run, evidence: dict[str, Any]) -> Judgement:
         """Judge a run without a segment."""
-        memory, lacking = self.memory, sorted(run.missing & NEEDED)
+        memory, lacking = self.memory, sorted(run.lacking)
         is_learnt = memory.reference is not None
         if lacking and is_learnt:
             return self._sensor_fault(run, evidence | {"lost": lacking})

@@ -1,5 +1,6 @@
 """What a run shows, as distances from what its pump's baseline expects."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,8 +101,9 @@ def observe(run: Run, reference: HealthyReference, curve: Curve, friction_h2_m5:
         direction[PUMP] += system_in_pump * direction[SYSTEM]
         direction[SYSTEM] = direction[PUMP] / system_in_pump  # of the main, if it were the cause
         head_direction[:] = 0.0
-        mean_m[SYSTEM] = np.nan
-    drawdown, power = run.log_ratio - reference.drawdown.mean, log_power(run) - reference.power.mean
+        mean_m[SYSTEM] = math.nan
+    drawdown = run.log_ratio - reference.drawdown.mean
+    power = math.nan if run.lacks_head else log_power(run) - reference.power.mean
     return Observation(
         mean=np.array([*mean_m, drawdown, power]),
         covariance=covariance,

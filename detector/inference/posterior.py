@@ -151,7 +151,8 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
     weighed alike. The power may follow the load or not, or drift: it tells a wrong meter from a fault, but no fault
     from health. In a few runs the drawdown is disturbed by something else and says nothing. Components that are not
     known are left out. Without a head sensor a run says that pump or main has moved, and not which: all faults are as
-    likely as that of the pump, and the prior, with what the other pumps of the main have met, tells them apart.
+    likely as that of the pump, and the prior, with what the other pumps of the main have met, tells them apart; only
+    the drawdown speaks of the flow meter then.
 
     Parameters
     ----------
@@ -180,8 +181,9 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
     log_weight[[PUMP_FAULT, BOTH]] += np.log(usual_pump)
     log_weight[[SYSTEM_FAULT, BOTH]] += np.log(usual_system)
     if not known[SYSTEM]:
+        alike = _FAULTS if known[DRAWDOWN] else [*_FAULTS, FLOW_METER]
+        log_weight[alike] = (np.log(prior) + log_likelihood[PUMP_FAULT] + np.log(usual_pump))[alike]
         log_weight[HEAD_SENSOR] = -np.inf
-        log_weight[_FAULTS] = (np.log(prior) + log_likelihood[PUMP_FAULT])[_FAULTS] + np.log(usual_pump)
     weight = np.exp(log_weight - log_weight.max())
     is_watched = bool(observation.covariance[DRAWDOWN, DRAWDOWN] < FLOW_TRUST**2)
     flow_error, flow_deviation = _meter_error(

@@ -13,8 +13,6 @@ FLOW_METER_PRIOR = 0.01
 HEAD_SENSOR_PRIOR = 0.005
 CHANGE_PER_RUN = 0.05
 """Share of a prior that is forgotten from run to run: faults come and go."""
-LEAST = 1e-6
-"""Probability that nothing is taken to be less than, and its opposite."""
 
 
 @dataclass(slots=True)
@@ -54,23 +52,24 @@ def joint_prior(pump: PumpPrior, system: SystemPrior) -> Floats:
 
 
 def update_prior(probability: Floats, pump: PumpPrior, system: SystemPrior, *, lacks_head: bool = False) -> None:
-    """Take what a run has said into the priors, in place; a little is forgotten, so that nothing is ever certain.
-
-    Without a head sensor a fault that goes on says nothing new of which it is, and nothing is forgotten.
-    """
+    """Take what a run has said into the priors, in place; a little is forgotten, so that nothing is ever certain."""
     faulty_system = probability[SYSTEM_FAULT] + probability[BOTH]
-    forgotten = CHANGE_PER_RUN
+    pump.flow_meter = _mixed(probability[FLOW_METER], FLOW_METER_PRIOR)
+    pump.head_sensor = _mixed(probability[HEAD_SENSOR], HEAD_SENSOR_PRIOR)
+    system.system = _mixed(faulty_system, SYSTEM_PRIOR)
     if lacks_head:
-        forgotten *= 1.0 - probability[PUMP_FAULT] - faulty_system
-        pump.pump = _mixed(probability[PUMP_FAULT] / max(1.0 - faulty_system, LEAST), PUMP_PRIOR, forgotten)
-        pump.pump_if_system = _mixed(probability[BOTH] / max(faulty_system, LEAST), PUMP_PRIOR, forgotten)
+        healthy = 1.0 - faulty_system - probability[PUMP_FAULT]
+        joint = np.array([[healthy, probability[SYSTEM_FAULT]], [probability[PUMP_FAULT], probability[BOTH]]])
+        joint = _change(PUMP_PRIOR) @ joint @ _change(SYSTEM_PRIOR).T
+        pump.pump, pump.pump_if_system = (float(each) for each in joint[1] / joint.sum(axis=0))
     else:
-        pump.pump = _mixed(probability[PUMP_FAULT] + probability[BOTH], PUMP_PRIOR, forgotten)
-        pump.pump_if_system = None
-    pump.flow_meter = _mixed(probability[FLOW_METER], FLOW_METER_PRIOR, forgotten)
-    pump.head_sensor = _mixed(probability[HEAD_SENSOR], HEAD_SENSOR_PRIOR, forgotten)
-    system.system = _mixed(faulty_system, SYSTEM_PRIOR, forgotten)
+        pump.pump, pump.pump_if_system = _mixed(probability[PUMP_FAULT] + probability[BOTH], PUMP_PRIOR), None
 
 
-def _mixed(probability: float, prior: float, forgotten: float) -> float:
-    return float(min(max((1.0 - forgotten) * probability + forgotten * prior, LEAST), 1.0 - LEAST))
+def _mixed(probability: float, prior: float) -> float:
+    return float((1.0 - CHANGE_PER_RUN) * probability + CHANGE_PER_RUN * prior)
+
+
+def _change(prior: float) -> Floats:
+    """(2, 2) probability to be healthy or faulty in the next run, in columns for either now."""
+    return np.array([[_mixed(1.0, 1.0 - prior), _mixed(0.0, 1.0 - prior)], [_mixed(0.0, prior), _mixed(1.0, prior)]])

@@ -1,4 +1,4 @@
-"""A pump without head or frequency: nobody can tell it from its main, but whether it runs as it used to shows."""
+"""A pump without flow or frequency: nobody can tell it from its main, but whether it runs as it used to shows."""
 
 import math
 from collections import deque

@@ -103,7 +103,7 @@ def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
     told = [verdict.encode() for piece in pieces for verdict in in_blocks.update_block(piece)]
     assert told == [verdict.encode() for verdict in expected]
     assert in_blocks.snapshot() == one_by_one.snapshot()
-    assert any(verdict.evidence.get("abnormal") for verdict in expected if verdict.pump == 2)
+    assert {verdict.state for verdict in expected if verdict.pump == 2} >= {"unknown", "learning", "normal"}
     assert {verdict.state for verdict in expected if verdict.pump == 1} >= {"learning", "normal"}
 
 

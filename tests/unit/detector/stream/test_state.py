@@ -14,7 +14,7 @@ from wetwell.detector.stream.state import StreamState
 from wetwell.detector.stream.steady_samples import STEADY_SAMPLE
 
 STORED = ["gate", "pumps", "pace", "rows", "phases", "meters", "blinds", "windows", "moments", "counts"]
-STORED += ["sampling_steps"]
+STORED += ["sampling_steps", "lacks_head"]
 
 
 def test_the_kernel_takes_a_block_and_the_state_in_the_order_of_their_fields():

@@ -1,0 +1,97 @@
+"""A station without head sensors: that pump or main has moved shows, and the other pumps show which of them."""
+
+from dataclasses import replace
+
+import pytest
+
+from wetwell.detector.curves.datasheet import datasheet_of
+from wetwell.detector.detector import Detector
+from wetwell.detector.stream.block import blocks
+from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.simulator.faults.pump.blockage import Blockage
+from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
+
+HOUR_S = 3600
+BEGIN_S, GROWN_S = 8 * HOUR_S, 9 * HOUR_S
+HELD = {"start_s": BEGIN_S, "end_s": GROWN_S, "after": "hold"}
+BLOCKED = Blockage(pump=2, speed_loss=0.1, **HELD)
+CLOGGED = PipeClogging(friction_rise=0.25, **HELD)
+
+
+def recorded(station, *faults, hours=13, has_head=False):
+    recording = Simulation(station, Scenario(name="s", fault=faults), 3).advance(hours * HOUR_S)
+    columns = {name: values for name, values in recording.columns.items() if has_head or not name.endswith("head_m")}
+    return replace(recording, columns=columns)
+
+
+def verdicts_on(station, recording):
+    detector = Detector(station.name, datasheet_of(station))
+    told = [verdict for block in blocks(recording, len(station.pump)) for verdict in detector.update_block(block)]
+    return told + list(detector.finish())
+
+
+def late_states(verdicts, recording, pump):
+    """States that are told of a pump once a fault has grown and each pump has run with it."""
+    late_ns = recording.time_ns[0] + (GROWN_S + HOUR_S) * NS_PER_S
+    return {verdict.state for verdict in verdicts if verdict.pump == pump and verdict.time > late_ns}
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [(BLOCKED, ["normal", "pump_fault", "normal"]), (CLOGGED, ["system_fault"] * 3)],
+    ids=["blockage", "clogging"],
+)
+def test_the_other_pumps_tell_a_fault_of_one_from_one_of_the_main(alpha, fault, expected):
+    recording = recorded(alpha, fault)
+    verdicts = verdicts_on(alpha, recording)
+    assert [late_states(verdicts, recording, pump) for pump in (1, 2, 3)] == [{state} for state in expected]
+    (last,) = [verdict for verdict in verdicts if verdict.pump == 2][-1:]
+    assert last.evidence["missing"] == ["head_m"]
+    assert not {"f_test", "tangent", "index"} & last.evidence.keys(), "they set the head against the flow"
+    ((name, severity),) = list(last.evidence["severity"].items())[:1]
+    true_percent = {"speed_loss_percent": 10.0, "friction_rise_percent": 25.0}[name]
+    assert severity["value"] == pytest.approx(true_percent, abs=1.0)
+
+
+def test_a_pump_that_is_alone_on_its_main_is_told_to_have_moved_and_no_crew_is_chosen(alpha):
+    alone = Station.model_validate(
+        alpha.model_dump(exclude_none=True)
+        | {"pump": [alpha.pump[0].model_dump(exclude_none=True)]}
+        | {"control": {"start_levels_m": [1.6], "stop_levels_m": [0.5]}}
+    )
+    recording = recorded(alone, Blockage(pump=1, speed_loss=0.1, **HELD))
+    verdicts = verdicts_on(alone, recording)
+    assert late_states(verdicts, recording, 1) == {"unknown"}
+    assert "cannot be told apart" in verdicts[-1].evidence["advice"]
+    assert {verdict.state for verdict in verdicts} == {"learning", "unknown", "normal"}
+
+
+def test_a_healthy_station_is_normal_and_a_snapshot_goes_on_bit_for_bit(alpha):
+    recording = recorded(alpha, hours=10)
+    detector, told = Detector(alpha.name, datasheet_of(alpha)), []
+    for block in blocks(recording, 3):
+        restored = Detector(alpha.name, datasheet_of(alpha))
+        restored.restore(detector.snapshot())
+        detector = restored
+        told += detector.update_block(block)
+    assert [v.encode() for v in told] == [v.encode() for v in verdicts_on(alpha, recording)[: len(told)]]
+    assert {verdict.state for verdict in told} == {"learning", "unknown", "normal"}
+    assert [v.state for v in told].count("unknown") == 3, "the first run of each pump, before its head is missed"
+
+
+def test_a_head_that_comes_while_learning_begins_the_learning_anew(alpha):
+    recording = recorded(alpha, hours=10, has_head=True)
+    late = recording.time_ns >= recording.time_ns[0] + 2 * HOUR_S * NS_PER_S
+    columns = {
+        name: values.copy() if name.endswith("head_m") else values for name, values in recording.columns.items()
+    }
+    for name, values in columns.items():
+        if name.endswith("head_m"):
+            values[~late] = float("nan")
+    verdicts = verdicts_on(alpha, replace(recording, columns=columns))
+    last = [verdict for verdict in verdicts if verdict.pump == 1][-1]
+    assert last.state == "normal"
+    assert last.evidence["signals"][:3] == ["flow", "head", "frequency"]
