@@ -1,9 +1,9 @@
 """The loop over samples: what each goes through before there is anything to judge. Live, a block has one sample.
 
 The order within a sample: the gate, which pumps run, the drawdown; the runs that end are judged; the runs go on, and
-one that has turned out blind is told; the watch over the sensors, and over pumps that lack what they are judged by; the rolling F-test; a
-look at segments that are full. Where there is something to judge, the loop stops and says so, and is called again to
-go on from there.
+one that has turned out blind is told; the watch over the sensors, and over pumps that lack what they are judged by;
+the rolling F-test; a look at segments that are full. Where there is something to judge, the loop stops and says so,
+and is called again to go on from there.
 """
 
 from enum import IntEnum
