@@ -37,6 +37,14 @@ def told(flows_m3h, *, running=None, period_s=1):
     return changes, watch
 
 
+def gathered_in(gathered, values, pumps, begin_s=0, seconds=LEARNT_S):
+    """Whether a segment is full in each of some seconds with the same values."""
+    return [
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps)
+        for second in range(begin_s, begin_s + seconds)
+    ]
+
+
 def noisy(*levels_m3h, samples, seed=0):
     rng = np.random.default_rng(seed)
     return np.concatenate([level * (1.0 + 0.01 * rng.normal(size=samples)) for level in levels_m3h])
@@ -91,19 +99,25 @@ def test_a_pump_that_stands_or_that_can_be_judged_is_left_alone(name):
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     pumps[name] = 0
     values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
-    assert not any(gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
+    assert not any(
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S)
+    )
 
 
 def test_a_pump_that_shows_everything_is_left_alone():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values = frame_of((50.0, 100.0, 26.0, NAN, 1.0))
-    assert not any(gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
+    assert not any(
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S)
+    )
 
 
 def test_a_clock_that_is_set_begins_a_segment_anew():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
-    begun = [gather_segments(TABLE, gathered, (10_000 + second) * NS_PER_S, 1.0, values, pumps) for second in range(50)]
+    begun = [
+        gather_segments(TABLE, gathered, (10_000 + second) * NS_PER_S, 1.0, values, pumps) for second in range(50)
+    ]
     set_back = [
         gather_segments(TABLE, gathered, second * NS_PER_S, 1.0 if second else math.inf, values, pumps)
         for second in range(55)
