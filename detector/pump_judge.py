@@ -74,6 +74,7 @@ class PumpJudge:
         self._datasheet = datasheet
         self._curve = datasheet.curves[pump]
         self._friction_h2_m5 = datasheet.main_of(pump).friction_h2_m5
+        self._needed = NEEDED | {"level_m"} if datasheet.main_of(pump).level_slope else NEEDED
         self._costs = costs
 
     def tell(self, time_ns: int, reason: str) -> Judgement:
@@ -120,6 +121,10 @@ class PumpJudge:
             return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
         return self._compare(run, memory.reference, system, evidence, rng)
 
+    def lacking(self, run: Run) -> frozenset[str]:
+        """Signals without which a run cannot be judged, and which it lacks."""
+        return run.missing & (self._needed - {"head_m"} if run.lacks_head else self._needed)
+
     def does_without_head(self, run: Run) -> bool:
         """Whether what comes after a run is judged without a head sensor.
 
@@ -131,7 +136,7 @@ class PumpJudge:
             memory.learning = Learning()
             return False
         is_new = memory.reference is None and memory.offset_m is None
-        return run.lacks_head or (is_new and run.lacking == {"head_m"})
+        return run.lacks_head or (is_new and self.lacking(run) == {"head_m"})
 
     def segments_since_change(self, last: Segments) -> int:
         """Segments of the open run since a change that is worth a look, by the last of them; 0 without one."""
@@ -184,7 +189,7 @@ class PumpJudge:
 
     def _without_segment(self, run: Run, evidence: dict[str, Any]) -> Judgement:
         """Judge a run without a segment."""
-        memory, lacking = self.memory, sorted(run.lacking)
+        memory, lacking = self.memory, sorted(self.lacking(run))
         is_learnt = memory.reference is not None
         if lacking and is_learnt:
             return self._sensor_fault(run, evidence | {"lost": lacking})

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass, field
 
-from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.arrays import Floats
 
@@ -86,8 +85,3 @@ class Run:
     running: int = 0
     step_s: float = 0.0
     lacks_head: bool = False
-
-    @property
-    def lacking(self) -> frozenset[str]:
-        """Signals without which it cannot be judged."""
-        return self.missing & (NEEDED - {"head_m"} if self.lacks_head else NEEDED)

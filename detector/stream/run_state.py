@@ -29,6 +29,8 @@ NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
 """What a pump is judged by; without a head in all of its runs, by the other two."""
 HEAD_BIT = 1 << SIGNALS.index("head_m")
 NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
+LEVEL_BIT = 1 << SIGNALS.index("level_m")
+"""Needed too where the main lifts to a delivery level."""
 BLIND_S = 60.0
 """A run that has lacked one of them for so long is reported at once."""
 WARM_UP_NS, SETTLING_NS, PART_NS, BLIND_NS = (int(s * NS_PER_S) for s in (WARM_UP_S, SETTLING_S, MAX_RUN_S, BLIND_S))
@@ -278,7 +280,9 @@ def collect(
             at += 1
         if not pump["is_reported_blind"] and time_ns - pump["start_ns"] >= BLIND_NS:
             pump["is_reported_blind"] = 1
-            needed = NEEDED_BITS & ~HEAD_BIT if is_without else NEEDED_BITS
+            needed = NEEDED_BITS | LEVEL_BIT if table[number]["level_slope"] > 0.0 else NEEDED_BITS
+            if is_without:
+                needed &= ~HEAD_BIT
             pump["is_blind"] = pump["seen"] & needed != needed
             any_blind = any_blind or pump["is_blind"] != 0
     return any_blind
