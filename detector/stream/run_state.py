@@ -19,6 +19,8 @@ SPEED_STEP = 0.02
 MIN_SPEED_RATIO = 0.4
 MAX_SPEED_RATIO = 1.25
 MAX_RUN_S = 1800.0
+MAX_RUN_STEPS = 4.0
+"""Of a slow feed a part of a run lasts so many steps at least."""
 BREAK_S = 60.0
 USUAL_GAPS = 2.5
 """A feed that is slow by itself breaks only where it lacks more than so many of its usual steps."""
@@ -115,8 +117,11 @@ def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
 
 
 @compiled
-def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+def note_running(
+    table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, usual_s: float, frame: Floats
+) -> bool:
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
+    part_ns = max(PART_NS, MAX_RUN_STEPS * usual_s * NS_PER_S)
     is_broken = is_break(period, gap_s, BREAK_S)
     is_changed = any_ending = False
     for number in range(pumps.shape[0]):
@@ -126,7 +131,7 @@ def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: f
         is_running = _says_running(table[number], frame, at, is_open and not is_broken)
         is_changed = is_changed or is_running != (pump["is_running"] != 0)
         pump["is_running"] = is_running
-        is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= PART_NS
+        is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= part_ns
         pump["is_ending"] = is_open and is_over
         any_ending = any_ending or (is_open and is_over)
         if is_open and is_broken:
