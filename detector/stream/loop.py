@@ -85,7 +85,7 @@ def process_samples(
             if collect(table, pumps, now_ns, frame, is_switched[row], steady_samples):
                 return row, stop
         watched = now_ns, state["gap_s"], sampling_steps[USUAL], frame, is_switched[row]
-        if stop <= Stop.RUN_BLIND and _watch(stuck_sensors, missing_signals, *watched, pumps):
+        if stop <= Stop.RUN_BLIND and _watch(table, stuck_sensors, missing_signals, *watched, pumps):
             return row, Stop.SEGMENT_GATHERED.value
         segment_samples = period["segment_samples"]
         if _test_steady(pumps, segment_samples, now_ns, state["gap_s"], steady_samples, windows, moments, counts):
@@ -97,18 +97,19 @@ def process_samples(
 
 @compiled
 def _watch(
+    table: Records,
     stuck_sensors: Any,
     missing_signals: Any,
     now_ns: int,
     gap_s: float,
     usual_s: float,
     frame: Floats,
-    is_switched: bool,
+    is_switched: Flags,
     pumps: Any,
 ) -> bool:
     """Look at the readings by themselves; whether there is a full segment of a pump without head."""
     watch_sensors(stuck_sensors, now_ns, gap_s, usual_s, frame, pumps)
-    is_full: bool = gather_segments(missing_signals, now_ns, gap_s, frame, is_switched, pumps)
+    is_full: bool = gather_segments(table, missing_signals, now_ns, gap_s, frame, is_switched, pumps)
     return is_full
 
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from wetwell.detector.stream.gate import seconds_between
-from wetwell.detector.stream.run_state import WARM_UP_NS
+from wetwell.detector.stream.run_state import WARM_UP_NS, is_disturbed
 from wetwell.detector.stream.steady_samples import SEGMENT_S, SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats, Records
+from wetwell.protocols.arrays import Flags, Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_METERS, PUMP_VALUES
 
@@ -16,8 +16,8 @@ MISSING_SIGNALS = np.dtype(
     [(name, np.int64) for name in ("running", "settled_ns", "begin_ns", "last_ns", "samples", "is_full", "is_apart")]
     + [(name, np.float64) for name in PUMP_METERS]
 )
-"""Of one pump: how many pumps run, sums over the segment that is being gathered, whether it is full, and whether it
-is the first since the pump started, others did, or the stream broke."""
+"""Of one pump: how many pumps run on its main, sums over the segment that is being gathered, whether it is full, and
+whether it is the first since the pump started, others did, or the stream broke."""
 
 
 def new_missing_signals(pumps: int) -> Records:
@@ -27,17 +27,24 @@ def new_missing_signals(pumps: int) -> Records:
 
 @compiled
 def gather_segments(
-    missing_signals: Any, time_ns: int, gap_s: float, frame: Floats, is_switched: bool, pumps: Any
+    table: Records,
+    missing_signals: Any,
+    time_ns: int,
+    gap_s: float,
+    frame: Floats,
+    is_switched: Flags,
+    pumps: Any,
 ) -> bool:
     """Gather the readings of pumps that run, are being learnt, and lack flow, head or frequency.
 
     Parameters
     ----------
+    table : Datasheet.table()
     missing_signals : new_missing_signals(pumps)
     time_ns, gap_s, frame
         A sample that has passed the gate.
-    is_switched : bool
-        Whether a pump may have started or stopped within the interval that the sample stands for.
+    is_switched : (pumps,) bool
+        Whether each may have started or stopped within the interval that the sample stands for.
     pumps : (pumps,) records
         `is_running` and `is_learning` are read.
 
@@ -46,9 +53,6 @@ def gather_segments(
     bool
         Whether there is a pump of which a segment is full.
     """
-    running = 0
-    for number in range(pumps.shape[0]):
-        running += pumps[number]["is_running"] != 0
     any_full = False
     for number in range(pumps.shape[0]):
         segment, at = missing_signals[number], FIRST_PUMP + PUMP_VALUES * number
@@ -56,6 +60,9 @@ def gather_segments(
         is_seen = not math.isnan(frame[at + FREQUENCY] + frame[at + FLOW] + frame[at + HEAD])
         if is_seen or not pumps[number]["is_running"] or not pumps[number]["is_learning"]:
             continue
+        running = 0
+        for other in range(pumps.shape[0]):
+            running += pumps[other]["is_running"] != 0 and table[other]["main"] == table[number]["main"]
         is_apart = gap_s == math.inf or seconds_between(segment["last_ns"], time_ns) > 1.5 * gap_s
         segment["last_ns"] = time_ns
         if is_apart or running != segment["running"]:
@@ -63,7 +70,7 @@ def gather_segments(
             segment["settled_ns"] = time_ns + WARM_UP_NS
             segment["samples"] = 0
             segment["is_apart"] = 1
-        if time_ns < segment["settled_ns"] or is_switched:
+        if time_ns < segment["settled_ns"] or is_disturbed(table, number, is_switched):
             continue
         if segment["samples"] == 0:
             segment["begin_ns"] = time_ns

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Datasheet, duty_flows
+from wetwell.detector.curves.datasheet import Datasheet, duty_flows, static_head_at_m
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats, Records
+from wetwell.protocols.arrays import Flags, Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
@@ -123,22 +123,23 @@ def note_running(
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
     part_ns = max(PART_NS, MAX_RUN_STEPS * usual_s * NS_PER_S)
     is_broken = is_break(period, gap_s, BREAK_S)
-    is_changed = any_ending = False
+    changed_mains, any_ending = 0, False
     for number in range(pumps.shape[0]):
         pump = pumps[number]
         is_open = pump["is_open"] != 0
         at = FIRST_PUMP + PUMP_VALUES * number
         is_running = _says_running(table[number], frame, at, is_open and not is_broken)
-        is_changed = is_changed or is_running != (pump["is_running"] != 0)
+        if is_running != (pump["is_running"] != 0):
+            changed_mains |= 1 << table[number]["main"]
         pump["is_running"] = is_running
         is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= part_ns
         pump["is_ending"] = is_open and is_over
         any_ending = any_ending or (is_open and is_over)
         if is_open and is_broken:
             pump["is_open"] = 0
-    if is_changed:
+    if changed_mains:
         for number in range(pumps.shape[0]):
-            if pumps[number]["is_open"]:
+            if pumps[number]["is_open"] and changed_mains >> table[number]["main"] & 1:
                 _settle(pumps[number], time_ns, WARM_UP_NS)
     return any_ending
 
@@ -170,20 +171,43 @@ def drop_ended(pumps: Any, steady_samples: Any, time_ns: int) -> None:
 
 @compiled
 def _note_duty(table: Records, pumps: Any, frame: Floats) -> None:
-    """Flows by the datasheet; worked out anew only when a speed has changed."""
+    """Flows by the datasheet; worked out anew only when a speed has changed, or the level may move a lift."""
     is_new = False
     for number in range(pumps.shape[0]):
+        is_new = is_new or table[number]["level_slope"] > 0.0
         pump, frequency_hz = pumps[number], frame[FIRST_PUMP + PUMP_VALUES * number + FREQUENCY]
         speed = frequency_hz / table[number]["frequency_hz"] if pump["is_running"] and frequency_hz > 0.0 else 0.0
         is_new = is_new or speed != pump["duty_speed"]
         pump["duty_speed"] = speed
     if is_new:
-        duty_flows(table, pumps)
+        duty_flows(table, pumps, frame[LEVEL])
+
+
+@compiled
+def _totals(table: Records, pumps: Any, main: int, frame: Floats) -> tuple[float, float]:
+    """Total flow of a main, as measured and by the datasheet. [m³/h]."""
+    total_m3h = duty_total_m3h = 0.0
+    for number in range(pumps.shape[0]):
+        if table[number]["main"] != main:
+            continue
+        duty_total_m3h += pumps[number]["duty_m3h"]
+        if pumps[number]["is_running"]:
+            total_m3h += frame[FIRST_PUMP + PUMP_VALUES * number + FLOW]
+    return total_m3h, duty_total_m3h
+
+
+@compiled
+def is_disturbed(table: Records, number: int, is_switched: Flags) -> bool:
+    """Whether a pump of the same main may have started or stopped within the interval that a sample stands for."""
+    for other in range(table.shape[0]):
+        if is_switched[other] and table[other]["main"] == table[number]["main"]:
+            return True
+    return False
 
 
 @compiled
 def _collect(
-    table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, is_switched: bool, steady: Any
+    table: Records, pumps: Any, number: int, time_ns: int, frame: Floats, is_switched: Flags, steady: Any
 ) -> bool:
     """Take the frame into the open run of a pump; whether it is steady, and so has become this record."""
     pump, own, at = pumps[number], table[number], FIRST_PUMP + PUMP_VALUES * number
@@ -196,16 +220,16 @@ def _collect(
         pump["speed_ratio"] = speed_ratio
         _settle(pump, time_ns, SETTLING_NS)
     is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
-    if time_ns < pump["steady_from_ns"] or is_switched or not is_usable or math.isnan(flow_m3h + head_m):
+    if time_ns < pump["steady_from_ns"] or not is_usable or math.isnan(flow_m3h + head_m):
+        return False
+    if is_disturbed(table, number, is_switched):
+        return False
+    if math.isnan(static_head_at_m(own, frame[LEVEL])):
         return False
     _note_duty(table, pumps, frame)
     total_m3h, duty_total_m3h = flow_m3h, pump["duty_m3h"]
     if own["is_common_header"]:
-        total_m3h = duty_total_m3h = 0.0
-        for other in range(pumps.shape[0]):
-            duty_total_m3h += pumps[other]["duty_m3h"]
-            if pumps[other]["is_running"]:
-                total_m3h += frame[FIRST_PUMP + PUMP_VALUES * other + FLOW]
+        total_m3h, duty_total_m3h = _totals(table, pumps, own["main"], frame)
         if math.isnan(total_m3h):
             return False
     steady["pump"] = number
@@ -222,10 +246,10 @@ def _collect(
 
 
 @compiled
-def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, is_switched: bool, steady_samples: Any) -> bool:
+def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, is_switched: Flags, steady_samples: Any) -> bool:
     """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind.
 
-    A frame in whose interval a pump may have started or stopped (`is_switched`) is steady for none.
+    A frame in whose interval a pump may have been switched (`is_switched`) is steady for none of its main.
     """
     at = count_steady(pumps)
     any_blind = False
