@@ -168,7 +168,9 @@ class Detector:
         return self._verdict(pump, time_ns, self._judges[pump].tell(time_ns, reason))
 
     def _verdict(self, pump: int, time_ns: int, judgement: Judgement) -> Verdict:
-        """The verdict with what the last samples show by themselves."""
+        """The verdict with what the last samples show by themselves, and the main where there are several."""
+        if len(self._datasheet.mains) > 1:
+            judgement.evidence["main"] = self._datasheet.main_of(pump).name
         tests = self._runs.rolling_tests(pump)
         if tests is not None:
             judgement.evidence["rolling_f_test"] = rolling_evidence(tests, self._runs.strongest_log_p(pump))

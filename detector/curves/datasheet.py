@@ -1,7 +1,7 @@
 """What the datasheet says of a station: the curves from which residuals are taken."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,12 +46,15 @@ class SystemCurve:
         Static head that a metre of level takes away: 1 where the main lifts to a delivery level. [1]
     is_common_header : bool
         Whether k acts on the total flow of its pumps.
+    name : str, optional
+        What people call it.
     """
 
     static_head_m: float
     friction_h2_m5: float
     is_common_header: bool
     level_slope: float = 0.0
+    name: str | None = field(default=None, repr=False, compare=False)
 
     def static_head_at_m(self, level_m: float) -> float:
         """Static head with the wet well at a level. [m]."""
@@ -75,6 +78,8 @@ class Datasheet:
         Cross-section of the wet well. [m²]
     middle_level_m : float
         Level at which a curve is drawn where no other is known. [m]
+    floor_level_m : float
+        Level at which the wet well is empty. [m]
     """
 
     curves: tuple[Curve, ...]
@@ -83,6 +88,7 @@ class Datasheet:
     main_of_pump: tuple[int, ...]
     area_m2: float
     middle_level_m: float
+    floor_level_m: float = 0.0
 
     @property
     def pumps(self) -> int:
@@ -206,10 +212,12 @@ def datasheet_of(station: Station) -> Datasheet:
                 friction_h2_m5=main.friction_h2_m5,
                 is_common_header=main.layout == "common",
                 level_slope=main.level_slope,
+                name=main.name,
             )
             for main in station.mains
         ),
         main_of_pump=station.main_of_pump,
         area_m2=station.sump.mean_area_m2,
         middle_level_m=station.middle_level_m,
+        floor_level_m=station.sump.floor_level_m,
     )
