@@ -43,7 +43,7 @@ STEPS = {
     "running": 1.0,
 }
 """What the readings of a historian are rounded to, by quantity; `level_m` and `inflow_m3h` end in the first two."""
-LONG_RUNS_AREA_M2 = 600.0
+LONG_RUNS_AREA_M2 = 300.0
 """Of a wet well in which a pump runs for hours."""
 
 

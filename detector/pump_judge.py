@@ -27,6 +27,7 @@ from wetwell.detector.pump_memory import PumpMemory
 from wetwell.detector.runs.run import Run, Segments
 from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, silencing_sensors
 from wetwell.detector.statistics.robust import median
+from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE, SEGMENT_SAMPLES
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs

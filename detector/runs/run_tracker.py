@@ -38,7 +38,8 @@ class RunTracker:
 
     A sample is steady `WARM_UP_S` after its pump has started and after any other pump has started or stopped, and
     `SETTLING_S` after the last change of its speed. A run ends when the pump stops, when the stream breaks for more
-    than `BREAK_S` and its own period explain, or in parts of `MAX_RUN_S`, so that one that never stops is judged too.
+    than `BREAK_S` and its own period explain, or in parts of `MAX_RUN_S` (of a slow feed `MAX_RUN_STEPS`), so that
+    one that never stops is judged too.
 
     Memory: 80 bytes a steady sample of the open runs, at most `MAX_RUN_S` of each.
     """

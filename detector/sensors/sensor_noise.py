@@ -11,21 +11,18 @@ from wetwell.protocols.arrays import Floats
 
 NOISY_FACTOR = 3.0
 MIN_DIFFERENCES = 30
-NEXT_STEPS = 1.5
-"""Samples that lie further apart than so many of the usual steps do not follow one another."""
 DIFFERENCE_MEDIAN = NORMAL_MEDIAN / math.sqrt(2.0)
 """Standard deviation of normal numbers over the median of the size of their differences."""
 
 
 def reading_noise(run: Run) -> Floats:
-    """(2,) standard deviation of flow and head from sample to sample, as shares of their means; NaN if too short.
+    """(2,) standard deviation of flow and head from second to second, as shares of their means; NaN if too short.
 
     From the median difference of neighbours: what changes slowly, or once, does not count.
     """
     if len(run.time_s) <= MIN_DIFFERENCES:
         return np.full(2, math.nan)
-    steps_s = np.diff(run.time_s)
-    is_next = steps_s <= NEXT_STEPS * median(steps_s)
+    is_next = np.diff(run.time_s) <= 1.5
     if np.count_nonzero(is_next) < MIN_DIFFERENCES:
         return np.full(2, math.nan)
     noise = [

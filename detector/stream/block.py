@@ -23,7 +23,7 @@ class Block(NamedTuple):
     time_ns, seq : (n,) int64
     values : (n, 2 + 5 pumps) array
         Level, inflow, then frequency, flow, head, power and running (0 or more) of each pump; NaN is "no value".
-    is_switched : (n,) bool
+    is_switched : (n, pumps) bool
         Whether a pump may have started or stopped within the interval that a value is the mean of.
     pumps : int
         How many pumps the source speaks of.
@@ -42,7 +42,7 @@ class Block(NamedTuple):
 def blocks(recording: Recording, pumps: int) -> Iterator[Block]:
     """Yield the rows of a recording for a station with so many pumps, `seq` counting from 0."""
     columns = [recording.column(name) for name in columns_of(pumps)]
-    is_switched = switched_rows(recording)
+    is_switched = switched_rows(recording, pumps)
     for first in range(0, len(recording), BLOCK_ROWS):
         last = min(first + BLOCK_ROWS, len(recording))
         values = np.empty((last - first, len(columns)))
@@ -52,25 +52,27 @@ def blocks(recording: Recording, pumps: int) -> Iterator[Block]:
         yield Block(time_ns, seq, values, np.array(is_switched[first:last]), recording.pumps, False)
 
 
-def switched_rows(recording: Recording) -> Flags:
-    """(n,) rows of means in whose interval a pump may have started or stopped; none where values are not means.
+def switched_rows(recording: Recording, pumps: int) -> Flags:
+    """(n, pumps) whether a pump may have been switched in the interval of a row; never where values are no means.
 
     A pump that runs in a row, and not in the one before or in the one after, was switched within it, or no one knows:
     a row at the edge of a gap is one of them.
     """
+    switched = np.zeros((len(recording), pumps), dtype=bool)
     if recording.value != "mean" or len(recording) == 0:
-        return np.zeros(len(recording), dtype=bool)
+        return switched
     order = np.argsort(recording.time_ns, kind="stable")
-    said = [recording.of_pumps(name)[:, order] for name in ("running", "frequency_hz", "flow_m3h")]
-    known = [np.where(np.isnan(values), 0.0, values) > 0.0 for values in said]
-    is_on = np.where(np.isnan(said[0]), np.where(np.isnan(said[1]), known[2], known[1]), known[0])
+    flag, frequency_hz, flow_m3h = (
+        recording.of_pumps(name, pumps)[:, order] for name in ("running", "frequency_hz", "flow_m3h")
+    )
+    shown = np.where(np.isnan(flag), np.where(np.isnan(frequency_hz), flow_m3h, frequency_hz), flag)
+    is_on = shown > 0.0
     step_ns = np.diff(recording.time_ns[order])
     is_next = (step_ns > 0) & (step_ns < MISSING_STEPS * np.median(step_ns)) if step_ns.size else step_ns > 0
     goes_on = is_on[:, 1:] & is_on[:, :-1] & is_next
-    edge = np.zeros((recording.pumps, 1), dtype=bool)
+    edge = np.zeros((pumps, 1), dtype=bool)
     through = np.hstack((edge, goes_on)) & np.hstack((goes_on, edge))
-    switched = np.zeros(len(recording), dtype=bool)
-    switched[order] = np.any(is_on & ~through, axis=0)
+    switched[order] = (is_on & ~through).T
     return switched
 
 
@@ -80,7 +82,7 @@ class LiveBlock:
     def __init__(self, pumps: int) -> None:
         self._time_ns, self._seq = np.zeros((2, 1), dtype=np.int64)
         self._values = np.full((1, len(columns_of(pumps))), np.nan)
-        self._is_switched = np.zeros(1, dtype=bool)
+        self._is_switched = np.zeros((1, pumps), dtype=bool)
 
     def fill(self, sample: Readings) -> Block:
         """The sample as a block, until the next one is filled in."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from wetwell.detector.stream.gate import MAX_GAP_S, seconds_between
 from wetwell.detector.stream.run_state import is_break
-from wetwell.protocols.arrays import Floats, Records
+from wetwell.protocols.arrays import Flags, Floats, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, INFLOW, LEVEL, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
@@ -111,7 +111,7 @@ def draw_down(
     time_ns: int,
     gap_s: float,
     frame: Floats,
-    is_switched: bool,
+    is_switched: Flags,
     pumps: Any,
 ) -> None:
     """Take a frame into account.
@@ -125,8 +125,8 @@ def draw_down(
         Before this frame.
     time_ns, gap_s, frame
         A sample that has passed the gate.
-    is_switched : bool
-        Whether a pump may have started or stopped within the interval that the sample stands for.
+    is_switched : (pumps,) bool
+        Whether each may have started or stopped within the interval that the sample stands for.
     pumps : (pumps,) records
         `is_running` is read; `log_ratio` becomes the ρ of a run that ends.
     """
@@ -141,7 +141,7 @@ def draw_down(
     elif time_ns - phase["begin_ns"] >= MAX_NS and running == 0:
         _end(phases, area_m2, pumps)
         _begin(phase, running, time_ns - SETTLED_NS)
-    if time_ns - phase["begin_ns"] < SETTLED_NS or is_switched or math.isnan(frame[LEVEL]):
+    if time_ns - phase["begin_ns"] < SETTLED_NS or is_switched.any() or math.isnan(frame[LEVEL]):
         return
     flow_m3h = 0.0
     for pump in range(pumps.shape[0]):

@@ -73,7 +73,7 @@ def process_samples(
             if not let_through(state, sampling_steps, ranges, *told, frame):
                 row += 1
                 continue
-            is_ending = note_running(table, pumps, period, now_ns, state["gap_s"], frame)
+            is_ending = note_running(table, pumps, period, now_ns, state["gap_s"], sampling_steps[USUAL], frame)
             draw_down(phases, area_m2, period, now_ns, state["gap_s"], frame, is_switched[row], pumps)
             note_gap(period, state["gap_s"])
             stop = Stop.RUNS_ENDED.value
@@ -105,7 +105,7 @@ def _watch(
     gap_s: float,
     usual_s: float,
     frame: Floats,
-    is_switched: bool,
+    is_switched: Flags,
     lacks_head: Integers,
     pumps: Any,
 ) -> bool:

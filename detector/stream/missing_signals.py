@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from wetwell.detector.stream.gate import seconds_between
-from wetwell.detector.stream.run_state import WARM_UP_NS
+from wetwell.detector.stream.run_state import WARM_UP_NS, is_disturbed
 from wetwell.detector.stream.steady_samples import SEGMENT_S, SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats, Integers, Records
+from wetwell.protocols.arrays import Flags, Floats, Integers, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, POWER, PUMP_METERS, PUMP_VALUES
 
@@ -32,7 +32,7 @@ def gather_segments(
     time_ns: int,
     gap_s: float,
     frame: Floats,
-    is_switched: bool,
+    is_switched: Flags,
     lacks_head: Integers,
     pumps: Any,
 ) -> bool:
@@ -44,8 +44,8 @@ def gather_segments(
     missing_signals : new_missing_signals(pumps)
     time_ns, gap_s, frame
         A sample that has passed the gate.
-    is_switched : bool
-        Whether a pump may have started or stopped within the interval that the sample stands for.
+    is_switched : (pumps,) bool
+        Whether each may have started or stopped within the interval that the sample stands for.
     lacks_head : (pumps,) int64
         Whether a pump is judged without a head sensor.
     pumps : (pumps,) records
@@ -74,7 +74,7 @@ def gather_segments(
             segment["settled_ns"] = time_ns + WARM_UP_NS
             segment["samples"] = 0
             segment["is_apart"] = 1
-        if time_ns < segment["settled_ns"] or is_switched:
+        if time_ns < segment["settled_ns"] or is_disturbed(table, number, is_switched):
             continue
         if segment["samples"] == 0:
             segment["begin_ns"] = time_ns

@@ -7,7 +7,7 @@ import numpy as np
 
 from wetwell.detector.curves.datasheet import Datasheet, duty_flows, static_head_at_m
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
-from wetwell.protocols.arrays import Floats, Integers, Records
+from wetwell.protocols.arrays import Flags, Floats, Integers, Records
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, LEVEL, POWER, PUMP_VALUES, RUNNING
 from wetwell.protocols.timestamps import NS_PER_S
@@ -19,6 +19,8 @@ SPEED_STEP = 0.02
 MIN_SPEED_RATIO = 0.4
 MAX_SPEED_RATIO = 1.25
 MAX_RUN_S = 1800.0
+MAX_RUN_STEPS = 4.0
+"""Of a slow feed a part of a run lasts so many steps at least."""
 BREAK_S = 60.0
 USUAL_GAPS = 2.5
 """A feed that is slow by itself breaks only where it lacks more than so many of its usual steps."""
@@ -118,8 +120,11 @@ def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
 
 
 @compiled
-def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
+def note_running(
+    table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, usual_s: float, frame: Floats
+) -> bool:
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
+    part_ns = max(PART_NS, MAX_RUN_STEPS * usual_s * NS_PER_S)
     is_broken = is_break(period, gap_s, BREAK_S)
     changed_mains, any_ending = 0, False
     for number in range(pumps.shape[0]):
@@ -130,7 +135,7 @@ def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: f
         if is_running != (pump["is_running"] != 0):
             changed_mains |= 1 << table[number]["main"]
         pump["is_running"] = is_running
-        is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= PART_NS
+        is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= part_ns
         pump["is_ending"] = is_open and is_over
         any_ending = any_ending or (is_open and is_over)
         if is_open and is_broken:
@@ -195,13 +200,22 @@ def _totals(table: Records, pumps: Any, main: int, frame: Floats) -> tuple[float
 
 
 @compiled
+def is_disturbed(table: Records, number: int, is_switched: Flags) -> bool:
+    """Whether a pump of the same main may have started or stopped within the interval that a sample stands for."""
+    for other in range(table.shape[0]):
+        if is_switched[other] and table[other]["main"] == table[number]["main"]:
+            return True
+    return False
+
+
+@compiled
 def _collect(
     table: Records,
     pumps: Any,
     number: int,
     time_ns: int,
     frame: Floats,
-    is_switched: bool,
+    is_switched: Flags,
     lacks_head: bool,
     steady: Any,
 ) -> bool:
@@ -219,7 +233,7 @@ def _collect(
         pump["speed_ratio"] = speed_ratio
         _settle(pump, time_ns, SETTLING_NS)
     is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
-    if time_ns < pump["steady_from_ns"] or is_switched or not is_usable:
+    if time_ns < pump["steady_from_ns"] or not is_usable or is_disturbed(table, number, is_switched):
         return False
     static_head_m = static_head_at_m(own, frame[LEVEL])
     if math.isnan(flow_m3h + static_head_m) or (math.isnan(head_m) and not lacks_head):
@@ -251,13 +265,13 @@ def collect(
     pumps: Any,
     time_ns: int,
     frame: Floats,
-    is_switched: bool,
+    is_switched: Flags,
     lacks_head: Integers,
     steady_samples: Any,
 ) -> bool:
     """Take a frame into the runs, after those that it ends are dropped; whether one has turned out blind.
 
-    A frame in whose interval a pump may have started or stopped (`is_switched`) is steady for none.
+    A frame in whose interval a pump may have been switched (`is_switched`) is steady for none of its main.
     """
     at = count_steady(pumps)
     any_blind = False

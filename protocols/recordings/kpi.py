@@ -1,8 +1,9 @@
 r"""Energy, starts, run time and volume of a recording: the one place where these figures come from.
 
-A row holds until the next one. An interval longer than `max_gap_s` is a gap: it counts no energy, run time or volume;
-nor does the last row, as nobody knows how long it held. So the figures of two parts of a recording that share the row
-at which it was cut add up to those of the whole.
+A row holds until the next one; a mean is that of the interval since the row before. An interval longer than
+`max_gap_s` is a gap: it counts no energy, run time or volume; nor does the last row, as nobody knows how long it
+held, or the first mean. So the figures of two parts of a recording that share the row at which it was cut add up to
+those of the whole.
 
 $$E = \sum_i P_i\, \Delta t_i, \qquad V = \sum_i Q_i\, \Delta t_i, \qquad e = E / V$$
 """
@@ -33,6 +34,8 @@ class Kpis:
 
     Attributes
     ----------
+    step_s : float
+        Usual interval between two rows; a start and a stop within one are not seen. 0 for a single row. [s]
     hour_ns : (hours,) int64
         Beginning of each hour since 1970. [ns]
     day_ns : (days,) int64
@@ -58,6 +61,7 @@ class Kpis:
         Time outside of gaps. [h]
     """
 
+    step_s: float
     hour_ns: Integers
     day_ns: Integers
     hourly_energy_kwh: Floats
@@ -117,13 +121,23 @@ class Kpis:
         return _ratio(self.run_h, np.full(self.run_h.size, self.run_h.sum()))
 
 
+def usual_step_s(stamps_ns: Integers) -> float:
+    """Median interval between (n,) rising stamps; 0 for less than two. [s]."""
+    return float(np.median(np.diff(stamps_ns))) / NS_PER_S if stamps_ns.size > 1 else 0.0
+
+
+def longest_step_s(stamps_ns: Integers) -> float:
+    """Longest interval between (n,) rising stamps that is no gap: three usual ones, and 10 s at least. [s]."""
+    return max(MIN_GAP_S, GAP_STEPS * usual_step_s(stamps_ns))
+
+
 def kpis(recording: Recording, max_gap_s: float | None = None) -> Kpis:
     """Figures of a recording.
 
     Rows may be late, doubled, missing or out of order: they are put in the order of their stamps, and the first of
     those with the same stamp counts. A negative power or flow counts as none. A pump runs where its flag says so;
     without flag, where its frequency is above zero; without both, it does not run, and keeps its state for the count
-    of starts.
+    of starts. A mean of the flag between 0 and 1 is the share of the interval in which it ran.
 
     Parameters
     ----------
@@ -159,13 +173,14 @@ def kpis(recording: Recording, max_gap_s: float | None = None) -> Kpis:
     stamps_ns, order = np.unique(recording.time_ns, return_index=True)
     interval_ns = np.diff(stamps_ns, append=stamps_ns[-1:])
     if max_gap_s is None:
-        usual_s = float(np.median(interval_ns[:-1])) / NS_PER_S if interval_ns.size > 1 else 0.0
-        max_gap_s = max(MIN_GAP_S, GAP_STEPS * usual_s)
+        max_gap_s = longest_step_s(stamps_ns)
     held_ns = np.where(interval_ns <= max_gap_s * NS_PER_S, interval_ns, 0)
     hour_ns, day_ns = _beginnings_ns(stamps_ns, _HOUR_S), _beginnings_ns(stamps_ns, _DAY_S)
     power_kw, flow_m3h = (recording.of_pumps(name)[:, order] for name in ("power_kw", "flow_m3h"))
-    running = _running(recording)[:, order]
+    running, run_share = _running(recording)[:, order], _run_share(recording)[:, order]
     known = np.ones(stamps_ns.size)
+    if recording.value == "mean":
+        power_kw, flow_m3h, run_share = (_since_before(each) for each in (power_kw, flow_m3h, run_share))
 
     def sums(rates_per_h: Floats, begin_ns: Integers, period_s: int) -> Floats:
         of_pumps = [_sums(rate_per_h, held_ns, stamps_ns, begin_ns, period_s) for rate_per_h in rates_per_h]
@@ -178,16 +193,17 @@ def kpis(recording: Recording, max_gap_s: float | None = None) -> Kpis:
         return np.reshape(np.array(of_pumps, dtype=np.int64), (recording.pumps, begin_ns.size))
 
     return Kpis(
+        step_s=usual_step_s(stamps_ns),
         hour_ns=hour_ns,
         day_ns=day_ns,
         hourly_energy_kwh=sums(power_kw, hour_ns, _HOUR_S),
         hourly_volume_m3=sums(flow_m3h, hour_ns, _HOUR_S),
-        hourly_run_h=sums(running, hour_ns, _HOUR_S),
+        hourly_run_h=sums(run_share, hour_ns, _HOUR_S),
         hourly_starts=starts(hour_ns, _HOUR_S),
         hourly_known_h=_sums(known, held_ns, stamps_ns, hour_ns, _HOUR_S),
         daily_energy_kwh=sums(power_kw, day_ns, _DAY_S),
         daily_volume_m3=sums(flow_m3h, day_ns, _DAY_S),
-        daily_run_h=sums(running, day_ns, _DAY_S),
+        daily_run_h=sums(run_share, day_ns, _DAY_S),
         daily_starts=starts(day_ns, _DAY_S),
         daily_known_h=_sums(known, held_ns, stamps_ns, day_ns, _DAY_S),
     )
@@ -211,6 +227,20 @@ def _running(recording: Recording) -> Floats:
     flag, frequency_hz = recording.of_pumps("running"), recording.of_pumps("frequency_hz")
     state = np.where(np.isnan(flag), frequency_hz, flag)
     return np.where(np.isnan(state), np.nan, state > 0.0)
+
+
+def _run_share(recording: Recording) -> Floats:
+    """(pumps, n) share of the time that a row stands for in which a pump ran; NaN unknown."""
+    if recording.value != "mean":
+        return _running(recording)
+    flag = recording.of_pumps("running")
+    return np.where(np.isnan(flag), _running(recording), np.clip(flag, 0.0, 1.0))
+
+
+def _since_before(means: Floats) -> Floats:
+    """(pumps, n) means at the beginning of the interval that each is of; the last row begins none."""
+    none = np.full((means.shape[0], min(means.shape[1], 1)), np.nan)
+    return np.hstack((means[:, 1:], none))
 
 
 def _starts(running: Floats) -> Integers:

@@ -55,6 +55,7 @@ def prepare_file(
         "shifted": report.shifted,
         "out_of_order": report.out_of_order,
         "doubled": report.doubled,
+        "max_gap_s": report.max_gap_s,
         "gaps": [{"start": to_iso(gap.start_ns), "length_s": gap.length_s} for gap in report.gaps],
     }
 

@@ -144,7 +144,7 @@ class StationDetector:
             time_ns=np.array(message.time, dtype=np.int64),
             seq=np.array(message.seq, dtype=np.int64),
             values=message.values(len(self._publishers)),
-            is_switched=np.zeros(len(message.time), dtype=bool),
+            is_switched=np.zeros((len(message.time), len(self._publishers)), dtype=bool),
             pumps=len(message.pumps),
             is_bad=message.quality == "bad",
         )

@@ -13,6 +13,10 @@ def as_json(value: object) -> str:
     return json.dumps(value, indent=2)
 
 
+ONE_SAMPLE_S = 1.0
+"""Of a recording with so many seconds a row nothing needs to be said: pumps do not stop within them. [s]"""
+
+
 def as_lines(result: Mapping[str, object], indent: str = "") -> str:
     """A result for people: one value a line, a list of alike tables as one table.
 
@@ -84,7 +88,12 @@ def kpi_table(figures: Kpis, *, with_hours: bool) -> dict[str, object]:
         "energy_kwh": _figure(figures.energy_kwh.sum()),
         "specific_energy_kwh_m3": _figure(figures.station_specific_energy_kwh_m3),
     }
-    return {"days": days, "totals": totals, "station": station} | ({"hours": hours} if with_hours else {})
+    unseen = f"starts and stops between two rows, of which there is one in {figures.step_s:g} s"
+    return (
+        {"days": days, "totals": totals, "station": station}
+        | ({"not_seen": unseen} if figures.step_s > ONE_SAMPLE_S else {})
+        | ({"hours": hours} if with_hours else {})
+    )
 
 
 def _figure(value: float) -> float | None:

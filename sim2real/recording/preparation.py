@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from wetwell.protocols.messages.message import Stamp
+from wetwell.protocols.recordings.kpi import longest_step_s
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.table import Finite, Positive, Table
 from wetwell.protocols.timestamps import NS_PER_S
@@ -35,11 +36,14 @@ class Scale(Table):
 
 
 class Preparation(Table):
-    """What is done to a recording, in this order: scale, offset, sort by time, drop doubles, look for gaps."""
+    """What is done to a recording, in this order: scale, offset, sort by time, drop doubles, look for gaps.
+
+    Without `max_gap_s` a gap is longer than three usual steps of the recording, and than 10 s.
+    """
 
     scale: tuple[Scale, ...] = ()
     offset: tuple[Offset, ...] = ()
-    max_gap_s: Positive = 10.0
+    max_gap_s: Positive | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,14 +66,17 @@ class PreparationReport:
         Rows changed by the offsets of each column.
     out_of_order, doubled : int
         Rows that stood before an earlier one; rows dropped as their time was there already.
+    max_gap_s : float
+        Longest pause that is none of the gaps. [s]
     gaps : tuple of Gap
-        Pauses longer than asked for.
+        Pauses longer than that.
     """
 
     rows: int
     shifted: dict[str, int]
     out_of_order: int
     doubled: int
+    max_gap_s: float
     gaps: tuple[Gap, ...]
 
 
@@ -103,14 +110,16 @@ def prepare(recording: Recording, preparation: Preparation) -> tuple[Recording, 
     is_first = np.concatenate([[True], np.diff(time_ns) > 0]) if time_ns.size else np.zeros(0, dtype=bool)
     kept = order[is_first]
     steps_s = np.diff(recording.time_ns[kept]) / NS_PER_S
+    max_gap_s = preparation.max_gap_s or longest_step_s(recording.time_ns[kept])
     report = PreparationReport(
         rows=kept.size,
         shifted=shifted,
         out_of_order=int(np.sum(np.diff(recording.time_ns) < 0)),
         doubled=int(order.size - kept.size),
+        max_gap_s=max_gap_s,
         gaps=tuple(
             Gap(start_ns=int(recording.time_ns[kept[row]]), length_s=float(steps_s[row]))
-            for row in np.flatnonzero(steps_s > preparation.max_gap_s)
+            for row in np.flatnonzero(steps_s > max_gap_s)
         ),
     )
     prepared = replace(

@@ -117,7 +117,9 @@ def test_the_diagnosis_gets_two_files_without_truth_and_the_missing_effect_only(
         recording = read_recording(published / "recording.parquet")
         assert recording.truth == {}
         assert recording.ignored == ()
-        assert load_station(published / "station.toml").effect == ()
+        station = load_station(published / "station.toml")
+        assert station.effect == ()
+        assert recording.station == station.name
 
 
 @pytest.mark.parametrize("changed", ["sealed/case-0001.json", "published/case-0001/recording.parquet"])

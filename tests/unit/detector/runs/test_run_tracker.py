@@ -33,7 +33,7 @@ ON = Reading(50.0, 200.0, 26.0, 15.0, 1.0)
 def sample(second, *pumps, level_m=1.0):
     """A block of one sample."""
     values = [level_m, NAN, *(value for pump in pumps + (OFF,) * (3 - len(pumps)) for value in pump)]
-    time_ns, seq, switched = np.array([second * NS_PER_S]), np.array([second]), np.zeros(1, dtype=bool)
+    time_ns, seq, switched = np.array([second * NS_PER_S]), np.array([second]), np.zeros((1, 3), dtype=bool)
     return Block(time_ns, seq, np.array([values]), switched, 3, False)
 
 

@@ -13,6 +13,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 
 NAN = math.nan
 WARM_UP_S = 30
+STILL = np.zeros(2, dtype=bool)
 TABLE = np.zeros(2, dtype=datasheet.TABLE)
 """Two pumps on one main."""
 HEAD_LOST = np.zeros(2, dtype=np.int64)
@@ -34,7 +35,7 @@ def told(flows_m3h, *, running=None, period_s=1):
         pumps["is_running"] = (1, on == 2)
         frame = frame_of((NAN, flow_m3h, NAN, NAN, 1.0), (NAN, flow_m3h, NAN, NAN, float(on == 2)))
         gather_segments(
-            TABLE, gathered, number * period_s * NS_PER_S, float(period_s), frame, False, HEAD_LOST, pumps
+            TABLE, gathered, number * period_s * NS_PER_S, float(period_s), frame, STILL, HEAD_LOST, pumps
         )
         if gathered["is_full"][0] and watch.update(gathered[0]):
             changes.append((number * period_s, watch.evidence(on)))
@@ -44,7 +45,7 @@ def told(flows_m3h, *, running=None, period_s=1):
 def gathered_in(gathered, values, pumps, begin_s=0, seconds=LEARNT_S):
     """Whether a segment is full in each of some seconds with the same values."""
     return [
-        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps)
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, STILL, pumps)
         for second in range(begin_s, begin_s + seconds)
     ]
 
@@ -104,7 +105,7 @@ def test_a_pump_that_stands_or_that_can_be_judged_is_left_alone(name):
     pumps[name] = 0
     values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
     assert not any(
-        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, False, HEAD_LOST, pumps)
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, STILL, HEAD_LOST, pumps)
         for second in range(LEARNT_S)
     )
 
@@ -113,7 +114,7 @@ def test_a_pump_that_shows_everything_is_left_alone():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values = frame_of((50.0, 100.0, 26.0, NAN, 1.0))
     assert not any(
-        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, False, HEAD_LOST, pumps)
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, STILL, HEAD_LOST, pumps)
         for second in range(LEARNT_S)
     )
 
@@ -122,20 +123,20 @@ def test_a_pump_that_is_judged_without_a_head_sensor_is_left_alone():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values, lacks_head = frame_of((50.0, 100.0, NAN, NAN, 1.0)), np.ones(1, dtype=np.int64)
     seconds_ns = np.arange(LEARNT_S) * NS_PER_S
-    assert not any(gather_segments(TABLE, gathered, now, 1.0, values, False, lacks_head, pumps) for now in seconds_ns)
-    assert any(gather_segments(TABLE, gathered, now, 1.0, values, False, HEAD_LOST, pumps) for now in seconds_ns)
+    assert not any(gather_segments(TABLE, gathered, now, 1.0, values, STILL, lacks_head, pumps) for now in seconds_ns)
+    assert any(gather_segments(TABLE, gathered, now, 1.0, values, STILL, HEAD_LOST, pumps) for now in seconds_ns)
 
 
 def test_a_clock_that_is_set_begins_a_segment_anew():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
     begun = [
-        gather_segments(TABLE, gathered, (10_000 + second) * NS_PER_S, 1.0, values, False, HEAD_LOST, pumps)
+        gather_segments(TABLE, gathered, (10_000 + second) * NS_PER_S, 1.0, values, STILL, HEAD_LOST, pumps)
         for second in range(50)
     ]
     set_back = [
         gather_segments(
-            TABLE, gathered, second * NS_PER_S, 1.0 if second else math.inf, values, False, HEAD_LOST, pumps
+            TABLE, gathered, second * NS_PER_S, 1.0 if second else math.inf, values, STILL, HEAD_LOST, pumps
         )
         for second in range(55)
     ]

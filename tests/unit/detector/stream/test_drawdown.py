@@ -53,7 +53,9 @@ def told_of_both(frames, *, area_m2=AREA_M2):
         pumps["is_running"] = running
         flows = (value for flow_m3h in frame.flows_m3h for value in (NAN, flow_m3h, NAN, NAN, NAN))
         values = np.array([frame.level_m, frame.inflow_m3h, *flows])
-        draw_down(phases, area_m2, period[0], frame.time_ns, frame.gap_s, values, False, pumps)
+        draw_down(
+            phases, area_m2, period[0], frame.time_ns, frame.gap_s, values, np.zeros(len(pumps), dtype=bool), pumps
+        )
         note_gap(period[0], frame.gap_s)
     return pumps["log_ratio"].tolist()
 

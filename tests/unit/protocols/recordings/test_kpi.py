@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from wetwell.protocols.recordings.kpi import kpis
+from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.timestamps import NS_PER_S
 
@@ -77,9 +78,10 @@ def test_figures_are_those_of_pandas(step_s: int, max_gap_s: int) -> None:
     np.testing.assert_allclose(figures.daily_known_h, daily["held"] / 3600)
 
 
-def rows(time_s: list[float], **columns: list[float]) -> Recording:
+def rows(time_s: list[float], value: StoredValue = "instant", **columns: list[float]) -> Recording:
     stamps_ns = (np.array(time_s) * NS_PER_S).astype(np.int64)
-    return Recording(time_ns=stamps_ns, columns={f"pump1_{n}": np.array(v, dtype=float) for n, v in columns.items()})
+    of_pump = {f"pump1_{name}": np.array(values, dtype=float) for name, values in columns.items()}
+    return Recording(time_ns=stamps_ns, columns=of_pump, value=value)
 
 
 def test_a_gap_counts_nothing() -> None:
@@ -89,6 +91,33 @@ def test_a_gap_counts_nothing() -> None:
     assert figures.run_h == pytest.approx([2.0 / 3600.0])
     assert figures.volume_m3 == pytest.approx([2.0])
     assert kpis(gap, max_gap_s=1000.0).energy_kwh == pytest.approx([1002.0])
+
+
+@pytest.mark.parametrize("period_s", [10, 60, 900])
+def test_means_give_the_energy_the_volume_and_the_run_time_of_the_seconds(period_s: int) -> None:
+    rng = np.random.default_rng(period_s)
+    on = np.repeat(rng.integers(0, 2, 200), rng.integers(100, 900, 200))
+    on = np.concatenate([on[: on.size // period_s * period_s], np.zeros(0)])
+    power_kw, flow_m3h = on * (10.0 + rng.random(on.size)), on * (200.0 + rng.random(on.size))
+    means = {
+        name: values.reshape(-1, period_s).mean(axis=1)
+        for name, values in (("power_kw", power_kw), ("flow_m3h", flow_m3h), ("running", on))
+    }
+    ends_s = period_s * np.arange(1, on.size // period_s + 1)
+    figures = kpis(rows(ends_s, "mean", **means))
+    rest = slice(period_s, None)  # of the first mean nobody knows when it began
+    assert figures.energy_kwh == pytest.approx([power_kw[rest].sum() / 3600.0])
+    assert figures.volume_m3 == pytest.approx([flow_m3h[rest].sum() / 3600.0])
+    assert figures.run_h == pytest.approx([on[rest].sum() / 3600.0])
+    assert figures.step_s == period_s
+
+
+def test_two_parts_of_means_that_share_a_row_add_up() -> None:
+    time_s, power_kw = [0, 900, 1800, 2700], [1.0, 2.0, 4.0, 8.0]
+    whole = kpis(rows(time_s, "mean", power_kw=power_kw)).energy_kwh
+    parts = [kpis(rows(time_s[part], "mean", power_kw=power_kw[part])) for part in (slice(0, 3), slice(2, 4))]
+    assert parts[0].energy_kwh + parts[1].energy_kwh == pytest.approx(whole)
+    assert whole == pytest.approx([14.0 / 4.0])
 
 
 def test_frequency_speaks_where_the_flag_does_not() -> None:
@@ -130,6 +159,14 @@ def test_the_command_prints_days_and_totals(run_wetwell, tmp_path, capsys, as_js
         assert [row["energy_kwh"] for row in shown["totals"]] == pytest.approx(energy_kwh.tolist(), abs=1e-3)
         assert len(shown["days"]) == 2 * len(PUMPS)
         assert len(shown["hours"]) == 6
+        assert "not_seen" not in shown
     else:
         assert "2025-01-02" in printed
         assert f"{energy_kwh[0]:.2f}"[:-1] in printed
+
+
+def test_the_command_says_what_a_slow_recording_does_not_show(run_wetwell, tmp_path, capsys) -> None:
+    write_recording(field_recording(60), tmp_path / "r.parquet")
+    assert run_wetwell("kpi", "--recording", tmp_path / "r.parquet") == 0
+    said = "not_seen: starts and stops between two rows, of which there is one in 60 s"
+    assert said in capsys.readouterr().out

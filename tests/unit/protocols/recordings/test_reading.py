@@ -155,3 +155,16 @@ def test_import_files_under_the_station_of_the_recording(run_wetwell, tmp_path, 
     assert "own.csv: is of station 'alpha', not of 'beta'" in capsys.readouterr().err
     assert run_wetwell(*command, "own.csv", "--station", "beta", "--as-station") == 0
     assert '"station": "beta"' in capsys.readouterr().out
+
+
+def test_all_that_is_made_of_a_recording_carries_its_station(run_wetwell, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    station, source = ["--station", "alpha"], ["--recording", "made.csv.gz"]
+    assert run_wetwell("simulate", *station, "--days", "0.2", "--seed", "3", "--out", "made.csv.gz") == 0
+    assert run_wetwell("prepare", *source, "--out", "prepared.csv") == 0
+    assert run_wetwell("gap", "replay", *station, *source, "--out", "replayed.parquet") == 0
+    assert run_wetwell("validate", *station, *source, "--out", "simulated.csv") == 0
+    assert run_wetwell("import", *source, "--data", "history") == 0
+    assert run_wetwell("export", *station, "--data", "history", "--out", "exported.csv") == 0
+    made = ["made.csv.gz", "prepared.csv", "replayed.parquet", "simulated.csv", "exported.csv"]
+    assert {name: read_recording(tmp_path / name).station for name in made} == dict.fromkeys(made, "alpha")

@@ -30,6 +30,15 @@ def test_rows_are_sorted_doubles_dropped_and_gaps_listed():
     assert [(gap.start_ns, gap.length_s) for gap in report.gaps] == [(START_NS + 2 * NS_PER_S, 28.0)]
 
 
+@pytest.mark.parametrize(("step_s", "max_gap_s"), [(1, 10.0), (5, 15.0), (60, 180.0), (900, 2700.0)])
+def test_without_a_longest_gap_it_follows_the_rate(step_s, max_gap_s):
+    seconds = step_s * np.array([0, 1, 2, 3, 4, 5, 16, 17, 18])
+    _, report = prepare(recording(seconds), Preparation())
+    assert report.max_gap_s == max_gap_s
+    assert [gap.length_s for gap in report.gaps] == [11.0 * step_s]
+    assert prepare(recording(seconds), Preparation(max_gap_s=0.5))[1].max_gap_s == 0.5
+
+
 def test_an_offset_acts_within_its_span_only_and_is_counted():
     raw = recording(range(10))
     span = {"column": "level_m", "value": 0.8, "start": "2024-11-20T12:00:02Z", "end": "2024-11-20T12:00:04Z"}
