@@ -237,6 +237,7 @@ def test_the_overview_knows_the_names_of_the_pumps(view) -> None:
     view.advance(0.25)
     summary = json.loads(view.site_state())["stations"]["0"]
     assert summary["names"] == ["1.1", "2.1", "1.2", "2.2"]
+    assert summary["floor"] == pytest.approx(-2.0 - 5.0 / 9.0)
 
 
 def test_alarms_count_until_they_are_normal(view) -> None:
