@@ -1,6 +1,6 @@
 """Days that are complete, a Parquet file each: `samples/station=alpha/2026-11-20.parquet`; in `minutes/` likewise.
 
-A file of samples is a recording of the house's form with two more columns, `seq` and `quality`, and carries its station.
+A file of samples is a recording with two more columns, `seq` and `quality`; it carries its station.
 """
 
 import os
