@@ -2,16 +2,20 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.station.sump import Sump
+from wetwell.services.stations import find_station
 from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.simulator.duty import duty_flows_m3h
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.forcing import healthy_forcing
+from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.parameters import plant_parameters
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
 from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.wet_well import level_at_volume_m, profile_of_slices, volume_at_level_m3
 
@@ -149,3 +153,39 @@ def test_level_and_volume_invert_each_other_on_points_of_volume(level_m, volume_
     held_m3 = share * top_m3
     at_m = level_at_volume_m(held_m3, profile)
     assert volume_at_level_m3(at_m, profile) == pytest.approx(held_m3, rel=1e-6, abs=1e-6 * top_m3)
+
+
+@given(numbers(0.2, 3.0), numbers(0.2, 3.0), numbers(0.3, 4.0), numbers(0.01, 4.5))
+def test_the_shape_of_a_sump_scales_points_of_volume_by_the_height_over_the_floor(bottom, top, height_m, over_m):
+    """Against the slope of the volume, and the factor of straight walls, which is written here a second time."""
+    points = [[-3.0, 0.0], [-2.0, 9.0], [1.0, 69.0]]
+    effect = {"name": "sump_area_profile", "bottom_factor": bottom, "top_factor": top, "height_m": height_m}
+    table = {"name": "s", "sump": {"volume_points": points}, "pump": [{"curve": [36.0, -0.02, -1e-4]}]}
+    profile = effective_parameters(Station.model_validate(table | {"effect": [effect]})).profile
+    step_m = 1e-5
+    around = (over_m - step_m, over_m + step_m)
+    edges_m = (1.0, height_m, 2.0 * height_m)
+    assume(not any(around[0] <= edge_m <= around[1] for edge_m in edges_m))
+    below_m3, above_m3 = (volume_at_level_m3(-3.0 + each_m, profile) for each_m in around)
+    factor = np.interp(over_m, [0.0, height_m, 2.0 * height_m], [bottom, 1.0, top])
+    configured_m2 = 9.0 if over_m < 1.0 else 20.0
+    assert (above_m3 - below_m3) / (2.0 * step_m) == pytest.approx(configured_m2 * factor, rel=1e-5)
+
+
+def test_a_tunnel_under_zero_keeps_its_water():
+    """The volume by the true levels moves by what flows, to 1e-9 m³ in each second, down to the dry floor."""
+    table = find_station("twin").model_dump(exclude_none=True)
+    table["control"] |= {"start_levels_m": [-1.0], "stop_levels_m": [-2.55]}
+    station = Station.model_validate(table)
+    scenario = Scenario(name="dry", initial_level_m=-1.5, inflow=RecordedInflow(time_s=[0.0], flow_m3h=[60.0]))
+    recording = Simulation(station, scenario, 1).advance(4 * 3600)
+    truth = recording.truth
+    pumped_m3h = np.sum([truth[f"truth_pump{number}_flow_m3h"] for number in range(1, 5)], axis=0)
+    assert pumped_m3h.max() > 100.0
+    profile = plant_parameters(station).profile
+    volume_m3 = np.array([volume_at_level_m3(level_m, profile) for level_m in truth["truth_level_m"]])
+    np.testing.assert_allclose(np.diff(volume_m3), (60.0 - pumped_m3h)[:-1] / 3600.0, rtol=0, atol=1e-9)
+    assert truth["truth_level_m"].min() == pytest.approx(-2.55, abs=0.05)
+    late = Scenario(name="under", initial_level_m=-2.6)
+    with pytest.raises(ValueError, match="the floor of station 'twin' is at -2"):
+        Simulation(station, late, 1)

@@ -107,3 +107,16 @@ def test_a_level_that_is_lost_is_a_sensor_fault(twin, learnt):
     recording.columns["level_m"][:] = np.nan
     after = told(restored(twin, learnt[0]), recording)
     assert {verdict.state for each in after.values() for verdict in each[1:]} == {"sensor_fault"}
+
+
+def test_a_level_that_falls_within_a_run_is_no_motion_of_the_main(twin):
+    """The attribution index of healthy runs is that of a main with a fixed lift; the level is no part of it."""
+    lift_m = 14.0 - twin.middle_level_m
+    fixed = [main.model_copy(update={"delivery_level_m": None, "static_head_m": lift_m}) for main in twin.mains]
+
+    def index(station):
+        verdicts = told(Detector(station.name, datasheet_of(station)), recorded(station, SEED + 4, 0))
+        evidence = [verdict.evidence for each in verdicts.values() for verdict in each]
+        return np.median([each["tangent"]["value"] for each in evidence if "tangent" in each])
+
+    assert index(twin) == pytest.approx(index(twin.with_mains(fixed)), abs=0.1)
