@@ -1,6 +1,6 @@
 """Days that are complete, a Parquet file each: `samples/station=alpha/2026-11-20.parquet`; in `minutes/` likewise.
 
-A file of samples is a recording of the house's form with two more columns, `seq` and `quality`.
+A file of samples is a recording with two more columns, `seq` and `quality`; it carries its station.
 """
 
 import os
@@ -15,6 +15,7 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.quantities import columns_of, pumps_of, pumps_of_width
+from wetwell.protocols.recordings.origin import Origin
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.summary import Summary
@@ -94,7 +95,7 @@ class Archive:
         columns = {"seq": pa.array(samples.seq), "quality": pa.array(samples.quality.astype(np.int8))}
         values = dict(zip(samples.columns, samples.values.T, strict=True))
         path = self.path("samples", station, day_ns)
-        _write(path, samples.time_ns, values, columns)
+        _write(path, samples.time_ns, values, columns, Origin(station=station))
         kept = self.samples(station, day_ns)
         if kept is None or not all(
             np.array_equal(getattr(kept, name), getattr(samples, name), equal_nan=True)
@@ -107,7 +108,7 @@ class Archive:
         names = columns_of(pumps_of_width(minutes.mean.shape[1]))
         counts = {f"{name}_count": column for name, column in zip(names, minutes.count.T, strict=True)}
         path = self.path("minutes", station, day_ns)
-        _write(path, minutes.time_ns, minutes.columns() | counts, {})
+        _write(path, minutes.time_ns, minutes.columns() | counts, {}, Origin())
         kept = self.minutes(station, day_ns)
         if kept is None or not all(
             np.array_equal(getattr(kept, name), getattr(minutes, name), equal_nan=True)
@@ -132,9 +133,10 @@ class Archive:
             raise StoreError(f"{path}: cannot be read: {error}") from error
 
 
-def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: dict[str, Any]) -> None:
+def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: dict[str, Any], origin: Origin) -> None:
     arrays = {name: pa.array(column, mask=np.isnan(column)) for name, column in values.items()}
     table = pa.table({"time": pa.array(time_ns, _STAMP), **columns, **arrays})
+    table = table.replace_schema_metadata(origin.metadata)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_file(path) as file:

@@ -5,6 +5,7 @@ seed 7; pump 2 was re-baselined after 36 001 s, and a run of pump 1 was open.
 """
 
 import gzip
+import hashlib
 import json
 from pathlib import Path
 
@@ -47,6 +48,30 @@ def rest(alpha):
     for block in blocks(recording, len(alpha.pump)):
         is_new = block.seq >= SEEN
         yield Block(*(column[is_new] for column in block[:4]), *block[4:])
+
+
+def without_steps(snapshot):
+    """A snapshot as the same form had it before the usual step was learnt."""
+    head, body = snapshot.strip().split(b"\n")
+    state = json.loads(body)
+    arrays = dict(state["dict"])["arrays"]["dict"]
+    arrays[:] = [item for item in arrays if item[0] != "sampling_steps"]
+    text = json.dumps(state, separators=(",", ":"))
+    header = json.loads(head) | {"sha256": hashlib.sha256(text.encode()).hexdigest()}
+    return f"{json.dumps(header)}\n{text}\n".encode()
+
+
+def test_a_snapshot_without_the_usual_step_says_what_one_with_it_says(alpha):
+    blocks_of_hours = list(blocks(Simulation(alpha, find_scenario("paper"), 7).advance(14 * 3600, truth=False), 3))
+    half = len(blocks_of_hours) // 2
+    whole, older = (Detector(alpha.name, datasheet_of(alpha)) for _ in range(2))
+    for block in blocks_of_hours[:half]:
+        whole.update_block(block)
+    older.restore(without_steps(whole.snapshot()))
+    told = [[detector.update_block(block) for block in blocks_of_hours[half:]] for detector in (whole, older)]
+    assert told[0] == told[1]
+    assert any(verdict.state == "normal" for verdicts in told[0] for verdict in verdicts)
+    assert whole.snapshot() == older.snapshot()
 
 
 def test_each_form_has_its_upgrade():

@@ -56,6 +56,7 @@ def test_a_daily_file_is_a_recording(tmp_path: Path) -> None:
     filed = read_recording(store.archive.path("samples", "alpha", START_NS))
     assert len(filed) == 144
     assert filed.ignored == ("seq", "quality")
+    assert filed.station == "alpha"
     store.close()
 
 
