@@ -90,8 +90,8 @@ def move_plant(
         turn_pumps(plant, state, forcing, second)
         for m in range(plant.mains.size):
             move_water(plant, state, forcing, second, m, level_m)
-    for m in range(plant.mains.size):
-        if plant.mains[m].air_head_m > 0.0:
+    if plant.has_air:
+        for m in range(plant.mains.size):
             gather_air(plant, state, m)
     over_m3h = overflow_m3h(level_m, station.overflow_level_m, station.weir_width_m, plant.profile)
     inflow_m3h = forcing.inflow_m3h[second] + station.unmetered_inflow_m3h + extra_inflow_m3h
