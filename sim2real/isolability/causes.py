@@ -18,9 +18,11 @@ MATERIAL = 0.05
 SHAPED_SHARE = 0.5
 """Share of the load in the power from which its form is varied. [1]"""
 
-MOST = 10.0
+MOST_SIZES = 10.0
 """So many times its material size a cause is at the most: what is larger is seen without any of this. [1]"""
-ONE_SIDED = frozenset({"level_dependent_static_head", "common_header", "pump_wear", "motor_slip", "unmetered_inflow"})
+NEVER_NEGATIVE = frozenset(
+    {"level_dependent_static_head", "common_header", "pump_wear", "motor_slip", "unmetered_inflow"}
+)
 """Effects that cannot be negative."""
 
 CauseKind = Literal["effect", "fault"]
@@ -58,7 +60,7 @@ class Cause:
     @property
     def limits(self) -> tuple[float, float]:
         """Least and most of each form, in material sizes."""
-        return (0.0 if self.is_one_sided else -MOST), MOST
+        return (0.0 if self.is_one_sided else -MOST_SIZES), MOST_SIZES
 
 
 def causes_of(station: Station, plant: PlantParameters) -> tuple[Cause, ...]:
@@ -110,7 +112,7 @@ def _effects(rise: float, lost_m: float, lost_m3h: float, low_m: float, high_m: 
             kind="effect",
             component=EFFECTS[name].component,
             forms=tuple(EFFECTS[name].model_validate(form) for form in given),
-            is_one_sided=name in ONE_SIDED,
+            is_one_sided=name in NEVER_NEGATIVE,
         )
         for name, given in forms.items()
     )
