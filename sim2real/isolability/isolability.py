@@ -24,6 +24,8 @@ from wetwell.sim2real.isolability.duty_points import DutyPoint, control_points
 from wetwell.sim2real.isolability.signatures import Signature, signatures_of
 from wetwell.simulator.effects import effective_parameters
 
+LINEAR = 0.02
+"""Share of the material size at which signatures are taken: curvature is no mark of a cause. [1]"""
 TELLING = 4.0
 """Units of noise that are no chance: of a few hundred comparisons, less than one in fifty goes so far by itself."""
 
@@ -95,7 +97,7 @@ def isolability(
     """
     plant = effective_parameters(station)
     at = control_points(station, plant) if points is None else tuple(points)
-    signatures = signatures_of(plant, station, at, causes_of(station, plant), signals)
+    signatures = signatures_of(plant, station, at, causes_of(station, plant, LINEAR), signals)
     return judged(signatures, tuple(name for name in SIGNALS.values() if name in signals), len(at))
 
 

@@ -2,7 +2,7 @@ r"""Signatures: what a cause changes in the steady readings, in units of noise, 
 
 Readings y of flow, head and power of running pumps, of the rise of the level, and of the inflow, at each duty point:
 
-$$s = P\, W \left(y(\text{cause}) - y(\text{none})\right), \qquad P = I - N N^+$$
+$$s = \frac{1}{\epsilon} P\, W \left(y(\epsilon\, \text{cause}) - y(\text{none})\right), \qquad P = I - N N^+$$
 
 W is one over the noise of a mean (of the level: of a slope), and N holds what the true inflow changes: of each point
 for itself where it is metered, of each cycle otherwise. Where the level is not measured, nobody knows which of the
@@ -30,9 +30,13 @@ LEAST_NOISE = 1e-4
 """Noise of the meters at the least, in case that a station file tells none. [1, m]"""
 
 
+UNSEEN = 1e-3
+"""A form that changes so little is none at this station, by these signals. [noise]"""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signature:
-    """(rows, forms) what the forms of a cause change, in units of noise."""
+    """(rows, forms) what those forms of a cause that show themselves change, in units of noise; one at least."""
 
     cause: Cause
     columns: Floats
@@ -72,18 +76,21 @@ def signatures_of(
     basis = _basis(_nuisance(plain, points, reading) / noise[:, None])
     before = reading.of(plain)
 
-    def column(form: Form) -> Floats:
+    def column(form: Form, share: float) -> Floats:
         changed = (
             steady_values(form.modify(plant), points)
             if isinstance(form, Effect)
             else steady_values(plant, points, [form])
         )
-        seen = (reading.of(changed) - before) / noise
+        seen = (reading.of(changed) - before) / noise / share
         return np.asarray(seen - basis @ (basis.T @ seen))
 
-    return tuple(
-        Signature(cause=cause, columns=np.column_stack([column(form) for form in cause.forms])) for cause in causes
-    )
+    def signature(cause: Cause) -> Signature:
+        columns = np.column_stack([column(form, cause.share) for form in cause.forms])
+        is_seen = np.linalg.norm(columns, axis=0) > UNSEEN
+        return Signature(cause=cause, columns=columns[:, is_seen] if is_seen.any() else columns[:, :1])
+
+    return tuple(map(signature, causes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -115,6 +115,21 @@ def test_what_the_station_file_holds_already_is_not_seen_again(alpha):
     assert told(joined, "flow")["common_header"].size == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_lift_that_follows_the_level_already_may_follow_it_more_and_power_by_load_take_another_form():
+    tunnel = {
+        "name": "tunnel",
+        "sump": {"volume_points": [[0.0, 350.0], [2.0, 6800.0], [4.0, 20000.0]]},
+        "pump": [{"curve": [45.0, 0.0, -5e-6]}, {"curve": [45.0, 0.0, -1.2e-6]}],
+        "rising_main": {"delivery_level_m": 30.0, "friction_h2_m5": 1.2e-7, "layout": "common"},
+        "control": {"mode": "external"},
+        "electrical": {"rated_current_a": 400.0, "power_model": "load"},
+    }
+    found = told(Station.model_validate(tunnel), "flow", "power", "level")
+    assert 50.0 < found["level_dependent_static_head"].size < 1000.0
+    assert found["static_head_bias"].same_as == ()
+    assert found["load_dependent_power"].is_visible
+
+
 def test_signatures_are_changes_over_noise(alpha):
     plant = plant_parameters(alpha)
     causes = [cause for cause in causes_of(alpha, plant) if cause.name in {"flow_meter_gain", "head_sensor_offset"}]
@@ -171,6 +186,8 @@ def test_pumps_of_two_mains_run_in_cycles_of_their_own():
     station = Station.model_validate(table | {"pump": pumps, "main": mains, "control": control})
     points = control_points(station, plant_parameters(station))
     running = {tuple(hz > 0.0 for hz in point.frequency_hz) for point in points}
+    layout = {cause.name: cause for cause in isolability(station, [SIGNALS["flow"]]).causes}["common_header"]
+    assert layout.size == pytest.approx(0.0, abs=1e-6)
     assert (True, True, False, False) in running
     assert (False, False, True, True) in running
     assert not any(any(states[:2]) and any(states[2:]) for states in running)
