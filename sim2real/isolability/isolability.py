@@ -19,7 +19,8 @@ from scipy.optimize import lsq_linear
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.quantities import SIGNALS, SensedQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.isolability.causes import CauseKind, causes_of
+from wetwell.sim2real.isolability.cause import CauseKind
+from wetwell.sim2real.isolability.causes import causes_of
 from wetwell.sim2real.isolability.duty_points import DutyPoint, control_points
 from wetwell.sim2real.isolability.signatures import Signature, signatures_of
 from wetwell.simulator.effects import effective_parameters

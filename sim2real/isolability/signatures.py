@@ -18,7 +18,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity, SensedQuantity
 from wetwell.protocols.station.station_file import Sensors, Station
-from wetwell.sim2real.isolability.causes import Cause, Form
+from wetwell.sim2real.isolability.cause import Cause, Form
 from wetwell.sim2real.isolability.duty_points import DutyPoint
 from wetwell.sim2real.isolability.steady import HOUR_S, SteadyValues, steady_values
 from wetwell.simulator.effects.effect import Effect
