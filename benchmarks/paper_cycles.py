@@ -181,7 +181,7 @@ def reasons(station: Station, recording: Recording) -> dict[str, Any]:
                 run.head_m,
                 run.speed_ratio,
                 curve=datasheet.curves[0],
-                friction_h2_m5=datasheet.friction_h2_m5,
+                friction_h2_m5=datasheet.main_of(0).friction_h2_m5,
             )
             noise.append(float(np.std(steps[component])))
             between.append(abs(float(run.segments.residual_m[:, component].mean() - usual_m)))

@@ -54,6 +54,11 @@ PUMP_ANALOGUES: tuple[AnalogueQuantity, ...] = tuple(each.name for each in _PUMP
 PUMP_METERS: tuple[AnalogueQuantity, ...] = tuple(name for name in PUMP_ANALOGUES if name != "frequency_hz")
 """What the instruments of a pump measure."""
 
+SIGNALS: Mapping[str, SensedQuantity] = MappingProxyType(
+    {"level": "level_m", "inflow": "inflow_m3h", "flow": "flow_m3h", "head": "head_m", "power": "power_kw"}
+)
+"""What an instrument measures, by the word for it."""
+
 LEVEL, INFLOW = range(len(_STATION))
 FIRST_PUMP = len(_STATION)
 """Places in a row: the values of the station, then those of the first pump."""
@@ -98,6 +103,19 @@ def pump_of(column: str) -> int:
     """
     match = _PUMP_COLUMN.fullmatch(column)
     return int(match[1]) if match else 0
+
+
+def quantity_of(column: str) -> AnalogueQuantity | Literal["running"] | None:
+    """What a column holds; None for what is no column.
+
+    Examples
+    --------
+    >>> quantity_of("pump12_head_m"), quantity_of("level_m"), quantity_of("pump1_colour")
+    ('head_m', 'level_m', None)
+    """
+    match = _PUMP_COLUMN.fullmatch(column)
+    found = (PUMP_QUANTITIES if match else STATION_QUANTITIES).get(match[2] if match else column)
+    return found.name if found else None
 
 
 def pumps_of(columns: Iterable[str]) -> int:

@@ -19,6 +19,7 @@ from wetwell.services.commands.options import (
     positive,
     print_batch,
     print_result,
+    signals_named,
 )
 
 app = typer.Typer(no_args_is_help=True, help="The gap between simulation and reality.")
@@ -33,7 +34,20 @@ def gap_trial(
     kinds: Annotated[
         str, typer.Option(help="Of single, pair, none, open, leave_one_out; with commas.")
     ] = "single,pair,none,open,leave_one_out",
-    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    days: Annotated[
+        float | None,
+        typer.Option(help="Length of each recording; default 1, or 14 with rows further apart than a minute."),
+    ] = None,
+    every: Annotated[str, typer.Option(metavar="S", help="Seconds from row to row; several with commas.")] = "1",
+    value: Annotated[
+        str, typer.Option(help="What a row holds: of instant, mean, held; several with commas.")
+    ] = "instant",
+    without_signals: Annotated[
+        str, typer.Option("--without-signals", help="Of level, inflow, flow, head, power; with commas.")
+    ] = "",
+    with_inflow: Annotated[
+        float, typer.Option("--with-inflow", min=0.0, max=1.0, help="Share of the cases with an inflow meter.")
+    ] = 0.5,
     workers: Annotated[int, typer.Option(min=1, help="Diagnoses at once.")] = 1,
     scheduler: SchedulerOption = None,
     recalibration: Annotated[
@@ -51,17 +65,27 @@ def gap_trial(
     import shlex
 
     from wetwell.services.batch.executors import check_scheduler
-    from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds
+    from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds, parse_rates, parse_values
     from wetwell.services.trial.result import brief
     from wetwell.services.trial.run import run_trial
+    from wetwell.sim2real.trial.cases import StoragePlan
 
     check_scheduler(scheduler)
+    rates_s = parse_rates(every)
+    if days is None:
+        days = 1.0 if max(rates_s) <= 60 else 14.0
     plan = TrialPlan(
         seed=seed,
         count=cases,
         kinds=parse_kinds(kinds),
         plants=("fine", "swmm") if plant == "both" else (plant,),
         seconds=round(positive(days, "--days") * 86_400.0),
+        storage=StoragePlan(
+            rates_s=rates_s,
+            values=parse_values(value),
+            absent=signals_named(without_signals, "--without-signals"),
+            metered_share=with_inflow,
+        ),
         command=DIAGNOSE if diagnoser is None else tuple(shlex.split(diagnoser)),
         replay=REPLAY if unseen else (),
         has_recalibration=recalibration,

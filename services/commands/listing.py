@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.options import ConfigOption, JsonOption, StationOption, print_result
+from wetwell.services.commands.options import ConfigOption, JsonOption, StationOption, print_result, signals_named
 from wetwell.services.runtime.settings import load_settings
 
 if TYPE_CHECKING:
@@ -30,13 +30,32 @@ def station_check(file: Annotated[str, typer.Argument(help="Station file.")]) ->
 
 @station_app.command("show")
 def station_show(
-    file: Annotated[str, typer.Argument(help="Station file.")] = "alpha", as_json: JsonOption = False
+    file: Annotated[str, typer.Argument(help="Station file.")] = "alpha",
+    signals: Annotated[
+        str | None,
+        typer.Option("--signals", help="Say what can be told apart by them: level, inflow, flow, head, power."),
+    ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            "--recording", metavar="FILE", help="Say what can be told apart by its signals and duty points."
+        ),
+    ] = None,
+    as_json: JsonOption = False,
 ) -> None:
-    """Print the duty points of a station, for each pump alone and for all together."""
+    """Print the duty points of a station, for each pump alone and for all together; or what can be told apart."""
     from wetwell.services.stations import find_station
     from wetwell.simulator.duty import duty_table
 
-    print_result(duty_table(find_station(file)), as_json=as_json)
+    station = find_station(file)
+    if signals is None and recording is None:
+        return print_result(duty_table(station), as_json=as_json)
+    from wetwell.services.batch.isolability import isolability_of
+    from wetwell.services.reports.isolability_table import isolability_table
+
+    given = None if signals is None else signals_named(signals, "--signals")
+    told = isolability_of(station, given, recording)
+    return print_result(isolability_table(station, told, as_json=as_json), as_json=as_json)
 
 
 @config_app.command("check")

@@ -15,6 +15,7 @@ from wetwell.protocols.station.table import Table
 from wetwell.services.runtime.settings import HistorianSettings, Settings, load_settings
 
 if TYPE_CHECKING:
+    from wetwell.protocols.quantities import SensedQuantity
     from wetwell.simulator.scenario import Scenario
     from wetwell.simulator.simulation import Simulation
 
@@ -146,6 +147,27 @@ def live_plant(station: str, scenario: str, seed: int, speed: float | None) -> t
     plan = find_scenario(scenario)
     speed = plan.clock_speed if speed is None else positive(speed, "--speed")
     return plant_of(station, plan, seed, this_second_ns() if speed == 1.0 else DEFAULT_START_NS), speed
+
+
+def signals_named(text: str, flag: str) -> tuple["SensedQuantity", ...]:
+    """Quantities of signals in a list with commas, which may be empty.
+
+    Raises
+    ------
+    ConfigError
+        If one is not known.
+
+    Examples
+    --------
+    >>> signals_named("head, flow", "--signals")
+    ('flow_m3h', 'head_m')
+    """
+    from wetwell.protocols.quantities import SIGNALS
+
+    named = [part.strip() for part in text.split(",") if part.strip()]
+    if unknown := [name for name in named if name not in SIGNALS]:
+        raise ConfigError(f"{flag}: got '{unknown[0]}', must be of {', '.join(SIGNALS)}")
+    return tuple(quantity for name, quantity in SIGNALS.items() if name in named)
 
 
 def positive(value: float, flag: str) -> float:

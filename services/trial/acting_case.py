@@ -11,15 +11,17 @@ from wetwell.sim2real.trial.cases import PlantName, TrialCase
 from wetwell.sim2real.truth import truth_plant
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS
+from wetwell.sim2real.truth.storage import EVERY_SECOND, stored
 
 ATTEMPTS = 8
 """Draws after which a case is given up: a short recording may have no room for its effect."""
 
 
 def acting_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
-    """The case in its first attempt in which every deviation changes a recorded value, with truth and recording.
+    """The case in its first attempt in which every deviation changes a value of a second, with truth and recording.
 
-    Only deviations of a kind that may never act are looked at, by a twin that is made without them.
+    Only deviations of a kind that may never act are looked at, by a twin that is made without them; what the
+    historian keeps of the seconds does not count.
 
     Raises
     ------
@@ -30,10 +32,11 @@ def acting_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
     for attempt in range(ATTEMPTS):
         case = replace(case, attempt=attempt)
         truth = case.truth()
-        recording = recording_of(truth, case.plant)
-        idle = idle_name(truth, case.plant, recording)
+        sensed = replace(truth, storage=EVERY_SECOND)
+        recording = recording_of(sensed, case.plant)
+        idle = idle_name(sensed, case.plant, recording)
         if not idle:
-            return case, truth, recording
+            return case, truth, stored(recording, truth.storage)
     raise WetwellError(
         f"{case.name}: '{idle}' changes no recorded value of plant '{case.plant}' in any of {ATTEMPTS} draws: "
         "a longer recording may show it"

@@ -24,29 +24,37 @@ def trial_page(result: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) ->
         "file and recording only; the labels were sealed before and opened after it."
     )
     kinds = result["kinds_scored"] | {"all": result["all"]}
-    matrix = result["confusion"]
     return page(
         f"Trial of seed {result['seed']}",
         [
             Section("What was tried", paragraph(intro)),
             Section("Shares", _bars(kinds) + _share_table("kind", kinds)),
             Section("By plant", _share_table("plant", result["plants_scored"])),
-            Section(
-                "Truth against answer",
-                heat_map(
-                    "Cases by truth and by what was told first",
-                    matrix["rows"],
-                    matrix["columns"],
-                    matrix["counts"],
-                    row_label="truth",
-                    column_label="told",
-                ),
-            ),
+            *(Section(f"By {name}", _split(name, groups)) for name, groups in result["splits"].items()),
+            Section("Truth against answer", _confusion("all cases", result["confusion"])),
             Section("Single effects", _share_table("effect", result["effects_scored"])),
             Section("Controls", _controls(result["controls"])),
             *([Section("Unseen recordings", _holdout(result["unseen"]))] if result["unseen"] else []),
             Section("Cases", _cases(cases)),
         ],
+    )
+
+
+def _split(name: str, groups: Mapping[str, Mapping[str, Any]]) -> str:
+    shares = _share_table(name, {group: parts["scores"] for group, parts in groups.items()})
+    if len(groups) < 2:
+        return shares
+    return shares + "".join(_confusion(group, parts["confusion"]) for group, parts in groups.items())
+
+
+def _confusion(which: str, matrix: Mapping[str, Any]) -> str:
+    return heat_map(
+        f"Cases by truth and by what was told first: {which}",
+        matrix["rows"],
+        matrix["columns"],
+        matrix["counts"],
+        row_label="truth",
+        column_label="told",
     )
 
 
@@ -62,13 +70,14 @@ def _share_table(title: str, groups: Mapping[str, Mapping[str, Any]]) -> str:
             name,
             scores["cases"],
             scores["failed"],
+            scores["not_tested"],
             *(_share(scores[key]) for key in SHARES),
             (scores["shrinkage"] or {}).get("median"),
             (scores["parameter_error"] or {}).get("median"),
         ]
         for name, scores in groups.items()
     ]
-    columns = [title, "cases", "failed", *SHARES, "median shrinkage", "median parameter error"]
+    columns = [title, "cases", "failed", "not tested", *SHARES, "median shrinkage", "median parameter error"]
     return table([column.replace("_", " ") for column in columns], rows)
 
 

@@ -6,14 +6,25 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
-from wetwell.sim2real.trial.cases import KINDS, CaseKind, PlantName, TrialCase, trial_case
+from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.sim2real.trial.cases import (
+    DEFAULT_STORAGE,
+    KINDS,
+    CaseKind,
+    PlantName,
+    StoragePlan,
+    TrialCase,
+    trial_case,
+)
 
-TRIAL_SCHEMA = "wetwell.trial/2"
+TRIAL_SCHEMA = "wetwell.trial/3"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
+SLOWEST_S = 3600
+"""Rows further apart are daily figures rather than a recording. [s]"""
 REPLAY = (sys.executable, "-m", "wetwell.services", "gap", "replay")
 
 
@@ -28,6 +39,8 @@ class TrialPlan:
     plants : tuple of PlantName
     seconds : int
         Length of each recording. [s]
+    storage : StoragePlan
+        How recordings are stored.
     command : tuple of str
         The diagnosis; it gets `--station FILE --recording FILE --out DIR`, and `--without NAME` or `--only NAME`.
     timeout_s : float
@@ -44,6 +57,7 @@ class TrialPlan:
     kinds: tuple[CaseKind, ...] = KINDS
     plants: tuple[PlantName, ...] = ("fine",)
     seconds: int = 86_400
+    storage: StoragePlan = DEFAULT_STORAGE
     command: tuple[str, ...] = DIAGNOSE
     replay: tuple[str, ...] = ()
     timeout_s: float = 1800.0
@@ -59,12 +73,23 @@ class TrialPlan:
             "kinds": list(self.kinds),
             "plants": list(self.plants),
             "length_s": self.seconds,
+            "rates_s": list(self.storage.rates_s),
+            "values": list(self.storage.values),
+            "absent": list(self.storage.absent),
+            "metered_share": self.storage.metered_share,
             "diagnoser": "wetwell gap diagnose" if self.command == DIAGNOSE else shlex.join(self.command),
         }
 
     def case(self, number: int) -> TrialCase:
         """Case `number`, from 0."""
-        return trial_case(self.seed, number, kinds=self.kinds, plants=self.plants, seconds=self.seconds)
+        return trial_case(
+            self.seed,
+            number,
+            kinds=self.kinds,
+            plants=self.plants,
+            seconds=self.seconds,
+            storage=self.storage,
+        )
 
 
 def parse_kinds(text: str) -> tuple[CaseKind, ...]:
@@ -84,6 +109,46 @@ def parse_kinds(text: str) -> tuple[CaseKind, ...]:
     if unknown := sorted(named - set(KINDS)):
         raise ConfigError(f"--kinds: got '{unknown[0]}', must be of {', '.join(KINDS)}")
     return tuple(kind for kind in KINDS if kind in named)
+
+
+def parse_rates(text: str) -> tuple[int, ...]:
+    """Seconds from row to row in a list with commas.
+
+    Raises
+    ------
+    ConfigError
+        If one is not a whole number of seconds from 1 to `SLOWEST_S`.
+
+    Examples
+    --------
+    >>> parse_rates("1,60")
+    (1, 60)
+    """
+    parts = [part.strip() for part in text.split(",")]
+    for part in parts:
+        if not part.isdecimal() or not 1 <= int(part) <= SLOWEST_S:
+            raise ConfigError(f"--every: got '{part}', must be a whole number of seconds from 1 to {SLOWEST_S}")
+    return tuple(dict.fromkeys(map(int, parts)))
+
+
+def parse_values(text: str) -> tuple[StoredValue, ...]:
+    """What rows hold, in a list with commas.
+
+    Raises
+    ------
+    ConfigError
+        If one is not known.
+
+    Examples
+    --------
+    >>> parse_values("mean,held")
+    ('mean', 'held')
+    """
+    named = [part.strip() for part in text.split(",")]
+    known: tuple[StoredValue, ...] = get_args(StoredValue)
+    if unknown := [name for name in named if name not in known]:
+        raise ConfigError(f"--value: got '{unknown[0]}', must be of {', '.join(known)}")
+    return tuple(value for value in known if value in named)
 
 
 def take_folder(plan: TrialPlan, folder: Path) -> None:

@@ -24,7 +24,6 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
     names = [name for number in range(plan.count) if (name := plan.case(number).name) not in failed]
     pairs = [(open_case(name, folder), answer_in(folder / REPORTS / name)) for name in names]
     scores = [score_case(label, answer, answer_in(folder / WHOLE_LIBRARY / label.case)) for label, answer in pairs]
-    rows, columns, counts = confusion(scores)
     controls: dict[str, Any] = {
         "permuted_labels": chance_level(pairs, np.random.default_rng(plan.seed)),
     }
@@ -46,9 +45,14 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         "effects_scored": _grouped(
             [score for score in scores if score.label.kind == "single"], lambda score: score.label.names[0]
         ),
+        "splits": {
+            "rate": _split(scores, lambda score: score.label.rate),
+            "inflow": _split(scores, lambda score: score.label.metering),
+            "noise": _split(scores, lambda score: score.label.noise),
+        },
         "unseen": holdout_summary([folder / REPORTS / name for name in names]),
         "controls": controls,
-        "confusion": {"rows": rows, "columns": columns, "counts": counts.tolist()},
+        "confusion": _confusion(scores),
     }
     cases = [asdict(score) for score in scores]
     with atomic_file(folder / "trial.json") as file:
@@ -59,12 +63,13 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
 
 
 def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
-    """What is printed for people: right answers of how many, by kind."""
+    """What is printed for people: right answers of how many, by kind, rate, metering and noise."""
     names = ("verdict_right", "top_1", "top_2", "component_right", "false_attribution")
+    split = {group: parts["scores"] for groups in result["splits"].values() for group, parts in groups.items()}
     rows = [
-        {"kind": kind, "cases": scores["cases"]}
+        {"kind": kind, "cases": scores["cases"], "not_tested": scores["not_tested"]}
         | {name: f"{scores[name]['value']:.2f}" if scores[name] else "-" for name in names}
-        for kind, scores in (result["kinds_scored"] | {"all": result["all"]}).items()
+        for kind, scores in (result["kinds_scored"] | split | {"all": result["all"]}).items()
     ]
     return {
         "page": str(folder / "trial.html"),
@@ -72,6 +77,18 @@ def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
         "failed": result["failed"],
         "scores": rows,
     }
+
+
+def _confusion(scores: Sequence[CaseScore]) -> dict[str, Any]:
+    rows, columns, counts = confusion(scores)
+    return {"rows": rows, "columns": columns, "counts": counts.tolist()}
+
+
+def _split(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, Any]:
+    """Scores and confusion of each group."""
+    groups = dict.fromkeys(key(score) for score in sorted(scores, key=lambda score: score.label.every_s))
+    of_group = {group: [score for score in scores if key(score) == group] for group in groups}
+    return {group: {"scores": summary(ours), "confusion": _confusion(ours)} for group, ours in of_group.items()}
 
 
 def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, Any]:

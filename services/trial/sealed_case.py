@@ -1,6 +1,8 @@
 """A case in the folder of a trial: two files published, its labels sealed."""
 
+import math
 import secrets
+from dataclasses import asdict
 from pathlib import Path
 
 import tomli_w
@@ -53,9 +55,10 @@ def publish(case: TrialCase, folder: Path) -> None:
         "names": list(case.names),
         "components": list(case.components),
         "parameters": {deviation.name: dict(deviation.parameters) for deviation in truth.deviations},
-        "inherent": list(case.inherent),
+        "inherent": [*case.inherent, *truth.storage.inherent],
         "truth_seed": truth.seed,
         "slow_share": truth.slow_share,
+        "storage": {**asdict(truth.storage), "report_s": _finite(truth.storage.report_s)},
         "sha256": {name: digest((published / name).read_bytes()) for name in (STATION_FILE, RECORDING_FILE)},
     }
     text = labels_text(labels, secrets.token_hex(16))
@@ -92,4 +95,12 @@ def open_case(name: str, folder: Path) -> Label:
         parameters=labels["parameters"],
         inherent=tuple(labels["inherent"]),
         attempt=labels["attempt"],
+        every_s=labels["storage"]["every_s"],
+        value=labels["storage"]["value"],
+        absent=tuple(labels["storage"]["absent"]),
+        slow_share=labels["slow_share"],
     )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -44,6 +44,13 @@ class Candidate(_Part):
     shrinkage: Number = None
 
 
+class NotTested(_Part):
+    """An effect that the recording cannot show, and why."""
+
+    effect: str
+    reason: str = ""
+
+
 class Gap(_Part):
     """Whitened gap before and after, and its floor."""
 
@@ -61,6 +68,12 @@ class Answer(_Part):
     effects: tuple[ToldEffect, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     gap: Gap = Gap()
+    not_tested: tuple[NotTested, ...] = ()
+
+    @property
+    def untested(self) -> frozenset[str]:
+        """Names of the effects that it says the recording cannot show."""
+        return frozenset(row.effect for row in self.not_tested)
 
     @property
     def names(self) -> tuple[str, ...]:

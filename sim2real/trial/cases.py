@@ -1,18 +1,21 @@
 """The cases of a trial: which truth, which kind, each from the seed and its number alone.
 
 Case k of seed S does not depend on how many there are. Kinds take turns; within a kind the names take turns in an
-order that the seed shuffles, so that each is met as often as any other. Its truth can be drawn anew: another attempt
-has the same names with another station, inflow and size.
+order that the seed shuffles, so that each is met as often as any other, and at each rate. Its truth can be drawn
+anew: another attempt has the same names with another station, inflow and size.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
+from wetwell.protocols.quantities import AnalogueQuantity
+from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.deviations import DEVIATIONS, LIBRARY, OPEN
 from wetwell.sim2real.truth.sampling import RAMPS_S, case_of
+from wetwell.sim2real.truth.storage import storage_of
 from wetwell.sim2real.truth.swmm_input import SWMM_LIBRARY, SWMM_OPEN, SWMM_RAMPS_S
 
 CaseKind = Literal["single", "pair", "none", "open", "leave_one_out"]
@@ -31,8 +34,38 @@ _HELD: dict[tuple[PlantName, bool], tuple[str, ...]] = {
     ("swmm", False): SWMM_LIBRARY,
     ("swmm", True): SWMM_OPEN,
 }
-SLOW_SHARE = 0.3
+SLOW_SHARE = 0.2
 """Share of the variance of the sensors' noise that is slow, in every other case."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoragePlan:
+    """How the recordings of a trial are stored; what else there is to storage each case draws for itself.
+
+    Attributes
+    ----------
+    rates_s : tuple of int
+        Seconds from row to row; they take turns. [s]
+    values : tuple of "instant", "mean" or "held"
+        What a row holds, at each rate.
+    absent : tuple of quantities
+        What no case has.
+    metered_share : float
+        Share of the cases that have an inflow meter. [1]
+    """
+
+    rates_s: tuple[int, ...] = (1,)
+    values: tuple[StoredValue, ...] = ("instant",)
+    absent: tuple[AnalogueQuantity, ...] = ()
+    metered_share: float = 0.5
+
+    @property
+    def ways(self) -> tuple[tuple[int, StoredValue], ...]:
+        """Each rate with each kind of value. [s, -]."""
+        return tuple((rate_s, value) for rate_s in self.rates_s for value in self.values)
+
+
+DEFAULT_STORAGE = StoragePlan()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +82,12 @@ class TrialCase:
         Of its deviations, the same in all attempts.
     seconds : int
         Length of its recording. [s]
+    every_s : int
+        Seconds from row to row. [s]
+    value : "instant", "mean" or "held"
+        What a row holds.
+    absent : tuple of quantities
+        What is not stored, or has no meter; of the inflow the case knows for itself.
     attempt : int
         From 0.
     """
@@ -59,6 +98,9 @@ class TrialCase:
     plant: PlantName
     names: tuple[str, ...]
     seconds: int
+    every_s: int = 1
+    value: StoredValue = "instant"
+    absent: tuple[AnalogueQuantity, ...] = ()
     attempt: int = 0
 
     @property
@@ -82,25 +124,43 @@ class TrialCase:
         return self.names if self.kind == "leave_one_out" else ()
 
     def truth(self) -> TruthCase:
-        """Draw station, inflow and deviations: of `SeedSequence(S, spawn_key=(k,))`, of `(k, attempt)` later."""
+        """Draw station, inflow and deviations: of `SeedSequence(S, spawn_key=(k,))`, of `(k, attempt)` later.
+
+        How it is stored is of a stream of its own, the same in all attempts.
+        """
         if self.attempt:
             rng = _stream(self.seed, self.number, self.attempt)
         else:
             rng = _stream(self.seed, self.number)
             if self.kind == "pair":
                 _other(self.names[0], _HELD[self.plant, False], rng)  # this stream has drawn the name, too
-        return case_of(
+        truth = case_of(
             self.names,
             f"station-{rng.integers(16**6):06x}",
             rng,
             seconds=self.seconds,
             slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,
             ramps_s=SWMM_RAMPS_S if self.plant == "swmm" else RAMPS_S,
+            every_s=self.every_s,
         )
+        storage = storage_of(
+            truth.station,
+            _stream(self.seed, self.number, *_STORAGE),
+            every_s=self.every_s,
+            value=self.value,
+            absent=self.absent,
+        )
+        return replace(truth, storage=storage)
 
 
 def trial_case(
-    seed: int, number: int, *, kinds: tuple[CaseKind, ...], plants: tuple[PlantName, ...], seconds: int
+    seed: int,
+    number: int,
+    *,
+    kinds: tuple[CaseKind, ...],
+    plants: tuple[PlantName, ...],
+    seconds: int,
+    storage: StoragePlan = DEFAULT_STORAGE,
 ) -> TrialCase:
     """Case `number` of the trial of a seed, in its first attempt.
 
@@ -112,6 +172,7 @@ def trial_case(
         They take turns.
     seconds : int
         Length of its recording. [s]
+    storage : StoragePlan
 
     Examples
     --------
@@ -121,9 +182,23 @@ def trial_case(
     """
     turn, place = divmod(number, len(kinds))
     kind = kinds[place]
-    plant = plants[turn % len(plants)]
-    names = _names(seed, number, kind, plant, turn // len(plants))
-    return TrialCase(seed=seed, number=number, kind=kind, plant=plant, names=names, seconds=seconds)
+    turn, place = divmod(turn, len(plants))
+    plant = plants[place]
+    turn, place = divmod(turn, len(storage.ways))
+    every_s, value = storage.ways[place]
+    has_meter = _stream(seed, number, *_METERS).random() < storage.metered_share
+    unmetered: tuple[AnalogueQuantity, ...] = () if has_meter or "inflow_m3h" in storage.absent else ("inflow_m3h",)
+    return TrialCase(
+        seed=seed,
+        number=number,
+        kind=kind,
+        plant=plant,
+        names=_names(seed, number, kind, plant, turn),
+        seconds=seconds,
+        every_s=every_s,
+        value=value,
+        absent=(*storage.absent, *unmetered),
+    )
 
 
 def _names(seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int) -> tuple[str, ...]:
@@ -139,6 +214,10 @@ def _other(first: str, held: tuple[str, ...], rng: np.random.Generator) -> str:
     """Second name of a pair, which lies in another component."""
     others = [name for name in held if DEVIATIONS[name].component != DEVIATIONS[first].component]
     return others[int(rng.integers(len(others)))]
+
+
+_STORAGE, _METERS = (0, 1), (0, 2)
+"""Ends of the keys of streams that are neither of an attempt nor of an order of names."""
 
 
 def _stream(seed: int, *key: int) -> np.random.Generator:

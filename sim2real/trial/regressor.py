@@ -5,6 +5,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.quantities import PUMP_METERS, pump_column
 from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.timestamps import NS_PER_S
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Strengths of the ridge, as shares of the number of rows; the one that serves the second half of the rows best."""
@@ -70,7 +71,7 @@ def _weights(design: Floats, residual: Floats, ridge: float) -> Floats:
 
 def _features(prediction: Recording, pump: int, name: str) -> Floats:
     on = prediction.column(pump_column(pump, "frequency_hz")) > 0.0
-    seconds = np.arange(on.size, dtype=np.float64)
+    seconds = (prediction.time_ns - prediction.time_ns[0]) / NS_PER_S
     changed = np.concatenate([[True], on[1:] != on[:-1]])
     since_s = seconds - np.maximum.accumulate(np.where(changed, seconds, 0.0))
     running = sum(prediction.column(pump_column(i, "frequency_hz")) > 0.0 for i in range(1, prediction.pumps + 1))

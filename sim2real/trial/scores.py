@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from wetwell.protocols.arrays import Integers
+from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.sim2real.trial.answer import Answer, ToldEffect
 from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind, PlantName
 
 FAILED = "failed"
+NOT_TESTED = "not tested"
 TELLS = ("effect", "none", "unknown", FAILED)
 PERMUTATIONS = 500
 
@@ -32,6 +34,10 @@ class Label:
         Effects that this plant always has to some degree: to tell them is neither right nor wrong.
     attempt : int
         Which draw of the case is published, from 0.
+    every_s, value, absent
+        How its recording is stored, as of a `Storage`.
+    slow_share : float
+        Share of the sensors' variance that is slow. [1]
     """
 
     case: str
@@ -42,6 +48,30 @@ class Label:
     parameters: Mapping[str, Mapping[str, Any]]
     inherent: tuple[str, ...] = ()
     attempt: int = 0
+    every_s: int = 1
+    value: StoredValue = "instant"
+    absent: tuple[str, ...] = ()
+    slow_share: float = 0.0
+
+    @property
+    def rate(self) -> str:
+        """How often what is stored."""
+        return f"{self.every_s} s {self.value}"
+
+    @property
+    def metering(self) -> str:
+        """Whether the inflow is measured."""
+        return "without inflow" if "inflow_m3h" in self.absent else "with inflow"
+
+    @property
+    def noise(self) -> str:
+        """Of the sensors."""
+        return "slow noise" if self.slow_share > 0.0 else "white noise"
+
+    def less(self, names: frozenset[str]) -> Self:
+        """The label without some of its effects."""
+        kept = [(name, at) for name, at in zip(self.names, self.components, strict=True) if name not in names]
+        return replace(self, names=tuple(name for name, _ in kept), components=tuple(at for _, at in kept))
 
     @property
     def title(self) -> str:
@@ -59,18 +89,27 @@ class CaseScore:
     `top_2` counts a declared equivalent of what is told first. With two true effects `top_1` asks whether what is
     told first is one of them, and `top_2` whether both are told or declared equivalent. Where the truth is not in
     the library, `top_1` and `top_2` do not arise, and "unknown" or a declared equivalent is right.
+
+    A true effect that the answer lists as not tested is neither right nor wrong: of a pair the other is asked for.
+    Where none is left, "none" is right, "unknown" neither, and the rest does not arise.
     """
 
     label: Label
     told: str
     told_names: tuple[str, ...]
-    verdict_right: bool
+    verdict_right: bool | None
     top_1: bool | None
     top_2: bool | None
     component_right: bool | None
     false_attribution: bool | None
     shrinkage: float | None
     parameters: tuple[dict[str, Any], ...]
+    not_tested: tuple[str, ...] = ()
+
+    @property
+    def is_tested(self) -> bool:
+        """Whether the answer has looked for a true effect, or there is none."""
+        return not self.not_tested or len(self.not_tested) < len(self.label.names)
 
 
 def score_case(label: Label, answer: Answer | None, whole: Answer | None = None) -> CaseScore:
@@ -86,22 +125,40 @@ def score_case(label: Label, answer: Answer | None, whole: Answer | None = None)
     answer = answer and _without(answer, set(label.inherent) - set(label.names))
     told = answer.verdict if answer else FAILED
     names = answer.names if answer and told == "effect" else ()
+    told_untested = frozenset().union(*(one.untested for one in (answer, whole) if one))
+    not_tested = tuple(name for name in label.names if name in told_untested)
+    if not_tested and len(not_tested) == len(label.names):
+        return CaseScore(
+            label=label,
+            told=told,
+            told_names=names,
+            verdict_right=None if told == "unknown" else told == "none",
+            top_1=None,
+            top_2=None,
+            component_right=None,
+            false_attribution=None,
+            shrinkage=None,
+            parameters=(),
+            not_tested=not_tested,
+        )
+    asked = label.less(told_untested)
     is_known = label.kind in {"single", "pair"}
     place = answer.where[0].component if answer and answer.where else ""
     expected = VERDICT_OF[label.kind]
     told_by = [one for one in (answer, whole) if one and names]
-    named_equivalent = any(_is_equivalent(names[0], label.names, one) for one in told_by)
+    named_equivalent = any(_is_equivalent(names[0], asked.names, one) for one in told_by)
     return CaseScore(
         label=label,
         told=told,
         told_names=names,
         verdict_right=told == expected or (label.kind == "leave_one_out" and named_equivalent),
-        top_1=bool(names and names[0] in label.names) if is_known else None,
-        top_2=_top_2(label, answer if names else None) if is_known else None,
-        component_right=place in label.components if label.names else None,
+        top_1=bool(names and names[0] in asked.names) if is_known else None,
+        top_2=_top_2(asked, answer if names else None) if is_known else None,
+        component_right=place in asked.components if asked.names else None,
         false_attribution=told == "effect" if label.kind == "none" else None,
         shrinkage=answer.gap.shrinkage if answer and is_known and told == "effect" else 0.0 if is_known else None,
-        parameters=tuple(_parameter_rows(label, answer)) if answer and is_known else (),
+        parameters=tuple(_parameter_rows(asked, answer)) if answer and is_known else (),
+        not_tested=not_tested,
     )
 
 
@@ -168,7 +225,7 @@ def _compared(effect: ToldEffect, true_values: Mapping[str, Any]) -> list[dict[s
 
 
 def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
-    """Figures over all cases: shares with Wilson's 95 % interval, medians, coverage.
+    """Figures over all cases: shares with Wilson's 95 % interval, medians, coverage; counts.
 
     Shares range from 0 to 1, best 1, but for `false_attribution` (best 0).
     """
@@ -178,6 +235,7 @@ def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
     return {
         "cases": len(scores),
         "failed": sum(score.told == FAILED for score in scores),
+        "not_tested": sum(bool(score.not_tested) for score in scores),
         **{
             name: share([getattr(score, name) for score in scores])
             for name in ("verdict_right", "top_1", "top_2", "component_right", "false_attribution")
@@ -240,14 +298,19 @@ def chance_level(pairs: Sequence[tuple[Label, Answer | None]], rng: np.random.Ge
 def confusion(scores: Sequence[CaseScore]) -> tuple[list[str], list[str], Integers]:
     """Rows (what is true), columns (what is told first, or the verdict) and counts; pairs are one row."""
     rows = sorted({_row(score) for score in scores})
-    columns = sorted({score.told_names[0] for score in scores if score.told_names})
-    columns += [tell for tell in TELLS[1:] if any(not s.told_names and s.told == tell for s in scores)]
-    columns += ["effect"] if any(not s.told_names and s.told == "effect" for s in scores) else []
+    verdicts = (*TELLS[1:], NOT_TESTED, "effect")
+    columns = sorted({told for score in scores if (told := _told(score)) not in verdicts})
+    columns += [verdict for verdict in verdicts if any(_told(score) == verdict for score in scores)]
     counts = np.zeros((len(rows), len(columns)), dtype=np.int64)
     for score in scores:
-        told = score.told_names[0] if score.told_names else score.told
-        counts[rows.index(_row(score)), columns.index(told)] += 1
+        counts[rows.index(_row(score)), columns.index(_told(score))] += 1
     return rows, columns, counts
+
+
+def _told(score: CaseScore) -> str:
+    if score.told_names:
+        return score.told_names[0]
+    return score.told if score.is_tested or score.told == FAILED else NOT_TESTED
 
 
 def _row(score: CaseScore) -> str:

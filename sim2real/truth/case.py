@@ -6,6 +6,7 @@ from typing import Literal
 
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.truth.storage import EVERY_SECOND, Storage
 
 FaultKind = Literal[
     "blockage", "clogging", "static_rise", "sensor_stuck", "sensor_bias", "sensor_drift", "sensor_gap"
@@ -86,7 +87,9 @@ class TruthCase:
     slow_share, slow_s : float
         Share of the sensors' variance that is slow, as an AR(1), and its correlation time. [1, s]
     start_ns : int
-        Time of the first row. [ns]
+        Time of the first second. [ns]
+    storage : Storage
+        What the historian keeps of it.
     """
 
     station: Station
@@ -97,5 +100,6 @@ class TruthCase:
     seed: int = 1
     initial_level_m: float = 1.0
     slow_share: float = 0.0
-    slow_s: float = 60.0
+    slow_s: float = 30.0
     start_ns: int = START_NS
+    storage: Storage = EVERY_SECOND

@@ -12,20 +12,28 @@ from wetwell.sim2real.truth.case import Deviation, FaultKind, TrueInflow, TruthC
 from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.kernel import LEVEL
 from wetwell.sim2real.truth.parts import draw_of, rounded
-from wetwell.sim2real.truth.spec import HOUR_S, WATER_N_M3, duty_m3h
+from wetwell.sim2real.truth.spec import HOUR_S, WATER_N_M3, duty_m3h, rated_power_w
 from wetwell.sim2real.truth.truth_plant import passage_of
 
 RAMPS_S = (6, 15)
 """Shortest and longest ramp of a drive. [s]"""
+EMPTIED_S = (60.0, 300.0)
+"""Shortest and longest time in which one pump empties a wet well into which nothing flows. [s]"""
+ROWS_WHILE_EMPTIED = (2.0, 8.0)
+"""Rows in that time at the least and at the most, where rows are so far apart that `EMPTIED_S` has fewer."""
 
 
 def station_of(
-    name: str, rng: np.random.Generator, *, needs_two_pumps: bool = False, ramps_s: tuple[int, int] = RAMPS_S
+    name: str,
+    rng: np.random.Generator,
+    *,
+    needs_two_pumps: bool = False,
+    ramps_s: tuple[int, int] = RAMPS_S,
+    emptied_s: tuple[float, float] = EMPTIED_S,
 ) -> Station:
     """A plausible station of one to four pumps.
 
-    Duty, curve, lift, friction, wet well, levels, ramp and noise are all drawn; the wet well is emptied by one pump
-    within one to five minutes.
+    Duty, curve, lift, friction, wet well, levels, ramp and noise are all drawn.
 
     Parameters
     ----------
@@ -35,6 +43,8 @@ def station_of(
         Whether at least two pumps with mains of their own are needed.
     ramps_s : (int, int)
         Shortest and longest ramp. [s]
+    emptied_s : (float, float)
+        Shortest and longest time in which one pump empties the wet well. [s]
     """
     pumps = int(rng.integers(2 if needs_two_pumps else 1, 5))
     flow_m3h, head_m = math.exp(rng.uniform(math.log(60.0), math.log(400.0))), rng.uniform(12.0, 40.0)
@@ -47,7 +57,7 @@ def station_of(
     is_common = not needs_two_pumps and rng.random() < 0.4
     table = {
         "name": name,
-        "sump": {"area_m2": rounded(flow_m3h / HOUR_S * rng.uniform(60.0, 300.0) / depth_m)},
+        "sump": {"area_m2": rounded(flow_m3h / HOUR_S * rng.uniform(*emptied_s) / depth_m)},
         "pump": [
             {
                 "curve": [
@@ -84,8 +94,24 @@ def station_of(
     return Station.model_validate(table)
 
 
-def inflow_of(station: Station, rng: np.random.Generator) -> TrueInflow:
-    """An inflow that one pump carries by and large, with rain that needs a second one."""
+def emptied_s(every_s: int) -> tuple[float, float]:
+    """Shortest and longest time in which a pump empties a wet well, for rows so far apart. [s].
+
+    Examples
+    --------
+    >>> emptied_s(10), emptied_s(900)
+    ((60.0, 300.0), (1800.0, 7200.0))
+    """
+    fewest, most = ROWS_WHILE_EMPTIED
+    return max(EMPTIED_S[0], fewest * every_s), max(EMPTIED_S[1], most * every_s)
+
+
+def inflow_of(station: Station, rng: np.random.Generator, every_s: int = 1) -> TrueInflow:
+    """An inflow that one pump carries by and large, with rain that needs a second one.
+
+    Rain lasts longer, and comes less often, as wet wells are larger for rows that are `every_s` apart. [s]
+    """
+    stretch = emptied_s(every_s)[1] / EMPTIED_S[1]
     flow_m3h, _ = duty_m3h(station)
     has_more = len(station.pump) > 1
     most = (1.05 if station.mains[0].layout == "common" else 1.5) if has_more else 0.6
@@ -94,9 +120,9 @@ def inflow_of(station: Station, rng: np.random.Generator) -> TrueInflow:
         swing=rng.uniform(0.2, 0.5),
         noise=rng.uniform(0.03, 0.1),
         noise_s=rng.uniform(300.0, 1800.0),
-        rain_per_day=rng.uniform(5.0, 10.0),
+        rain_per_day=rng.uniform(5.0, 10.0) / stretch,
         rain_m3h=flow_m3h * (rng.uniform(0.7, 1.1) if has_more else rng.uniform(0.1, 0.25)),
-        rain_s=rng.uniform(600.0, 1800.0),
+        rain_s=rng.uniform(600.0, 1800.0) * stretch,
         most_m3h=most * flow_m3h,
     )
 
@@ -109,6 +135,7 @@ def case_of(
     seconds: int,
     slow_share: float = 0.0,
     ramps_s: tuple[int, int] = RAMPS_S,
+    every_s: int = 1,
 ) -> TruthCase:
     """A case with deviations of these names, at a new station, with parameters drawn for it.
 
@@ -124,6 +151,8 @@ def case_of(
         Share of the sensors' variance that is slow. [1]
     ramps_s : (int, int)
         Shortest and longest ramp of the station. [s]
+    every_s : int
+        Seconds from row to row of what is stored: the wet well is so large that runs have rows. [s]
 
     Examples
     --------
@@ -134,14 +163,14 @@ def case_of(
     (['flow_meter_gain'], True)
     """
     needs_two = any(DEVIATIONS[name].needs_two_pumps for name in names)
-    station = station_of(station_name, rng, needs_two_pumps=needs_two, ramps_s=ramps_s)
+    station = station_of(station_name, rng, needs_two_pumps=needs_two, ramps_s=ramps_s, emptied_s=emptied_s(every_s))
     draw = draw_of(station, rng)
     deviations = tuple(Deviation(name=name, parameters=DEVIATIONS[name].draw(draw)) for name in names)
     control = station.control
     case = TruthCase(
         station=station,
         deviations=deviations,
-        inflow=inflow_of(station, rng),
+        inflow=inflow_of(station, rng, every_s),
         seconds=seconds,
         seed=int(rng.integers(2**31)),
         initial_level_m=rounded(0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])),
@@ -230,6 +259,6 @@ _SENSOR_SIZES = {"level_m": 0.15, "flow_m3h": 0.12, "head_m": 0.12, "power_kw": 
 
 def _scale(channel: str, station: Station) -> float:
     flow_m3h, head_m = duty_m3h(station)
-    electrical = station.electrical
-    power_kw = math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor / 1000.0
-    return {"level_m": 1.0, "flow_m3h": flow_m3h, "head_m": head_m, "power_kw": power_kw}[channel]
+    return {"level_m": 1.0, "flow_m3h": flow_m3h, "head_m": head_m, "power_kw": rated_power_w(station) / 1000.0}[
+        channel
+    ]

@@ -169,10 +169,16 @@ def spec_of(station: Station) -> Spec:
         area_m2=station.sump.mean_area_m2,
         crest_m=control.start_levels_m[-1] + 3.0,
         ramp_s=control.ramp_s,
-        rated_power_w=math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor,
+        rated_power_w=rated_power_w(station),
         start_m=np.array(control.start_levels_m),
         stop_m=np.array(control.stop_levels_m),
     )
+
+
+def rated_power_w(station: Station) -> float:
+    """Electrical power of a pump at its rated current. [W]."""
+    electrical = station.electrical
+    return math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor
 
 
 def duty_m3h(station: Station) -> tuple[float, float]:

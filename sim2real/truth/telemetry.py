@@ -71,7 +71,7 @@ def transmitted(reading: Floats, channel: Channel) -> Floats:
     if channel.count > 0.0:
         reading = np.floor(reading / channel.count) * channel.count
     if channel.deadband > 0.0:
-        reading = _by_exception(reading, channel.deadband, channel.report_s)
+        reading = by_exception(reading, channel.deadband, channel.report_s)
     return reading
 
 
@@ -83,7 +83,14 @@ def _with_cutoff(reading: Floats, cutoff: float) -> Floats:
     return np.where(state[last] == 1, reading, 0.0)
 
 
-def _by_exception(reading: Floats, deadband: float, report_s: float) -> Floats:
+def by_exception(reading: Floats, deadband: float, report_s: float) -> Floats:
+    """(n,) values as they are sent when they have moved by a deadband, or after so many seconds.
+
+    Examples
+    --------
+    >>> by_exception(np.array([0.0, 0.4, 1.0, 1.2, 2.1]), 1.0, 3.0)
+    array([0. , 0. , 1. , 1. , 2.1])
+    """
     sent = reading.copy()
     last, age = reading[0], 0
     for row, value in enumerate(reading.tolist()):

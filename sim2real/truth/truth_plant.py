@@ -18,6 +18,7 @@ from wetwell.sim2real.truth.faults import fault_states, force_faults, spoil
 from wetwell.sim2real.truth.inflow import inflow_m3h, slow_noise
 from wetwell.sim2real.truth.parts import Truth
 from wetwell.sim2real.truth.spec import HOUR_S, Surroundings, spec_of
+from wetwell.sim2real.truth.storage import stored
 from wetwell.sim2real.truth.telemetry import Telemetry, sensed, transmitted
 
 _QUIET = Sensors(flow_noise=0.0, head_noise=0.0, power_noise=0.0, inflow_noise=0.0, level_noise_m=0.0)
@@ -36,12 +37,13 @@ class Passage:
     def recording(self, *, truth: bool) -> Recording:
         """The recording, to be taken once; a blind one has no truth columns."""
         columns = self._columns(self.case, self.station_record, self.sensor_rng)
-        return Recording(
+        recording = Recording(
             time_ns=self._stamps_ns,
             columns=columns,
             truth=_truth_columns(self.case, self.made.around, self.station_record, self.pump_record) if truth else {},
             station=self.case.station.name,
         )
+        return stored(recording, self.case.storage)
 
     def oracle(self) -> Recording:
         """What sensors without noise would have recorded: what a perfect model says of the recording."""
@@ -50,7 +52,8 @@ class Passage:
         station_record[kernel.LEVEL_READING] -= self.made.level_noise_m
         case = replace(self.case, station=station)
         columns = self._columns(case, station_record, np.random.default_rng(0))
-        return Recording(time_ns=self._stamps_ns, columns=columns, station=self.case.station.name)
+        recording = Recording(time_ns=self._stamps_ns, columns=columns, station=self.case.station.name)
+        return stored(recording, self.case.storage)
 
     @property
     def _stamps_ns(self) -> Integers:

@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,13 @@ import pytest
 from wetwell.protocols.errors import ConfigError, RecordingError, WetwellError
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.station.station_file import load_station
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.trial.diagnosis import RECALIBRATION
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.run import run_trial
 from wetwell.services.trial.sealed_case import publish
 from wetwell.services.trial.swmm_plant import run_swmm
-from wetwell.sim2real.trial.cases import KINDS, trial_case
+from wetwell.sim2real.trial.cases import KINDS, StoragePlan, trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
@@ -168,6 +170,15 @@ def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
     assert "flexible regressor" in (folder / "trial.html").read_text()
 
 
+def test_unseen_recordings_are_stored_as_the_case_is(tmp_path, monkeypatch):
+    replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
+    storage = StoragePlan(rates_s=(60,), values=("mean",), absent=("head_m", "inflow_m3h"))
+    small = {"count": 1, "kinds": ("single",), "seconds": 14_400}
+    _, result = run_fake("perfect", tmp_path, monkeypatch, replay=replay, storage=storage, **small)
+    assert result["unseen"]["cases"] == 1
+    assert result["unseen"]["before"] > result["unseen"]["oracle"] > 0.0
+
+
 def test_every_effect_takes_its_turn():
     plan = TrialPlan(seed=5, count=50, kinds=("single",), seconds=3600)
     names = [plan.case(number).names[0] for number in range(50)]
@@ -175,6 +186,73 @@ def test_every_effect_takes_its_turn():
     assert names[:25] == names[25:]
     other = TrialPlan(seed=6, count=25, kinds=("single",), seconds=3600)
     assert [other.case(number).names[0] for number in range(25)] != names[:25]
+
+
+def test_rates_and_values_take_turns_with_the_same_effects_at_each():
+    storage = StoragePlan(rates_s=(1, 60), values=("mean", "held"), absent=("head_m",))
+    plan = TrialPlan(seed=5, count=80, kinds=("single",), seconds=3600, storage=storage)
+    cases = [plan.case(number) for number in range(80)]
+    assert [(case.every_s, case.value) for case in cases[:4]] == list(storage.ways)
+    for first in range(0, 80, 4):
+        assert len({case.names for case in cases[first : first + 4]}) == 1
+    assert all("head_m" in case.absent for case in cases)
+    assert 0.3 < np.mean(["inflow_m3h" in case.absent for case in cases]) < 0.7
+    all_metered = replace(plan, storage=StoragePlan(metered_share=1.0))
+    none_metered = replace(plan, storage=StoragePlan(absent=("inflow_m3h",), metered_share=1.0))
+    assert {all_metered.case(number).absent for number in range(20)} == {()}
+    assert {none_metered.case(number).absent for number in range(20)} == {("inflow_m3h",)}
+
+
+def test_how_a_case_is_stored_is_its_own_and_the_same_in_all_attempts():
+    plan = TrialPlan(seed=5, count=9, seconds=3600, storage=StoragePlan(rates_s=(60,), values=("held",)))
+    cases = [plan.case(number) for number in range(9)]
+    storages = [case.truth().storage for case in cases]
+    assert len({bool(storage.step) for storage in storages}) == 2
+    assert len({storage.report_s for storage in storages}) == 9
+    again = replace(cases[0], attempt=1).truth()
+    assert again.storage.report_s == storages[0].report_s
+    assert again.station != cases[0].truth().station
+
+
+def test_a_slow_trial_is_sealed_published_and_told_by_rate(tmp_path, monkeypatch):
+    storage = StoragePlan(rates_s=(10, 60), values=("mean",), absent=("head_m",))
+    plan, result = run_fake("perfect", tmp_path, monkeypatch, storage=storage, seconds=7200)
+    assert list(result["splits"]["rate"]) == ["10 s mean", "60 s mean"]
+    for name in ("rate", "inflow", "noise"):
+        groups = result["splits"][name].values()
+        assert sum(group["scores"]["cases"] for group in groups) == COUNT
+        assert sum(np.sum(group["confusion"]["counts"]) for group in groups) == COUNT
+    page = (tmp_path / "trial.html").read_text()
+    assert "By rate" in page
+    assert "60 s mean" in page
+    for number in range(COUNT):
+        case = plan.case(number)
+        published = tmp_path / "published" / case.name
+        recording, station = read_recording(published / "recording.parquet"), load_station(published / "station.toml")
+        assert (recording.station, recording.value) == (station.name, "mean")
+        assert set(np.diff(recording.time_ns)) == {case.every_s * NS_PER_S}
+        assert not any(name.endswith("head_m") for name in recording.columns)
+        assert ("inflow_m3h" in recording.columns) == ("inflow_m3h" not in case.absent)
+        sealed = json.loads((tmp_path / "sealed" / f"{case.name}.json").read_text())
+        assert sealed["storage"]["every_s"] == case.every_s
+        assert ("level_quantisation" in sealed["inherent"]) == bool(sealed["storage"]["step"])
+    with pytest.raises(ConfigError, match="holds a trial with another rates s"):
+        run_fake("perfect", tmp_path, monkeypatch, seconds=7200, storage=StoragePlan(absent=("head_m",)))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--every", "0"), "--every: got '0', must be a whole number of seconds from 1 to 3600"),
+        (("--every", "10,1.5"), "--every: got '1.5', must be"),
+        (("--value", "median"), "--value: got 'median', must be of instant, mean, held"),
+        (("--without-signals", "inflow,heat"), "--without-signals: got 'heat', must be of level, inflow, flow"),
+    ],
+)
+def test_options_of_storage_are_refused_in_one_line(options, said, run_wetwell, tmp_path, capsys):
+    assert run_wetwell("gap", "trial", "--out", str(tmp_path / "t"), *options) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "t").exists()
 
 
 def test_stations_of_swmm_have_soft_starters():

@@ -5,6 +5,7 @@ import pytest
 
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.trial.answer import answer_of
 from wetwell.sim2real.trial.holdout import gap, shrinkage, whitened
 from wetwell.sim2real.trial.regressor import corrected
@@ -99,6 +100,56 @@ def test_what_the_whole_library_cannot_tell_apart_is_right_for_the_one_left_out(
     assert not score_case(label("open"), one, answer(effects=told("pump_wear"))).verdict_right
 
 
+def untested(*names):
+    return [{"effect": name, "reason": "no such signal"} for name in names]
+
+
+@pytest.mark.parametrize(
+    ("given", "verdict_right"),
+    [
+        (answer("none", not_tested=untested("motor_slip")), True),
+        (answer("unknown", not_tested=untested("motor_slip")), None),
+        (answer(effects=told("pump_wear"), not_tested=untested("motor_slip")), False),
+        (answer("none", not_tested=untested("pump_wear")), False),
+    ],
+)
+def test_what_was_not_tested_is_in_its_own_column(given, verdict_right):
+    score = score_case(label(), given)
+    assert score.verdict_right is verdict_right
+    is_untested = "motor_slip" in given.untested
+    assert score.not_tested == (("motor_slip",) if is_untested else ())
+    assert score.is_tested is not is_untested
+    if is_untested:
+        assert score.top_1 is score.top_2 is score.component_right is score.shrinkage is None
+    _, columns, counts = confusion([score])
+    expected = score.told_names[0] if score.told_names else "not tested" if is_untested else "none"
+    assert columns == [expected]
+    assert counts.sum() == 1
+    assert summary([score])["not_tested"] == int(is_untested)
+
+
+@pytest.mark.parametrize(
+    ("effects", "top_1", "top_2"),
+    [(told("b"), True, True), (told("c", equivalent=["b"]), False, True), (told("a"), False, False)],
+)
+def test_of_a_pair_the_effect_that_was_tested_is_asked_for(effects, top_1, top_2):
+    pair = label("pair", ("a", "b"), ("pump", "drive"))
+    score = score_case(pair, answer(effects=effects, where=("drive",), not_tested=untested("a")))
+    assert (score.verdict_right, score.top_1, score.top_2) == (True, top_1, top_2)
+    assert score.component_right is True
+    assert score.not_tested == ("a",)
+    assert score.is_tested
+    assert (
+        score_case(pair, answer(effects=effects, where=("pump",), not_tested=untested("a"))).component_right is False
+    )
+
+
+def test_a_name_left_out_may_be_told_as_not_tested_by_the_whole_library():
+    true = label("leave_one_out", ("motor_slip",))
+    assert not score_case(true, answer("none")).verdict_right
+    assert score_case(true, answer("none"), answer("none", not_tested=untested("motor_slip"))).verdict_right
+
+
 def test_none_and_component():
     nothing = label("none", (), ())
     assert score_case(nothing, answer("none")).false_attribution is False
@@ -148,7 +199,7 @@ def test_confusion_counts_each_case_once():
         score_case(label(), answer(effects=told("pump_wear"))),
         score_case(label(), answer(effects=told("motor_slip"))),
         score_case(label("none", (), ()), answer("none")),
-        score_case(label("pair", ("a", "b")), None),
+        score_case(label("pair", ("a", "b"), ("pump", "drive")), None),
         score_case(label("open", ("foam",)), answer("effect")),
     ]
     rows, columns, counts = confusion(scores)
@@ -187,7 +238,7 @@ def test_the_regressor_learns_a_constant_factor():
 
     def recording(values):
         columns = {"level_m": np.ones(4000), "pump1_frequency_hz": frequency_hz, "pump1_flow_m3h": values}
-        return Recording(time_ns=np.arange(4000), columns=columns)
+        return Recording(time_ns=NS_PER_S * np.arange(4000), columns=columns)
 
     said = recording(flow_m3h)
     fixed = corrected(said, recording(1.1 * flow_m3h), said)
