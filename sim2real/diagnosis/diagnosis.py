@@ -120,7 +120,7 @@ def diagnose(
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
     check_plausible(traces, station, regimes, plain)
-    residuals = StationResiduals(traces, station, regimes, plain)
+    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
     bins = residuals.bins
     found = _if_much(attribute(replay, residuals, candidates, progress, each), bins)
     told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.recording.drives import Drives
 from wetwell.sim2real.recording.traces import Traces
 
 MOST_DIAGNOSED_S = 172_800
@@ -65,7 +66,12 @@ def _of_rows(traces: Traces, parts: list[Integers]) -> Traces:
     return replace(
         traces,
         time_s=time_s,
-        frequency_hz=taken(traces.frequency_hz, 0.0),
+        is_row=~is_blank & traces.is_row[rows],
+        drives=Drives(
+            frequency_hz=taken(traces.frequency_hz, 0.0),
+            placements=tuple(taken(one, 0.0) for one in traces.drives.placements),
+            open_s=taken(traces.drives.open_s, 0.0),
+        ),
         level_m=taken(traces.level_m, np.nan),
         inflow_m3h=None if traces.inflow_m3h is None else taken(traces.inflow_m3h, 0.0),
         signals={name: taken(values, np.nan) for name, values in traces.signals.items()},

@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.drives import MOVED_HZ
 from wetwell.sim2real.recording.traces import Traces
 
 Regime = Literal["idle", "start_ramp", "steady", "multi_pump", "stop_ramp"]
@@ -15,7 +16,6 @@ IDLE, START_RAMP, STEADY, MULTI_PUMP, STOP_RAMP = range(5)
 
 SETTLING_S = 20
 """Seconds after a ramp in which damped sensors, inertia and observers settle."""
-MOVED_HZ = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,22 +50,32 @@ class Regimes:
 
 
 def regimes_of(traces: Traces, station: Station) -> Regimes:
-    """Regimes of a recording, from its frequencies alone."""
-    running = traces.frequency_hz > 0.0
-    commanded = np.array([_commanded(hz, station.control.min_frequency_hz) for hz in traces.frequency_hz])
+    """Regimes of a recording, from its frequencies alone; a ramp where it is open whether it is one."""
+    found = _regimes_of(traces.frequency_hz, station)
+    for placement in traces.drives.placements:
+        other = _regimes_of(placement, station)
+        for mine, its in ((found.of_station, other.of_station), (found.of_pumps, other.of_pumps)):
+            is_ramp = (its == START_RAMP) | (its == STOP_RAMP)
+            mine[is_ramp] = its[is_ramp]
+    return found
+
+
+def _regimes_of(frequency_hz: Floats, station: Station) -> Regimes:
+    running = frequency_hz > 0.0
+    commanded = np.array([_commanded(hz, station.control.min_frequency_hz) for hz in frequency_hz])
     ramp_s = round(station.control.ramp_s) + SETTLING_S
     of_pumps = np.full(running.shape, IDLE, dtype=np.int64)
     together = running.sum(axis=0) > 1
-    for i in range(traces.pumps):
+    for i in range(running.shape[0]):
         of_pumps[i][running[i]] = STEADY
         of_pumps[i][running[i] & together] = MULTI_PUMP
         _mark(of_pumps[i], _rises(commanded[i]), ramp_s, START_RAMP)
         _mark(of_pumps[i], _falls(commanded[i]), 2 * ramp_s, STOP_RAMP, ends=_rises(commanded[i]))
-    of_station = np.full(traces.seconds, IDLE, dtype=np.int64)
+    of_station = np.full(running.shape[1], IDLE, dtype=np.int64)
     of_station[running.any(axis=0)] = STEADY
     of_station[together] = MULTI_PUMP
     switches = np.sort(np.concatenate([np.r_[_rises(c), _falls(c)] for c in commanded]))
-    for i in range(traces.pumps):
+    for i in range(running.shape[0]):
         _mark(of_station, _rises(commanded[i]), ramp_s, START_RAMP, ends=switches)
         _mark(of_station, _falls(commanded[i]), ramp_s, STOP_RAMP, ends=switches)
     any_running = np.asarray(running.any(axis=0))

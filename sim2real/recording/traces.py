@@ -6,18 +6,21 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity, pump_column
+from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.recording.drives import Drives, drives_between
+from wetwell.sim2real.recording.seconds import filled
 
-HELD_S = 120
-"""How long a command is taken to hold on while its value is missing."""
-STANDING_HZ = 0.5
-"""A frequency under this is a drive at rest."""
 MIN_LENGTH_S = 1800
 MIN_STARTS = 6
-MAX_SPAN = 10
+SLOWEST_S = 900
 """Seconds to a row at the most."""
+MOST_LOST = 10
+"""Time that a recording takes over that of its rows at the slowest rate, at the most."""
+EACH_SECOND_S = 1.5
+"""Seconds from row to row up to which the recording is one of each second."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,10 +31,16 @@ class Traces:
     ----------
     start_ns : int
         Time of the first second.
+    rate_s : float
+        From row to row. [s]
+    value : "instant", "mean" or "held"
+        What a stored value stands for.
     time_s : (n,) array
         Seconds since then.
-    frequency_hz : (pumps, n) array
-        Without NaN.
+    is_row : (n,) array
+        Whether there is a row.
+    drives : Drives
+        Frequencies of all seconds.
     level_m : (n,) array
     inflow_m3h : (n,) array or None
         Without NaN.
@@ -40,8 +49,11 @@ class Traces:
     """
 
     start_ns: int
+    rate_s: float
+    value: StoredValue
     time_s: Floats
-    frequency_hz: Floats
+    is_row: Flags
+    drives: Drives
     level_m: Floats
     inflow_m3h: Floats | None
     signals: dict[AnalogueQuantity, Floats]
@@ -50,6 +62,21 @@ class Traces:
     def seconds(self) -> int:
         """Length. [s]."""
         return int(self.level_m.shape[0])
+
+    @property
+    def frequency_hz(self) -> Floats:
+        """(pumps, n) frequencies, without NaN; between rows as they were most likely."""
+        return self.drives.frequency_hz
+
+    @property
+    def is_each_second(self) -> bool:
+        """Whether there is a row each second, but for some that were lost."""
+        return self.rate_s <= EACH_SECOND_S
+
+    @property
+    def span_s(self) -> int:
+        """Seconds that a value is the mean of, up to its own. [s]."""
+        return round(self.rate_s) if self.value == "mean" else 1
 
     @property
     def pumps(self) -> int:
@@ -97,45 +124,38 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     frequency_hz = np.where(np.isnan(frequency_hz), of_pumps("running") * nominal_hz, frequency_hz)
     if not np.isfinite(frequency_hz).any():
         raise ValueError("neither frequencies nor running flags have values: no run can be told")
-    frequency_hz = np.array([filled(values, HELD_S, 0.0) for values in frequency_hz])
-    frequency_hz[frequency_hz < STANDING_HZ] = 0.0
-    starts = int(np.sum((frequency_hz[:, 1:] > 0.0) & (frequency_hz[:, :-1] == 0.0)))
+    rate_s = float(np.median(np.diff(second)))
+    drives = drives_between(frequency_hz, nominal_hz[:, 0], station.control.ramp_s, rate_s)
+    running = drives.frequency_hz > 0.0
+    starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
     if starts < MIN_STARTS:
         raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {MIN_STARTS}")
     level_m = on_seconds("level_m")
     if not {"flow_m3h", "head_m"} & signals.keys() and not _moves(level_m):
         raise ValueError("flow, head and level have no values or never move: nothing to hold the simulator against")
     inflow_m3h = on_seconds("inflow_m3h")
-    is_known = np.isfinite(inflow_m3h).mean() > 0.5 * (np.unique(second).size / seconds)
+    is_row = np.zeros(seconds, dtype=np.bool_)
+    is_row[second] = True
+    is_known = np.isfinite(inflow_m3h[is_row]).mean() > 0.5
     return Traces(
         start_ns=int(recording.time_ns[0]),
+        rate_s=rate_s,
+        value=recording.value,
         time_s=np.arange(seconds, dtype=np.float64),
-        frequency_hz=frequency_hz,
+        is_row=is_row,
+        drives=drives,
         level_m=level_m if _moves(level_m) else np.full(seconds, np.nan),
-        inflow_m3h=filled(inflow_m3h, seconds, 0.0) if is_known else None,
+        inflow_m3h=_inflow_between(inflow_m3h, rate_s) if is_known else None,
         signals=signals,
     )
 
 
-def filled(values: Floats, longest: int, otherwise: float) -> Floats:
-    """Values with NaN replaced by the last one before, for at most `longest` places; else by `otherwise`.
-
-    Examples
-    --------
-    >>> filled(np.array([np.nan, 1.0, np.nan, np.nan, 3.0]), 1, 0.0)
-    array([0., 1., 1., 0., 3.])
-    """
-    place = np.arange(values.size)
-    last = np.maximum.accumulate(np.where(np.isfinite(values), place, -1))
-    held = np.where((last >= 0) & (place - last <= longest), values[last], otherwise)
-    return np.asarray(held, dtype=np.float64)
-
-
-def repeated(values: Floats) -> Flags:
-    """(..., n) whether a value is exactly that of the second before; the zeros of a standing pump are not meant."""
-    same = np.zeros(values.shape, dtype=bool)
-    same[..., 1:] = (values[..., 1:] == values[..., :-1]) & (values[..., 1:] != 0.0)
-    return same
+def _inflow_between(inflow_m3h: Floats, rate_s: float) -> Floats:
+    """Inflow of each second: of those that were lost the last one, of those between rows along a straight line."""
+    if rate_s <= EACH_SECOND_S:
+        return filled(inflow_m3h, inflow_m3h.size, 0.0)
+    known = np.flatnonzero(np.isfinite(inflow_m3h))
+    return np.interp(np.arange(inflow_m3h.size), known, inflow_m3h[known])
 
 
 def _moves(values: Floats) -> bool:
@@ -149,8 +169,9 @@ def _length_s(second: Integers) -> int:
     seconds = int(second[-1]) + 1
     if seconds < MIN_LENGTH_S:
         raise ValueError(f"the recording is {seconds} s long, a diagnosis needs at least {MIN_LENGTH_S} s")
-    if seconds > MAX_SPAN * len(second):
+    if float(np.median(np.diff(second))) > SLOWEST_S or seconds > MOST_LOST * SLOWEST_S * len(second):
         raise ValueError(
-            f"the recording has {len(second)} rows over {seconds} s: a stamp is wrong, or it is sampled too slowly"
+            f"the recording has {len(second)} rows over {seconds} s: a stamp is wrong, or it is sampled more slowly "
+            f"than every {SLOWEST_S} s"
         )
     return seconds

@@ -8,20 +8,23 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.traces import Traces, repeated
+from wetwell.sim2real.recording.regimes import IDLE, regimes_of
+from wetwell.sim2real.recording.seconds import repeated, trailing_means
+from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.kernel import replay_seconds
+from wetwell.sim2real.replay.observer import Observer, constant_observer, row_observer
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, plant_parameters
 from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels_of
 
-LEVEL_TIME_S = 150.0
-"""Time constant with which the observer follows the recorded level."""
 FIRST = 5
 """Values of the level from which the observer begins."""
-UNKNOWN_INFLOW_TIME_S = 300.0
-"""Time constant with which it follows where the inflow has to be followed too."""
+DRIFTS = tuple(2.0 * 0.05**2 / 900.0 * 8.0**k for k in range(-4, 5))
+"""Rates by which the variance of an unknown inflow may grow, over the square of what a pump carries. [1/s]"""
+MOST_SQUARE = 9.0
+"""Square of a standardised error beyond which it says no more about how an inflow drifts."""
 KEPT_RUNS = 3
 """Runs that are kept: what only the telemetry or the controller does differently is not computed again."""
 
@@ -37,6 +40,18 @@ class Prediction:
     level_m: Floats
     signals: dict[AnalogueQuantity, Floats]
     plant: PlantParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Doubt:
+    """Standard deviations of what a right model predicts, in the unit of the signal.
+
+    `level_m` (n,) has all that the level may be off, its sensor's noise included, or is None where the observer does
+    not know; `signals` (pumps, n) what moments that the rows do not show leave open, empty where they show all.
+    """
+
+    level_m: Floats | None
+    signals: dict[AnalogueQuantity, Floats]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +86,7 @@ class Replay:
         known = np.flatnonzero(np.isfinite(traces.level_m))
         first = traces.level_m[known[:FIRST]]  # a single value may be wrong
         self._first_level_m = float(np.median(first)) if known.size else _middle_level_m(station)
+        self.observer = self._observer()
 
     def run(self, effects: Sequence[Effect] = ()) -> Prediction:
         """Predict under effects.
@@ -81,22 +97,49 @@ class Replay:
             If an effect does not fit the station.
         """
         acting = (*self.own, *effects)
+        plant = self._plant(acting)
+        run = self._run(acting, plant)
+        return self._predicted(plant, run.level_m, run.reading)
+
+    def doubt(self) -> Doubt:
+        r"""What the moments that the rows do not show leave open in what is predicted.
+
+        $$\sigma^2 = \frac{(y_\text{early} - y_\text{late})^2 + (y_\text{long} - y_\text{short})^2}{24}$$
+
+        for starts and stops that lie anywhere in what is possible, one as likely as another, each by itself.
+        """
+        placements = self.traces.drives.placements
+        if not placements:
+            return Doubt(level_m=self.observer.deviation_m, signals={})
+        plant = self._plant(self.own)
+        early, late, long, short = (
+            self._predicted(plant, *self._computed(self.own, plant, placement, self.observer)).signals
+            for placement in placements
+        )
+        signals = {
+            name: np.sqrt(((early[name] - late[name]) ** 2 + (long[name] - short[name]) ** 2) / 24.0) for name in early
+        }
+        return Doubt(level_m=self.observer.deviation_m, signals=signals)
+
+    def _plant(self, acting: Sequence[Effect]) -> PlantParameters:
         plant = plant_parameters(self.station)
         for effect in acting:
             plant = effect.modify(plant)
-        run = self._run(acting, plant)
-        level_m, reading = run.level_m, run.reading
+        return plant
+
+    def _predicted(self, plant: PlantParameters, level_m: Floats, reading: Floats) -> Prediction:
+        """What the sensors read as the recording stores it."""
+        span_s = self.traces.span_s
         signals = {
-            name: later(reading[k], _delay_s(plant, name))
+            name: trailing_means(later(reading[k], _delay_s(plant, name)), span_s)
             for k, name in enumerate(PUMP_METERS)
             if name in self.traces.signals
         }
-        delay_s = plant.sensors[LEVEL].delay_s
-        return Prediction(level_m=later(level_m, delay_s), signals=signals, plant=plant)
+        told_m = later(level_m, plant.sensors[LEVEL].delay_s)
+        return Prediction(level_m=trailing_means(told_m, span_s), signals=signals, plant=plant)
 
     def _run(self, acting: Sequence[Effect], plant: PlantParameters) -> _Run:
         """Run of the kernel; one that is kept, where the plant differs from its plant in nothing that it reads."""
-        traces, pumps = self.traces, self.traces.pumps
         is_held = plant.sensors[LEVEL].deadband > 0.0
         frequency_delay_s = _delay_s(plant, "frequency_hz")
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
@@ -108,27 +151,57 @@ class Replay:
         for run in self._kept:
             if run.key == key:
                 return run
+        observer = self.observer
+        if is_held and observer.deviation_m is None:
+            observer = constant_observer(self._told_level_m)
+        level_m, reading = self._computed(acting, plant, self.traces.frequency_hz, observer)
+        run = _Run(key=key, level_m=level_m, reading=reading)
+        self._kept = (*self._kept[1 - KEPT_RUNS :], run)
+        return run
+
+    def _computed(
+        self, acting: Sequence[Effect], plant: PlantParameters, frequency_hz: Floats, observer: Observer
+    ) -> tuple[Floats, Floats]:
+        """(n,) level and (3, pumps, n) flow, head and power as the sensors read them, by the kernel."""
+        traces, pumps = self.traces, self.traces.pumps
+        is_held = plant.sensors[LEVEL].deadband > 0.0
+        forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         level_m = np.empty(traces.seconds)
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
-        if traces.inflow_m3h is None:
-            gains = 1.4 / UNKNOWN_INFLOW_TIME_S, 1.0 / UNKNOWN_INFLOW_TIME_S**2
-        else:
-            gains = 1.0 / LEVEL_TIME_S, 0.0
         replay_seconds(
-            records,
+            replace(plant, control_delay_s=0.0).records(),
             first_state(plant, max(self._first_level_m, 0.0)),
             self._forced(forces, plant),
             np.zeros((len(PUMP_METERS), pumps)),
-            np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
+            np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
             self._told_level_m if is_held else traces.level_m,
-            *gains,
+            observer.level_gain,
+            observer.inflow_gain,
+            traces.span_s,
             still_truth(pumps, 1),
             level_m,
             reading,
         )
-        run = _Run(key=key, level_m=level_m, reading=reading)
-        self._kept = (*self._kept[1 - KEPT_RUNS :], run)
-        return run
+        return level_m, reading
+
+    def _observer(self) -> Observer:
+        """Observer of the recording; of an inflow that is not measured, with the drift that its calm rows are likeliest of."""
+        traces, station = self.traces, self.station
+        if traces.inflow_m3h is not None:
+            return constant_observer(traces.level_m) if traces.is_each_second else row_observer(traces, station, 0.0)
+        plant = self._plant(self.own)
+        carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.area_m2
+        rows = np.isfinite(traces.level_m) & (regimes_of(traces, station).of_station == IDLE)
+        best, least = None, np.inf
+        for drift in DRIFTS:
+            observer = row_observer(traces, station, drift * carried_m_s**2)
+            level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
+            variance_m2 = observer.deviation_m[rows] ** 2
+            squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
+            unlikely = float(np.sum(np.log(variance_m2) + np.minimum(squares, MOST_SQUARE)))
+            if best is None or unlikely < least:
+                best, least = observer, unlikely
+        return best
 
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""

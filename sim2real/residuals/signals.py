@@ -10,10 +10,12 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
-from wetwell.sim2real.recording.traces import Traces, repeated
-from wetwell.sim2real.replay.replay import LEVEL_TIME_S, UNKNOWN_INFLOW_TIME_S, Prediction
+from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD, repeated
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.observer import LEVEL_TIME_S, level_noise_m
+from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
-from wetwell.sim2real.residuals.noise import GAUSSIAN_MAD, Noise, configured_noise, noise_of
+from wetwell.sim2real.residuals.noise import BLOCK_S, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.telemetry.channels import channels_of
@@ -82,6 +84,7 @@ def pump_residuals(
     station: Station,
     regimes: Regimes,
     plain: Prediction,
+    doubt: Doubt,
     patterns: Mapping[AnalogueQuantity, Pattern],
 ) -> list[SignalResiduals]:
     """Of every measured signal of every pump.
@@ -90,32 +93,42 @@ def pump_residuals(
     ----------
     plain : Prediction
         Of the station as it is: what the noise is relative to, the same for every candidate.
+    doubt : Doubt
+        What moments that the rows do not show leave open.
     """
     configured = configured_noise(station.sensors)
     is_step = _steps(traces, plain)
+    block = max(round(BLOCK_S / traces.rate_s), 1)
     found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
-        noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
+        noise = noise_of(_steady_ratios(recorded, expected, regimes, traces.is_each_second), configured[name], TOLERANCE, block)
         for pump in range(traces.pumps):
             open_ = _unresolved(expected[pump], is_step)
+            if name in doubt.signals:
+                open_ = np.hypot(open_, doubt.signals[name][pump])
             one = _one_pump(name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(name))
             if one is not None:
                 found.append(one)
     return found
 
 
-def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list[Floats]:
+def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, is_each_second: bool) -> list[Floats]:
     stretches: list[Floats] = []
     for pump in range(recorded.shape[0]):
         regime = regimes.of_pumps[pump]
         edges = np.flatnonzero(np.diff(regime)) + 1
         stretches += [
-            recorded[pump, rows] / np.maximum(expected[pump, rows], 1e-9)
+            _between_losses(recorded[pump, rows] / np.maximum(expected[pump, rows], 1e-9), is_each_second)
             for rows in np.split(np.arange(regime.size), edges)
             if regime[rows[0]] == STEADY and rows.size >= MIN_STRETCH_S
         ]
     return stretches
+
+
+def _between_losses(values: Floats, is_each_second: bool) -> Floats:
+    """Values in rows that are slower than a second, one after the other."""
+    return values if is_each_second else values[np.isfinite(values)]
 
 
 def _steps(traces: Traces, plain: Prediction) -> Flags:
@@ -179,6 +192,7 @@ def level_residuals(
     station: Station,
     regimes: Regimes,
     plain: Prediction,
+    doubt: Doubt,
     patterns: Mapping[AnalogueQuantity, Pattern],
 ) -> SignalResiduals:
     """Of the level."""
@@ -186,19 +200,16 @@ def level_residuals(
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
-    follow_s = UNKNOWN_INFLOW_TIME_S if traces.inflow_m3h is None else LEVEL_TIME_S
     rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
-    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * follow_s
+    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * LEVEL_TIME_S
     flow_m3h = plain.signals["flow_m3h"].sum(axis=0) if "flow_m3h" in plain.signals else np.zeros(regime.size)
     jumps_m3h = np.abs(np.diff(flow_m3h, prepend=flow_m3h[:1])) * _steps(traces, plain)
-    forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * follow_s) / follow_s)
+    forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * LEVEL_TIME_S) / LEVEL_TIME_S)
     open_m = np.convolve(jumps_m3h, forgotten)[: regime.size] / 3600.0 / station.sump.area_m2
     balance_m = np.hypot(off_m, seconds.means(open_m))
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
-    if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know
-        error_m = np.abs(seconds.means_of(traces.level_m[seconds.second] - plain.level_m[seconds.second]))
-        is_idle = seconds.first(regime) == IDLE
-        balance_m = np.hypot(balance_m, np.median(error_m[is_idle]) / GAUSSIAN_MAD if is_idle.any() else 0.0)
+    if doubt.level_m is not None:
+        noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
     return SignalResiduals(
         bins=seconds.bins(
             LEVEL,
@@ -216,11 +227,3 @@ def level_residuals(
         is_repeated=repeated(traces.level_m)[seconds.second],
         pattern=patterns.get("level_m"),
     )
-
-
-def level_noise_m(traces: Traces, station: Station) -> float:
-    """Standard deviation of the level sensor's noise. [m]."""
-    bends = np.diff(traces.level_m, n=2)
-    bends = np.abs(bends[np.isfinite(bends)])
-    seen_m = float(np.median(bends)) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
-    return max(seen_m, 0.5 * station.sensors.level_noise_m, 1e-4)
