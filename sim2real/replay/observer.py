@@ -18,10 +18,14 @@ MOST_FOLLOWED = 0.5
 LOST_S = 300
 """After that long without a level, and more than two rows, the observer begins anew."""
 BEGUN_ANEW = 1.0
-"""Share of an error that is taken away by beginning anew."""
+"""Share of an error that is taken away by beginning anew, which is all of it."""
 FIRST_SHARE = 0.5
 """Standard deviation of an inflow before anything is known of it, as a share of what a pump carries."""
 MIN_NOISE_M = 1e-4
+UNKNOWN = 1e6
+"""Variance of a level of which nothing is known, over that of its sensor."""
+RANGE = (0.05, 0.95)
+"""Quantiles of the level between which the wet well is emptied and filled."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,13 +34,16 @@ class Observer:
 
     Attributes
     ----------
+    level_m : (n,) array
+        Level that is followed, NaN where there is none. [m]
     level_gain, inflow_gain : (n,) arrays
         Shares of the error of a value by which the level, and the inflow over the area, are moved. [1, 1/s]
     deviation_m : (n,) array or None
         Standard deviation of the error under a right model, noise of the value included; None where the gains are
-        constant, as with a measured inflow of each second. [m]
+        constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
     """
 
+    level_m: Floats
     level_gain: Floats
     inflow_gain: Floats
     deviation_m: Floats | None
@@ -55,8 +62,34 @@ def constant_observer(level_m: Floats) -> Observer:
     lost_s = place - np.r_[-1, last[:-1]] - 1
     gain = np.minimum(1.0 / LEVEL_TIME_S * (lost_s + 1), MOST_FOLLOWED)
     return Observer(
-        level_gain=np.where(lost_s > LOST_S, BEGUN_ANEW, gain), inflow_gain=np.zeros(level_m.size), deviation_m=None
+        level_m=level_m,
+        level_gain=np.where(lost_s > LOST_S, BEGUN_ANEW, gain),
+        inflow_gain=np.zeros(level_m.size),
+        deviation_m=None,
     )
+
+
+def forced_observer(traces: Traces) -> Observer:
+    """Observer that takes the level from the rows, along straight lines, and predicts none."""
+    rows = np.flatnonzero(np.isfinite(traces.level_m))
+    middle = rows - 0.5 * (traces.span_s - 1)
+    place = np.arange(traces.seconds)
+    return Observer(
+        level_m=np.interp(place, middle, traces.level_m[rows]) if rows.size else traces.level_m,
+        level_gain=np.full(traces.seconds, BEGUN_ANEW),
+        inflow_gain=np.zeros(traces.seconds),
+        deviation_m=np.full(traces.seconds, np.inf),
+    )
+
+
+def hides_cycles(traces: Traces, station: Station) -> bool:
+    """Whether the wet well can be emptied or filled between two rows, so that the level between them is unknown."""
+    level_m = traces.level_m[np.isfinite(traces.level_m)]
+    if traces.is_each_second or level_m.size == 0:
+        return False
+    low_m, high_m = np.quantile(level_m, RANGE)
+    carried_m_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0 / station.sump.area_m2
+    return traces.rate_s * carried_m_s > high_m - low_m
 
 
 def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observer:
@@ -102,7 +135,12 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observ
         inflow_gain,
         variance_m2,
     )
-    return Observer(level_gain=level_gain, inflow_gain=inflow_gain, deviation_m=np.sqrt(variance_m2))
+    return Observer(
+        level_m=traces.level_m,
+        level_gain=level_gain,
+        inflow_gain=inflow_gain,
+        deviation_m=np.sqrt(variance_m2),
+    )
 
 
 @compiled
@@ -120,7 +158,7 @@ def _filter(
     variance_m2: Floats,
 ) -> None:
     """Write gains, and variances of the error before each value, its own noise included."""
-    level, both, inflow = noise_m2, 0.0, first_inflow
+    level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
     last, hidden = -1, 0.0
     for k in range(is_known.size):
         hidden += open_m2[k]
@@ -131,13 +169,13 @@ def _filter(
         both += step * inflow + 0.5 * drift * step**2
         inflow += drift * step
         if step > lost_s:
-            level, both, inflow = 1e6 * noise_m2, 0.0, first_inflow
+            level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
         seen = level + noise_m2
         gain = max(level / seen, min(least_gain * step, 0.5))
         of_inflow = both / seen
         variance_m2[k] = seen
         level_gain[k], inflow_gain[k] = gain, of_inflow
-        if step > lost_s:
+        if step > lost_s or last < 0:
             level_gain[k] = 1.0
         # Joseph's form: right for any gain
         inflow = inflow - 2.0 * of_inflow * both + of_inflow**2 * seen

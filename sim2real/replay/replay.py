@@ -12,7 +12,7 @@ from wetwell.sim2real.recording.regimes import IDLE, regimes_of
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.kernel import replay_seconds
-from wetwell.sim2real.replay.observer import Observer, constant_observer, row_observer
+from wetwell.sim2real.replay.observer import Observer, constant_observer, forced_observer, hides_cycles, row_observer
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, plant_parameters
@@ -152,8 +152,10 @@ class Replay:
             if run.key == key:
                 return run
         observer = self.observer
-        if is_held and observer.deviation_m is None:
-            observer = constant_observer(self._told_level_m)
+        if is_held:
+            is_constant = observer.deviation_m is None
+            told_m = self._told_level_m
+            observer = constant_observer(told_m) if is_constant else replace(observer, level_m=told_m)
         level_m, reading = self._computed(acting, plant, self.traces.frequency_hz, observer)
         run = _Run(key=key, level_m=level_m, reading=reading)
         self._kept = (*self._kept[1 - KEPT_RUNS :], run)
@@ -164,7 +166,6 @@ class Replay:
     ) -> tuple[Floats, Floats]:
         """(n,) level and (3, pumps, n) flow, head and power as the sensors read them, by the kernel."""
         traces, pumps = self.traces, self.traces.pumps
-        is_held = plant.sensors[LEVEL].deadband > 0.0
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         level_m = np.empty(traces.seconds)
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
@@ -174,10 +175,10 @@ class Replay:
             self._forced(forces, plant),
             np.zeros((len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
-            self._told_level_m if is_held else traces.level_m,
+            observer.level_m,
             observer.level_gain,
             observer.inflow_gain,
-            traces.span_s,
+            1 if observer.level_m is not traces.level_m and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
             level_m,
             reading,
@@ -187,6 +188,8 @@ class Replay:
     def _observer(self) -> Observer:
         """Observer of the recording; of an inflow that is not measured, with the drift that its calm rows are likeliest of."""
         traces, station = self.traces, self.station
+        if hides_cycles(traces, station):
+            return forced_observer(traces)
         if traces.inflow_m3h is not None:
             return constant_observer(traces.level_m) if traces.is_each_second else row_observer(traces, station, 0.0)
         plant = self._plant(self.own)

@@ -163,6 +163,8 @@ def _one_pump(
     seconds = binned(counted, regime + 10 * regimes.cycle, length_s)
     running = counted & ((regime == STEADY) | (regime == MULTI_PUMP))
     rated = float(np.median(np.abs(recorded[running if running.any() else counted])))
+    if rated == 0.0:
+        return None
     slope = np.gradient(expected)
     size = np.abs(np.where(counted, recorded, 0.0))
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
@@ -197,6 +199,8 @@ def level_residuals(
 ) -> SignalResiduals:
     """Of the level."""
     counted = np.isfinite(traces.level_m)
+    if doubt.level_m is not None:
+        counted &= np.isfinite(doubt.level_m)
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))

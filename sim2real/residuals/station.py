@@ -34,7 +34,8 @@ class StationResiduals:
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
         self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, doubt, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
-            self._parts.append(level_residuals(traces, station, regimes, plain, doubt, patterns))
+            level = level_residuals(traces, station, regimes, plain, doubt, patterns)
+            self._parts += [level] if level.bins.size else []
             self._parts.append(event_residuals(traces, station, regimes, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 
