@@ -52,12 +52,24 @@ class Regimes:
 def regimes_of(traces: Traces, station: Station) -> Regimes:
     """Regimes of a recording, from its frequencies alone; a ramp where it is open whether it is one."""
     found = _regimes_of(traces.frequency_hz, station)
-    for placement in traces.drives.placements:
+    for placement in traces.drives.placements if traces.span_s == 1 else ():
         other = _regimes_of(placement, station)
         for mine, its in ((found.of_station, other.of_station), (found.of_pumps, other.of_pumps)):
             is_ramp = (its == START_RAMP) | (its == STOP_RAMP)
             mine[is_ramp] = its[is_ramp]
+    if traces.span_s > 1:
+        order = (IDLE, STEADY, MULTI_PUMP, START_RAMP, STOP_RAMP)
+        if traces.span_s > station.control.ramp_s + SETTLING_S:
+            order = (IDLE, START_RAMP, STOP_RAMP, STEADY, MULTI_PUMP)
+        for mine in (found.of_station, *found.of_pumps):
+            mine[traces.is_row] = _of_intervals(mine, np.flatnonzero(traces.is_row), traces.span_s, order)
     return found
+
+
+def _of_intervals(regime: Integers, last: Integers, span_s: int, order: tuple[int, ...]) -> Integers:
+    """(rows,) the last in an order of the regimes that an interval meets."""
+    rank = np.argsort(order)[regime]
+    return np.array([order[int(rank[max(k - span_s + 1, 0) : k + 1].max())] for k in last], dtype=np.int64)
 
 
 def _regimes_of(frequency_hz: Floats, station: Station) -> Regimes:

@@ -11,6 +11,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.recording.drives import Drives, drives_between
+from wetwell.sim2real.recording.duty import Intervals, drives_of_means
 from wetwell.sim2real.recording.seconds import filled
 
 MIN_LENGTH_S = 1800
@@ -87,6 +88,8 @@ class Traces:
 def traces_of(recording: Recording, station: Station) -> Traces:
     """Recording on whole seconds; rows between are dropped, seconds between rows have no value.
 
+    The seconds of a recording of means begin with the interval of its first row.
+
     Parameters
     ----------
     recording : Recording
@@ -107,7 +110,10 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     if np.any(np.diff(recording.time_ns) <= 0):
         raise ValueError("times must rise: prepare the recording first")
     second = (recording.time_ns - recording.time_ns[0] + NS_PER_S // 2) // NS_PER_S
-    seconds = _length_s(second)
+    rate_s = _rate_s(second)
+    before_s = round(rate_s) - 1 if recording.value == "mean" else 0
+    second = second + before_s
+    seconds = int(second[-1]) + 1
 
     def on_seconds(name: str) -> Floats:
         values = np.full(seconds, np.nan)
@@ -124,8 +130,11 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     frequency_hz = np.where(np.isnan(frequency_hz), of_pumps("running") * nominal_hz, frequency_hz)
     if not np.isfinite(frequency_hz).any():
         raise ValueError("neither frequencies nor running flags have values: no run can be told")
-    rate_s = float(np.median(np.diff(second)))
-    drives = drives_between(frequency_hz, nominal_hz[:, 0], station.control.ramp_s, rate_s)
+    if before_s > 0:
+        intervals = Intervals(last=second, length_s=before_s + 1, seconds=seconds)
+        drives = drives_of_means(frequency_hz[:, second], of_pumps("running")[:, second], intervals, station)
+    else:
+        drives = drives_between(frequency_hz, nominal_hz[:, 0], station.control.ramp_s, rate_s)
     running = drives.frequency_hz > 0.0
     starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
     if starts < MIN_STARTS:
@@ -138,24 +147,26 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     is_row[second] = True
     is_known = np.isfinite(inflow_m3h[is_row]).mean() > 0.5
     return Traces(
-        start_ns=int(recording.time_ns[0]),
+        start_ns=int(recording.time_ns[0]) - before_s * NS_PER_S,
         rate_s=rate_s,
         value=recording.value,
         time_s=np.arange(seconds, dtype=np.float64),
         is_row=is_row,
         drives=drives,
         level_m=level_m if _moves(level_m) else np.full(seconds, np.nan),
-        inflow_m3h=_inflow_between(inflow_m3h, rate_s) if is_known else None,
+        inflow_m3h=_inflow_between(inflow_m3h, rate_s, before_s + 1) if is_known else None,
         signals=signals,
     )
 
 
-def _inflow_between(inflow_m3h: Floats, rate_s: float) -> Floats:
+def _inflow_between(inflow_m3h: Floats, rate_s: float, span_s: int) -> Floats:
     """Inflow of each second: of those that were lost the last one, of those between rows along a straight line."""
     if rate_s <= EACH_SECOND_S:
         return filled(inflow_m3h, inflow_m3h.size, 0.0)
-    known = np.flatnonzero(np.isfinite(inflow_m3h))
-    return np.interp(np.arange(inflow_m3h.size), known, inflow_m3h[known])
+    known, place = np.flatnonzero(np.isfinite(inflow_m3h)), np.arange(inflow_m3h.size)
+    if span_s > 1:
+        return np.asarray(inflow_m3h[known[np.minimum(np.searchsorted(known, place), known.size - 1)]])
+    return np.interp(place, known, inflow_m3h[known])
 
 
 def _moves(values: Floats) -> bool:
@@ -164,14 +175,15 @@ def _moves(values: Floats) -> bool:
     return bool(known.size) and bool(np.ptp(known) > 0.0)
 
 
-def _length_s(second: Integers) -> int:
-    """Length of a recording with rows at these seconds."""
+def _rate_s(second: Integers) -> float:
+    """Seconds from row to row of a recording that is long enough and stored often enough."""
     seconds = int(second[-1]) + 1
     if seconds < MIN_LENGTH_S:
         raise ValueError(f"the recording is {seconds} s long, a diagnosis needs at least {MIN_LENGTH_S} s")
-    if float(np.median(np.diff(second))) > SLOWEST_S or seconds > MOST_LOST * SLOWEST_S * len(second):
+    rate_s = float(np.median(np.diff(second)))
+    if rate_s > SLOWEST_S or seconds > MOST_LOST * SLOWEST_S * len(second):
         raise ValueError(
             f"the recording has {len(second)} rows over {seconds} s: a stamp is wrong, or it is sampled more slowly "
             f"than every {SLOWEST_S} s"
         )
-    return seconds
+    return rate_s

@@ -113,13 +113,21 @@ class Replay:
             return Doubt(level_m=self.observer.deviation_m, signals={})
         plant = self._plant(self.own)
         early, late, long, short = (
-            self._predicted(plant, *self._computed(self.own, plant, placement, self.observer)).signals
+            self._predicted(plant, *self._computed(self.own, plant, placement, self.observer))
             for placement in placements
         )
+
+        def spread(*values: Floats) -> Floats:
+            first, second, third, fourth = values
+            return np.sqrt(((first - second) ** 2 + (third - fourth) ** 2) / 24.0)
+
         signals = {
-            name: np.sqrt(((early[name] - late[name]) ** 2 + (long[name] - short[name]) ** 2) / 24.0) for name in early
+            name: spread(*(one.signals[name] for one in (early, late, long, short))) for name in self.traces.signals
         }
-        return Doubt(level_m=self.observer.deviation_m, signals=signals)
+        level_m = self.observer.deviation_m
+        if level_m is not None and self.traces.span_s > 1:  # the observer knows of instants only
+            level_m = np.hypot(level_m, spread(*(one.level_m for one in (early, late, long, short))))
+        return Doubt(level_m=level_m, signals=signals)
 
     def _plant(self, acting: Sequence[Effect]) -> PlantParameters:
         plant = plant_parameters(self.station)

@@ -98,11 +98,12 @@ def pump_residuals(
     """
     configured = configured_noise(station.sensors)
     is_step = _steps(traces, plain)
+    is_counted = np.ones(traces.seconds, dtype=np.bool_) if traces.is_each_second else traces.is_row
     block = max(round(BLOCK_S / traces.rate_s), 1)
     found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
-        noise = noise_of(_steady_ratios(recorded, expected, regimes, traces.is_each_second), configured[name], TOLERANCE, block)
+        noise = noise_of(_steady_ratios(recorded, expected, regimes, is_counted), configured[name], TOLERANCE, block)
         for pump in range(traces.pumps):
             open_ = _unresolved(expected[pump], is_step)
             if name in doubt.signals:
@@ -113,22 +114,20 @@ def pump_residuals(
     return found
 
 
-def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, is_each_second: bool) -> list[Floats]:
+def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, is_counted: Flags) -> list[Floats]:
+    """Recorded over expected in stretches in which nothing is switched, of the seconds that count."""
     stretches: list[Floats] = []
     for pump in range(recorded.shape[0]):
-        regime = regimes.of_pumps[pump]
+        regime = regimes.of_pumps[pump, is_counted]
+        ratio = recorded[pump, is_counted] / np.maximum(expected[pump, is_counted], 1e-9)
+        second = np.flatnonzero(is_counted)
         edges = np.flatnonzero(np.diff(regime)) + 1
         stretches += [
-            _between_losses(recorded[pump, rows] / np.maximum(expected[pump, rows], 1e-9), is_each_second)
+            ratio[rows]
             for rows in np.split(np.arange(regime.size), edges)
-            if regime[rows[0]] == STEADY and rows.size >= MIN_STRETCH_S
+            if regime[rows[0]] == STEADY and second[rows[-1]] - second[rows[0]] + 1 >= MIN_STRETCH_S
         ]
     return stretches
-
-
-def _between_losses(values: Floats, is_each_second: bool) -> Floats:
-    """Values in rows that are slower than a second, one after the other."""
-    return values if is_each_second else values[np.isfinite(values)]
 
 
 def _steps(traces: Traces, plain: Prediction) -> Flags:
