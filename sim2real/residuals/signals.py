@@ -10,7 +10,7 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
-from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD, repeated
+from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S, level_noise_m
 from wetwell.sim2real.replay.replay import Doubt, Prediction
@@ -37,6 +37,10 @@ UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
 MIN_STRETCH_S = 60
+RAMP_ROWS = 4
+"""Rows in a ramp from which it is looked at."""
+TRANSIENT_S = 2.0
+"""Time for which a mean may miss, or have too much of, a flow at each start and stop: nobody sees its form. [s]"""
 QUANTUM_SHARE = 0.75
 """Share of a quantum by which a rounded value may be off: half of it, and the same if it is cut off instead."""
 
@@ -98,6 +102,9 @@ def pump_residuals(
     """
     configured = configured_noise(station.sensors)
     is_step = _steps(traces, plain)
+    is_ramp = (regimes.of_pumps == START_RAMP) | (regimes.of_pumps == STOP_RAMP)
+    is_shown = ~is_ramp | shows_ramps(traces, station)
+    switched = _switched(traces, plain)
     is_counted = np.ones(traces.seconds, dtype=np.bool_) if traces.is_each_second else traces.is_row
     block = max(round(BLOCK_S / traces.rate_s), 1)
     found = []
@@ -108,7 +115,10 @@ def pump_residuals(
             open_ = _unresolved(expected[pump], is_step)
             if name in doubt.signals:
                 open_ = np.hypot(open_, doubt.signals[name][pump])
-            one = _one_pump(name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(name))
+            if traces.span_s > 1:
+                open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
+            known = np.where(is_shown[pump], recorded[pump], np.nan)
+            one = _one_pump(name, pump, known, expected[pump], open_, regimes, noise, patterns.get(name))
             if one is not None:
                 found.append(one)
     return found
@@ -128,6 +138,18 @@ def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, is_coun
             if regime[rows[0]] == STEADY and second[rows[-1]] - second[rows[0]] + 1 >= MIN_STRETCH_S
         ]
     return stretches
+
+
+def shows_ramps(traces: Traces, station: Station) -> bool:
+    """Whether enough rows lie in a ramp to tell what happens there."""
+    return traces.is_each_second or traces.rate_s * RAMP_ROWS <= station.control.ramp_s
+
+
+def _switched(traces: Traces, plain: Prediction) -> Floats:
+    """(pumps, n) how often a drive was switched in the interval of a mean, per second of it."""
+    nominal_hz = plain.plant.nominal_frequency_hz[:, None]
+    moved = np.abs(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1])) / nominal_hz
+    return trailing_means(moved, traces.span_s)
 
 
 def _steps(traces: Traces, plain: Prediction) -> Flags:
