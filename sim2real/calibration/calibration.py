@@ -84,23 +84,25 @@ def _pump_curve(points: SteadyPoints, station: Station, pump: int, rng: np.rando
 
 
 def _system_curve(points: SteadyPoints, station: Station, rng: np.random.Generator) -> list[Estimate]:
-    main = station.rising_main
-    head = Estimate(name="rising_main.static_head_m", unit="m", value=main.static_head_m)
+    main = station.mains[0]
+    head = Estimate(name="rising_main.static_head_m", unit="m", value=main.lift_at_zero_m)
     friction = Estimate(name="rising_main.friction_h2_m5", unit="h²/m⁵", value=main.friction_h2_m5)
+    if len(station.mains) > 1 or main.delivery_level_m is not None:
+        return [parameter.kept("the file has several mains, or a delivery level") for parameter in (head, friction)]
     if np.unique(points.run).size < MIN_RUNS:
         return [parameter.kept("too few runs with steady flow and head") for parameter in (head, friction)]
     squared = (points.total_flow_m3h if main.layout == "common" else points.flow_m3h) ** 2
     if is_spread(squared):
         return polynomial_estimated([head, friction], squared, points.head_m, points.run, rng)
     reason = "one operating point: static head and friction cannot be told apart, the static head is kept"
-    rest = (points.head_m - main.static_head_m) / squared
+    rest = (points.head_m - main.lift_at_zero_m) / squared
     return [head.kept(reason), *mean_estimated(friction, rest, points.run, rng)]
 
 
 def _area(recording: Recording, station: Station, rng: np.random.Generator) -> list[Estimate]:
     """Area from the change of the level's slope when pumps start and stop: A Δ(dL/dt) = −Δ(ΣQ), inflow unchanged."""
-    parameter = Estimate(name="sump.area_m2", unit="m²", value=station.sump.area_m2)
-    if station.sump.profile is not None:
+    parameter = Estimate(name="sump.area_m2", unit="m²", value=station.sump.mean_area_m2)
+    if station.sump.profile is not None or station.sump.volume_points is not None:
         return [parameter.kept("the file gives a profile")]
     pumps = len(station.pump)
     running = running_flags(recording, pumps)

@@ -104,11 +104,13 @@ def _poured(on_s: Floats, length_s: int, most: int) -> Floats:
 def _runs(on_s: Floats, length_s: int, station: Station) -> Floats:
     """(rows,) runs of each pump in an interval by the volume between start and stop; under 1 where they are longer."""
     control = station.control
+    if control.is_external:
+        return np.zeros(on_s.shape[1])
     depth_m = control.start_levels_m[0] - control.stop_levels_m[0]
     carried_m3_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0
     share = np.minimum(on_s.sum(axis=0) / length_s, 1.0)
     active = np.maximum(np.sum(on_s > 0.0, axis=0), 1)
-    return np.asarray(share * (1.0 - share) * carried_m3_s * length_s / (station.sump.area_m2 * depth_m) / active)
+    return np.asarray(share * (1.0 - share) * carried_m3_s * length_s / (station.sump.mean_area_m2 * depth_m) / active)
 
 
 @compiled

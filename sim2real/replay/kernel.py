@@ -87,7 +87,7 @@ def replay_seconds(
         error_m = measured_level_m[second] - expected_m
         followed = level_gain[second]
         if followed >= 1.0:
-            now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], 0.0), plant.profile)
+            now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], plant.profile[0].level_m), plant.profile)
             sensed_m = measured_level_m[second]
         else:
             area_m2 = (

@@ -88,7 +88,7 @@ def hides_cycles(traces: Traces, station: Station) -> bool:
     if traces.is_each_second or level_m.size == 0:
         return False
     low_m, high_m = np.quantile(level_m, RANGE)
-    carried_m_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0 / station.sump.area_m2
+    carried_m_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
     return traces.rate_s * carried_m_s > high_m - low_m
 
 
@@ -115,7 +115,7 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observ
     Kalman, R. E.: A new approach to linear filtering and prediction problems. J. Basic Eng. 82 (1960) 35-45.
     """
     plant = plant_parameters(station)
-    area_m2 = station.sump.area_m2
+    area_m2 = station.sump.mean_area_m2
     speed_m_s = plant.rated_flow_m3h / 3600.0 / area_m2
     open_m2 = np.sum((speed_m_s[:, None] * traces.drives.open_s) ** 2, axis=0) / 12.0
     noise_m = level_noise_m(traces, station)

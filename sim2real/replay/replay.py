@@ -85,7 +85,7 @@ class Replay:
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
         first = traces.level_m[known[:FIRST]]  # a single value may be wrong
-        self._first_level_m = float(np.median(first)) if known.size else _middle_level_m(station)
+        self._first_level_m = float(np.median(first)) if known.size else station.middle_level_m
         self.observer = self._observer()
 
     def run(self, effects: Sequence[Effect] = ()) -> Prediction:
@@ -155,7 +155,7 @@ class Replay:
         read = tuple((sensor.gain, sensor.offset, sensor.followed, sensor.cutoff) for sensor in plant.sensors)
         delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
         station, profile = np.asarray(records.station).tolist(), np.asarray(records.profile).tolist()
-        key = (station, plant.pumps, profile, read, is_held, delays_s, forces)
+        key = (station, plant.mains, plant.pumps, profile, read, is_held, delays_s, forces)
         for run in self._kept:
             if run.key == key:
                 return run
@@ -179,7 +179,7 @@ class Replay:
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
         replay_seconds(
             replace(plant, control_delay_s=0.0).records(),
-            first_state(plant, max(self._first_level_m, 0.0)),
+            first_state(plant, max(self._first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
             np.zeros((len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
@@ -201,7 +201,7 @@ class Replay:
         if traces.inflow_m3h is not None:
             return constant_observer(traces.level_m) if traces.is_each_second else row_observer(traces, station, 0.0)
         plant = self._plant(self.own)
-        carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.area_m2
+        carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         rows = np.isfinite(traces.level_m) & (regimes_of(traces, station).of_station == IDLE)
         best, least = None, np.inf
         for drift in DRIFTS:
@@ -245,7 +245,3 @@ def later(values: Floats, delay_s: float) -> Floats:
 
 def _delay_s(plant: PlantParameters, quantity: AnalogueQuantity) -> float:
     return plant.sensors[channels_of(quantity, len(plant.pumps))[0]].delay_s
-
-
-def _middle_level_m(station: Station) -> float:
-    return 0.5 * (station.control.start_levels_m[0] + station.control.stop_levels_m[0])
