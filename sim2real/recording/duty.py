@@ -127,30 +127,35 @@ def _lay(
         begin = last[k] - length_s + 1
         is_next = k + 1 < last.size and last[k + 1] - last[k] == length_s
         is_after = k > 0 and last[k] - last[k - 1] == length_s
-        before = 0.0
+        rest_s, active = float(length_s), 0
+        for pump in range(on_s.shape[0]):
+            rest_s -= on_s[pump, k]
+            active += on_s[pump, k] > 0.0
+        before, is_much = 0.0, rest_s < 0.0
         for pump in range(on_s.shape[0]):
             wanted_s = on_s[pump, k]
             if count[k] >= 1.0 and wanted_s < length_s:
                 period = length_s / count[k]
-                first = before + place * max(period - before - wanted_s / count[k], 0.0)
+                first = before + place * max(rest_s, 0.0) / count[k] / max(active, 1)
                 for second in range(length_s):
                     since = (second - first) % period
                     if since < wanted_s / count[k]:
                         wanted_hz[pump, begin + second] = speed_hz[pump, k]
-                before = (before + wanted_s / count[k]) % period
+                if wanted_s > 0.0 and not (is_much and place == 1.0):  # late: those that run together begin together
+                    before = (before + (wanted_s + max(rest_s, 0.0) / active) / count[k]) % period
                 continue
             ran = is_after and on_s[pump, k - 1] > 0.0
             runs_on = is_next and on_s[pump, k + 1] > 0.0
-            rest_s = length_s - wanted_s
+            off_s = length_s - wanted_s
             for second in range(length_s):
                 if ran and runs_on:
-                    is_on = second < place * wanted_s or second >= place * wanted_s + rest_s
+                    is_on = second < place * wanted_s or second >= place * wanted_s + off_s
                 elif ran:
                     is_on = second < wanted_s
                 elif runs_on:
-                    is_on = second >= rest_s
+                    is_on = second >= off_s
                 else:
-                    is_on = place * rest_s <= second < place * rest_s + wanted_s
+                    is_on = place * off_s <= second < place * off_s + wanted_s
                 if is_on:
                     wanted_hz[pump, begin + second] = speed_hz[pump, k]
 
