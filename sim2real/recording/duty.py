@@ -54,8 +54,7 @@ def drives_of_means(frequency_hz: Floats, running: Floats, intervals: Intervals,
         [_speeds(mean, share, rated) for mean, share, rated in zip(mean_hz, told, nominal_hz, strict=True)]
     )
     on_s = np.minimum(mean_hz / speed_hz, 1.0) * intervals.length_s
-    most = int(np.ceil(station.control.ramp_s / intervals.length_s)) + 1
-    on_s = np.array([_poured(one, intervals.length_s, most) for one in on_s])
+    on_s = np.array([_poured(one, intervals.length_s, station.control.ramp_s) for one in on_s])
     count = _runs(on_s, intervals.length_s, station)
 
     def laid(place: float, factor: float) -> Floats:
@@ -83,8 +82,11 @@ def _speeds(mean_hz: Floats, share: Floats, nominal_hz: float) -> Floats:
     return np.where(is_full & (mean_hz > 0.0), mean_hz, np.maximum(usual_hz, mean_hz))
 
 
-def _poured(on_s: Floats, length_s: int, most: int) -> Floats:
-    """(rows,) times of running, those of the intervals over which one ramp goes together on the side that runs."""
+def _poured(on_s: Floats, length_s: int, ramp_s: float) -> Floats:
+    """(rows,) times of running, those of the intervals over which one ramp goes together on the side that runs.
+
+    Of a ramp an eighth lies before its middle, and is missing after it.
+    """
     poured = on_s.copy()
     share = np.r_[0.0, on_s, 0.0] / length_s
     is_part = (share > 0.0) & (share < FULL)
@@ -92,12 +94,14 @@ def _poured(on_s: Floats, length_s: int, most: int) -> Floats:
     ends = np.flatnonzero(~is_part[1:] & is_part[:-1])
     for begin, end in zip(begins, ends, strict=True):
         was_on, goes_on = share[begin] >= FULL, share[end + 1] >= FULL
-        if not 1 < end - begin <= most or was_on == goes_on:
+        if end - begin < 2 or was_on == goes_on:
             continue
-        left_s = float(on_s[begin:end].sum())
-        for k in range(begin, end) if was_on else range(end - 1, begin - 1, -1):
-            poured[k] = min(left_s, length_s)
-            left_s -= poured[k]
+        left_s, together = float(on_s[begin:end].sum()), np.zeros(end - begin)
+        for k in range(end - begin) if was_on else range(end - begin - 1, -1, -1):
+            together[k] = min(left_s, length_s)
+            left_s -= together[k]
+        if np.sum(np.abs(together - on_s[begin:end])) < 0.25 * ramp_s + 2.0:
+            poured[begin:end] = together
     return poured
 
 
