@@ -101,6 +101,19 @@ class Replay:
         run = self._run(acting, plant)
         return self._predicted(plant, run.level_m, run.reading)
 
+    def readings(self, effects: Sequence[Effect]) -> Floats:
+        """(3, pumps, n) flow, head and power of each second under effects, as sensors would read them, also missing ones.
+
+        Raises
+        ------
+        ValueError
+            If an effect does not fit the station.
+        """
+        acting = (*self.own, *effects)
+        plant = self._plant(acting)
+        read = self._run(acting, plant).reading
+        return np.array([later(one, _delay_s(plant, name)) for name, one in zip(PUMP_METERS, read, strict=True)])
+
     def doubt(self) -> Doubt:
         r"""What the moments that the rows do not show leave open in what is predicted.
 
