@@ -85,9 +85,7 @@ def drives_between(frequency_hz: Floats, nominal_hz: Floats, ramp_s: float, rate
                 open_s[pump, end] = slack_s * abs(last - first) / nominal_hz[pump]
     for one in (middle, *placements.values()):
         one[one < STANDING_HZ] = 0.0
-    return Drives(
-        frequency_hz=middle, placements=tuple(placements.values()) if open_s.any() else (), open_s=open_s
-    )
+    return Drives(frequency_hz=middle, placements=tuple(placements.values()) if open_s.any() else (), open_s=open_s)
 
 
 def _moves(rows: Integers, values: Floats, longest_s: float) -> Integers:

@@ -78,7 +78,9 @@ def drives_of_means(frequency_hz: Floats, running: Floats, intervals: Intervals,
 def _speeds(mean_hz: Floats, share: Floats, nominal_hz: float) -> Floats:
     """(rows,) speed of a drive while it runs: its mean where it ran throughout, else as it mostly ran."""
     is_full = np.where(np.isfinite(share), share >= FULL, mean_hz >= FULL * nominal_hz)
-    usual_hz = float(np.median(mean_hz[is_full & (mean_hz > 0.0)])) if np.any(is_full & (mean_hz > 0.0)) else nominal_hz
+    usual_hz = (
+        float(np.median(mean_hz[is_full & (mean_hz > 0.0)])) if np.any(is_full & (mean_hz > 0.0)) else nominal_hz
+    )
     return np.where(is_full & (mean_hz > 0.0), mean_hz, np.maximum(usual_hz, mean_hz))
 
 
@@ -114,7 +116,9 @@ def _runs(on_s: Floats, length_s: int, station: Station) -> Floats:
     carried_m3_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0
     share = np.minimum(on_s.sum(axis=0) / length_s, 1.0)
     active = np.maximum(np.sum(on_s > 0.0, axis=0), 1)
-    return np.asarray(share * (1.0 - share) * carried_m3_s * length_s / (station.sump.mean_area_m2 * depth_m) / active)
+    return np.asarray(
+        share * (1.0 - share) * carried_m3_s * length_s / (station.sump.mean_area_m2 * depth_m) / active
+    )
 
 
 @compiled

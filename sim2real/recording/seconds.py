@@ -3,6 +3,7 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.jit import compiled
 
 GAUSSIAN_MAD = 0.6745
 """Median of what is off, without its sign, over the standard deviation of a normal distribution."""
@@ -48,7 +49,17 @@ def trailing_means(values: Floats, span_s: int) -> Floats:
     """
     if span_s == 1:
         return values
-    sums = np.cumsum(values, axis=-1)
-    sums[..., span_s:] -= sums[..., :-span_s].copy()
-    counts = np.minimum(np.arange(values.shape[-1]) + 1.0, span_s)
-    return np.asarray(sums / counts, dtype=np.float64)
+    means = np.empty_like(values)
+    for series, found in zip(np.atleast_2d(values), np.atleast_2d(means), strict=True):
+        _average(series, span_s, found)
+    return means
+
+
+@compiled
+def _average(values: Floats, span_s: int, means: Floats) -> None:
+    total = 0.0
+    for k in range(values.size):
+        total += values[k]
+        if k >= span_s:
+            total -= values[k - span_s]
+        means[k] = total / min(k + 1, span_s)

@@ -12,7 +12,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.recording.drives import Drives, drives_between
 from wetwell.sim2real.recording.duty import Intervals, drives_of_means
-from wetwell.sim2real.recording.seconds import filled
+from wetwell.sim2real.recording.seconds import filled, repeated
 
 MIN_LENGTH_S = 1800
 MIN_STARTS = 6
@@ -115,19 +115,26 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     second = second + before_s
     seconds = int(second[-1]) + 1
 
+    is_held = recording.value == "held"
+
     def on_seconds(name: str) -> Floats:
         values = np.full(seconds, np.nan)
         values[second] = recording.column(name)
         return values
 
+    def news(values: Floats) -> Floats:
+        return np.where(repeated(values), np.nan, values) if is_held else values
+
     def of_pumps(quantity: str) -> Floats:
         return np.array([on_seconds(pump_column(i, quantity)) for i in range(1, pumps + 1)])
 
     signals: dict[AnalogueQuantity, Floats] = {name: of_pumps(name) for name in PUMP_METERS}
-    signals = {name: values for name, values in signals.items() if _moves(values)}
+    signals = {name: news(values) for name, values in signals.items() if _moves(values)}
     nominal_hz = np.array([[pump.nominal_frequency_hz] for pump in station.pump])
     frequency_hz = of_pumps("frequency_hz")
     frequency_hz = np.where(np.isnan(frequency_hz), of_pumps("running") * nominal_hz, frequency_hz)
+    if is_held:
+        frequency_hz[:, second] = [filled(values[second], second.size, np.nan) for values in frequency_hz]
     if not np.isfinite(frequency_hz).any():
         raise ValueError("neither frequencies nor running flags have values: no run can be told")
     if before_s > 0:
@@ -139,12 +146,14 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
     if starts < MIN_STARTS:
         raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {MIN_STARTS}")
-    level_m = on_seconds("level_m")
+    level_m = news(on_seconds("level_m"))
     if not {"flow_m3h", "head_m"} & signals.keys() and not _moves(level_m):
         raise ValueError("flow, head and level have no values or never move: nothing to hold the simulator against")
     inflow_m3h = on_seconds("inflow_m3h")
     is_row = np.zeros(seconds, dtype=np.bool_)
     is_row[second] = True
+    if is_held:
+        inflow_m3h = filled(inflow_m3h, seconds, np.nan)
     is_known = np.isfinite(inflow_m3h[is_row]).mean() > 0.5
     return Traces(
         start_ns=int(recording.time_ns[0]) - before_s * NS_PER_S,
@@ -154,7 +163,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         is_row=is_row,
         drives=drives,
         level_m=level_m if _moves(level_m) else np.full(seconds, np.nan),
-        inflow_m3h=_inflow_between(inflow_m3h, rate_s, before_s + 1) if is_known else None,
+        inflow_m3h=_inflow_between(inflow_m3h, 1.0 if is_held else rate_s, before_s + 1) if is_known else None,
         signals=signals,
     )
 
@@ -180,7 +189,7 @@ def _rate_s(second: Integers) -> float:
     seconds = int(second[-1]) + 1
     if seconds < MIN_LENGTH_S:
         raise ValueError(f"the recording is {seconds} s long, a diagnosis needs at least {MIN_LENGTH_S} s")
-    rate_s = float(np.median(np.diff(second)))
+    rate_s = max(float(np.median(np.diff(second))), 1.0)
     if rate_s > SLOWEST_S or seconds > MOST_LOST * SLOWEST_S * len(second):
         raise ValueError(
             f"the recording has {len(second)} rows over {seconds} s: a stamp is wrong, or it is sampled more slowly "

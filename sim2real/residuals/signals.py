@@ -105,12 +105,12 @@ def pump_residuals(
     is_ramp = (regimes.of_pumps == START_RAMP) | (regimes.of_pumps == STOP_RAMP)
     is_shown = ~is_ramp | shows_ramps(traces, station)
     switched = _switched(traces, plain)
-    is_counted = np.ones(traces.seconds, dtype=np.bool_) if traces.is_each_second else traces.is_row
+    has_lost = traces.is_each_second and traces.value != "held"
     block = max(round(BLOCK_S / traces.rate_s), 1)
     found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
-        noise = noise_of(_steady_ratios(recorded, expected, regimes, is_counted), configured[name], TOLERANCE, block)
+        noise = noise_of(_steady_ratios(recorded, expected, regimes, has_lost), configured[name], TOLERANCE, block)
         for pump in range(traces.pumps):
             open_ = _unresolved(expected[pump], is_step)
             if name in doubt.signals:
@@ -124,10 +124,11 @@ def pump_residuals(
     return found
 
 
-def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, is_counted: Flags) -> list[Floats]:
-    """Recorded over expected in stretches in which nothing is switched, of the seconds that count."""
+def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, has_lost: bool) -> list[Floats]:
+    """Recorded over expected in stretches in which nothing is switched; seconds without a value are lost, or none."""
     stretches: list[Floats] = []
     for pump in range(recorded.shape[0]):
+        is_counted = np.isfinite(recorded[pump]) | has_lost
         regime = regimes.of_pumps[pump, is_counted]
         ratio = recorded[pump, is_counted] / np.maximum(expected[pump, is_counted], 1e-9)
         second = np.flatnonzero(is_counted)

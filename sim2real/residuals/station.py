@@ -27,9 +27,7 @@ class _Part(Protocol):
 class StationResiduals:
     """Residuals of a recording; which they are and what they weigh is the same for every prediction."""
 
-    def __init__(
-        self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction, doubt: Doubt
-    ) -> None:
+    def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction, doubt: Doubt) -> None:
         self.telemetry = telemetry_residuals(traces, station, regimes)
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
         self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, doubt, patterns), self.telemetry]
