@@ -78,7 +78,7 @@ def replay_file(station: Station, recording: Path, out: Path, *, closed_loop: bo
     """Write what the simulator says for a recording.
 
     Teacher-forced, frequency, inflow and level come from the recording, second by second; in a closed loop only the
-    inflow does, and the simulator controls its own pumps. What is written stands for what the rows of the recording do.
+    inflow does, and the simulator controls its own pumps. What is written is a mean where the recording has means.
 
     Raises
     ------

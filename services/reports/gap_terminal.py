@@ -26,7 +26,10 @@ def gap_lines(report: GapReport, out: Path) -> str:
     """Summary of a report for people."""
     gap = report.gap
     lines = [
-        f"station '{report.station}', {report.cycles} cycles, {STORED[report.value]} {report.rate_s:g} s: {report.verdict}",
+        (
+            f"station '{report.station}', {report.cycles} cycles, {STORED[report.value]} {report.rate_s:g} s: "
+            f"{report.verdict}"
+        ),
         (
             f"gap on held-out cycles: {gap.before:.2f} before, {gap.after:.2f} after, {gap.floor:.0f} is noise; "
             f"shrinkage {gap.shrinkage:.1%} ({gap.shrinkage_ci[0]:.1%} to {gap.shrinkage_ci[1]:.1%})"

@@ -12,7 +12,7 @@ from wetwell.sim2real.attribution.gains import CELL_GAIN, SPAN_GAIN, Gains, Rank
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import intervals_of
 from wetwell.sim2real.attribution.search import Search
-from wetwell.sim2real.attribution.testable import NotTested, testable
+from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
@@ -86,7 +86,7 @@ def attribute(
     fitter = Fitter(replay, residuals, training)
     plain = fitter.plain.residuals
     gains = Gains(plain, residuals.bins, validation)
-    tested, not_tested = testable(candidates, fitter, (training, validation), replay, regimes, each)
+    tested, not_tested = shown_by(candidates, fitter, (training, validation), replay, regimes, each)
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, gains, guesses, progress, each)
     singles = trials.singles()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
-from wetwell.protocols.quantities import PUMP_METERS
+from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.attribution.gains import LEAST_GAIN
@@ -18,7 +18,7 @@ STRENGTHS = (0.3, 1.0)
 """Strengths that are tried, as shares of the way from neutral to either end of the range."""
 CHANGED = 0.01
 """Share of a reading by which an effect changes it."""
-CALLED = {"flow_m3h": "flow", "head_m": "head", "power_kw": "power"}
+CALLED: dict[AnalogueQuantity, str] = {"flow_m3h": "flow", "head_m": "head", "power_kw": "power"}
 OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
 """Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
 
@@ -31,13 +31,13 @@ class NotTested:
     reason: str
 
 
-def testable(
+def shown_by(
     candidates: Sequence[Candidate],
     fitter: Fitter,
     halves: tuple[Flags, Flags],
     replay: Replay,
     regimes: Regimes,
-    each: Each = map,
+    each: Each,
 ) -> tuple[tuple[Candidate, ...], tuple[NotTested, ...]]:
     """Candidates that move what is counted by more than noise at some size within their ranges, and the others.
 
@@ -81,6 +81,7 @@ def _points(candidate: Candidate) -> list[list[Floats]]:
 
 
 def _reason(candidate: Candidate, replay: Replay, regimes: Regimes) -> str:
+    """Why an effect is not tested: by what its component needs, else by what it changes."""
     traces = replay.traces
     rows = f"rows of {traces.rate_s:g} s"
     if candidate.component == "controller":
@@ -89,25 +90,30 @@ def _reason(candidate: Candidate, replay: Replay, regimes: Regimes) -> str:
         return f"{rows} do not show the level at which a pump was switched"
     if candidate.name in OF_TELEMETRY:
         return f"{rows} do not show how single values came"
-    if candidate.component in {"wet_well", "level_sensor"} and not np.isfinite(traces.level_m).any():
+    if candidate.component in {"sump", "level_sensor"} and not np.isfinite(traces.level_m).any():
         return "the level is not measured"
-    if candidate.component == "wet_well" and traces.inflow_m3h is None:
+    if candidate.component == "sump" and traces.inflow_m3h is None:
         return "the inflow is not measured: the level follows it, whatever comes"
-    changed = _changed(candidate, replay)
-    missing = [CALLED[name] for name in PUMP_METERS if name in changed and name not in traces.signals]
-    if missing and not any(name in traces.signals for name in changed):
+    return _hidden(_changed(candidate, replay), replay, regimes)
+
+
+def _hidden(changed: set[AnalogueQuantity], replay: Replay, regimes: Regimes) -> str:
+    """Why readings that an effect changes do not show it."""
+    traces = replay.traces
+    missing = [CALLED[name] for name in PUMP_METERS if name in changed - traces.signals.keys()]
+    if missing and not changed & traces.signals.keys():
         return f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not measured"
     if changed and not traces.is_each_second:
-        return f"what it changes is over, or within the noise, in {rows}"
+        return f"what it changes is over, or within the noise, in rows of {traces.rate_s:g} s"
     if not np.any(regimes.of_station == MULTI_PUMP):
         return "no two pumps ran at once"
     return "it moves nothing that was measured by more than noise"
 
 
-def _changed(candidate: Candidate, replay: Replay) -> set[str]:
+def _changed(candidate: Candidate, replay: Replay) -> set[AnalogueQuantity]:
     """Readings of each second that an effect changes, measured or not."""
     plain = replay.readings(())
-    found: set[str] = set()
+    found: set[AnalogueQuantity] = set()
     for grid in _points(candidate):
         try:
             tried = replay.readings((candidate.effect(grid[-1]),))

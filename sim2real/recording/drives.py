@@ -1,10 +1,11 @@
 """Frequencies of each second from those of the rows: what the drives have done between two rows."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.recording.seconds import filled
 
 HELD_S = 120
@@ -58,46 +59,67 @@ def drives_between(frequency_hz: Floats, nominal_hz: Floats, ramp_s: float, rate
     rate_s : float
         From row to row. [s]
     """
-    middle = np.array([filled(values, round(max(HELD_S, 2 * rate_s)), 0.0) for values in frequency_hz])
+    longest_s = max(HELD_S, 2.0 * rate_s)
+    middle = np.array([filled(values, round(longest_s), 0.0) for values in frequency_hz])
     placements = {name: middle.copy() for name in PLACES}
     open_s = np.zeros(middle.shape)
     for pump, values in enumerate(frequency_hz):
-        rows = np.flatnonzero(np.isfinite(values))
-        for k in _moves(rows, values[rows], max(HELD_S, 2 * rate_s)):
-            begin, end = int(rows[k]), int(rows[k + 1])
-            first, last = float(values[begin]), float(values[end])
-            is_begun, goes_on = _goes_on(values[rows], k - 1, k), _goes_on(values[rows], k, k + 1)
-            fixed = 0.0 if is_begun else 1.0 if goes_on else None
-            steepest = abs(last - first) / (end - begin)
-            slope = steepest if is_begun and goes_on else max(nominal_hz[pump] / ramp_s, steepest)
-            slack_s = end - begin - abs(last - first) / slope
-            time_s = np.arange(begin + 1, end) - begin
-
-            def path(place: float, first=first, last=last, slack_s=slack_s, slope=slope, time_s=time_s) -> Floats:
-                moved = np.maximum(time_s - place * slack_s, 0.0) * slope
-                return first + np.sign(last - first) * np.minimum(moved, abs(last - first))
-
-            middle[pump, begin + 1 : end] = path(0.5 if fixed is None else fixed)
+        for move in _moves(values, nominal_hz[pump] / ramp_s, longest_s):
+            between = slice(move.begin + 1, move.end)
+            middle[pump, between] = move.path(0.5)
             for name, (rise, fall) in PLACES.items():
-                place = rise if last > first else fall
-                placements[name][pump, begin + 1 : end] = path(place if fixed is None else fixed)
-            if fixed is None and slack_s > UNKNOWN_S:
-                open_s[pump, end] = slack_s * abs(last - first) / nominal_hz[pump]
+                placements[name][pump, between] = move.path(rise if move.last > move.first else fall)
+            if move.fixed is None and move.slack_s > UNKNOWN_S:
+                open_s[pump, move.end] = move.slack_s * abs(move.last - move.first) / nominal_hz[pump]
     for one in (middle, *placements.values()):
         one[one < STANDING_HZ] = 0.0
     return Drives(frequency_hz=middle, placements=tuple(placements.values()) if open_s.any() else (), open_s=open_s)
 
 
-def _moves(rows: Integers, values: Floats, longest_s: float) -> Integers:
-    """Rows before a change that is no gap and has seconds in it."""
-    apart = np.diff(rows)
-    is_move: Flags = (np.abs(np.diff(values)) > MOVED_HZ) & (apart > 1) & (apart <= longest_s)
-    return np.flatnonzero(is_move)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Move:
+    """A move between two seconds and frequencies; `fixed` is its place where it is known, as in `PLACES`."""
+
+    begin: int
+    end: int
+    first: float
+    last: float
+    slope: float
+    fixed: float | None
+
+    @property
+    def slack_s(self) -> float:
+        return self.end - self.begin - abs(self.last - self.first) / self.slope
+
+    def path(self, place: float) -> Floats:
+        """Frequencies of the seconds between."""
+        begun_s = (place if self.fixed is None else self.fixed) * self.slack_s
+        time_s = np.arange(1, self.end - self.begin)
+        moved_hz = np.minimum(np.maximum(time_s - begun_s, 0.0) * self.slope, abs(self.last - self.first))
+        return np.asarray(self.first + np.sign(self.last - self.first) * moved_hz)
 
 
-def _goes_on(values: Floats, k: int, later: int) -> bool:
-    """Whether the frequency moves on between two pairs of rows, in the same direction: it was within a ramp."""
-    if min(k, later) < 0 or max(k, later) + 1 >= values.size:
+def _moves(frequency_hz: Floats, slope: float, longest_s: float) -> Iterator[_Move]:
+    """Changes of the frequency from row to row that are no gap and have seconds in them."""
+    rows = np.flatnonzero(np.isfinite(frequency_hz))
+    values, apart = frequency_hz[rows], np.diff(rows)
+    is_move = (np.abs(np.diff(values)) > MOVED_HZ) & (apart > 1) & (apart <= longest_s)
+    for k in np.flatnonzero(is_move).tolist():
+        was_moving, moves_on = _goes_on(values, k - 1), _goes_on(values, k)
+        steepest = abs(float(values[k + 1] - values[k])) / float(apart[k])
+        yield _Move(
+            begin=int(rows[k]),
+            end=int(rows[k + 1]),
+            first=float(values[k]),
+            last=float(values[k + 1]),
+            slope=steepest if was_moving and moves_on else max(slope, steepest),
+            fixed=0.0 if was_moving else 1.0 if moves_on else None,
+        )
+
+
+def _goes_on(values: Floats, k: int) -> bool:
+    """Whether the frequency moves on after a row in the direction in which it came: the row lies within a ramp."""
+    if k < 0 or k + 2 >= values.size:
         return False
-    first, second = values[k + 1] - values[k], values[later + 1] - values[later]
-    return bool(first * second > 0.0 and min(abs(first), abs(second)) > MOVED_HZ)
+    came, goes = values[k + 1] - values[k], values[k + 2] - values[k + 1]
+    return bool(came * goes > 0.0 and min(abs(came), abs(goes)) > MOVED_HZ)

@@ -1,4 +1,4 @@
-"""Frequencies of each second from their means over intervals: how long the drives ran, laid where they can have run."""
+"""Frequencies of each second from their means over intervals: running times, laid where the drives can have run."""
 
 from dataclasses import dataclass
 
@@ -108,17 +108,15 @@ def _poured(on_s: Floats, length_s: int, ramp_s: float) -> Floats:
 
 
 def _runs(on_s: Floats, length_s: int, station: Station) -> Floats:
-    """(rows,) runs of each pump in an interval by the volume between start and stop; under 1 where they are longer."""
+    """(rows,) runs of each pump in an interval by the volume from start to stop; under 1 where they are longer."""
     control = station.control
     if control.is_external:
         return np.zeros(on_s.shape[1])
-    depth_m = control.start_levels_m[0] - control.stop_levels_m[0]
+    volume_m3 = station.sump.mean_area_m2 * (control.start_levels_m[0] - control.stop_levels_m[0])
     carried_m3_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0
     share = np.minimum(on_s.sum(axis=0) / length_s, 1.0)
     active = np.maximum(np.sum(on_s > 0.0, axis=0), 1)
-    return np.asarray(
-        share * (1.0 - share) * carried_m3_s * length_s / (station.sump.mean_area_m2 * depth_m) / active
-    )
+    return np.asarray(share * (1.0 - share) * carried_m3_s * length_s / volume_m3 / active)
 
 
 @compiled
@@ -131,41 +129,49 @@ def _lay(
     count: Floats,
     place: float,
 ) -> None:
+    """Write the commanded frequencies of all intervals."""
     for k in range(last.size):
         begin = last[k] - length_s + 1
-        is_next = k + 1 < last.size and last[k + 1] - last[k] == length_s
-        is_after = k > 0 and last[k] - last[k - 1] == length_s
-        rest_s, active = float(length_s), 0
+        is_alone = k == 0 or last[k] - last[k - 1] != length_s
+        ends = k + 1 == last.size or last[k + 1] - last[k] != length_s
+        if count[k] >= 1.0:
+            _lay_runs(wanted_hz, on_s[:, k], speed_hz[:, k], begin, length_s, count[k], place)
+            continue
         for pump in range(on_s.shape[0]):
-            rest_s -= on_s[pump, k]
-            active += on_s[pump, k] > 0.0
-        before, is_much = 0.0, rest_s < 0.0
-        for pump in range(on_s.shape[0]):
-            wanted_s = on_s[pump, k]
-            if count[k] >= 1.0 and wanted_s < length_s:
-                period = length_s / count[k]
-                first = before + place * max(rest_s, 0.0) / count[k] / max(active, 1)
-                for second in range(length_s):
-                    since = (second - first) % period
-                    if since < wanted_s / count[k]:
-                        wanted_hz[pump, begin + second] = speed_hz[pump, k]
-                if wanted_s > 0.0 and not (is_much and place == 1.0):  # late: those that run together begin together
-                    before = (before + (wanted_s + max(rest_s, 0.0) / active) / count[k]) % period
-                continue
-            ran = is_after and on_s[pump, k - 1] > 0.0
-            runs_on = is_next and on_s[pump, k + 1] > 0.0
-            off_s = length_s - wanted_s
+            ran = not is_alone and on_s[pump, k - 1] > 0.0
+            runs_on = not ends and on_s[pump, k + 1] > 0.0
+            off_s = length_s - on_s[pump, k]
+            first, stop = place * off_s, place * off_s + on_s[pump, k]
+            if ran and runs_on:  # it stood in the middle
+                first, stop = place * on_s[pump, k] + off_s, place * on_s[pump, k] + length_s
+            elif ran:
+                first, stop = 0.0, on_s[pump, k]
+            elif runs_on:
+                first, stop = off_s, float(length_s)
             for second in range(length_s):
-                if ran and runs_on:
-                    is_on = second < place * wanted_s or second >= place * wanted_s + off_s
-                elif ran:
-                    is_on = second < wanted_s
-                elif runs_on:
-                    is_on = second >= off_s
-                else:
-                    is_on = place * off_s <= second < place * off_s + wanted_s
-                if is_on:
+                if first <= second < stop or second < stop - length_s:
                     wanted_hz[pump, begin + second] = speed_hz[pump, k]
+
+
+@compiled
+def _lay_runs(
+    wanted_hz: Floats, on_s: Floats, speed_hz: Floats, begin: int, length_s: int, count: float, place: float
+) -> None:
+    """Write those of an interval with several runs of each pump, one pump after the other, with room between them."""
+    rest_s, active = float(length_s), 0
+    for pump in range(on_s.size):
+        rest_s -= on_s[pump]
+        active += on_s[pump] > 0.0
+    room_s = max(rest_s, 0.0) / max(active, 1) / count
+    period_s = length_s / count
+    first = place * room_s
+    for pump in range(on_s.size):
+        run_s = on_s[pump] / count
+        for second in range(length_s):
+            if (second - first) % period_s < run_s:
+                wanted_hz[pump, begin + second] = speed_hz[pump]
+        if run_s > 0.0 and not (rest_s < 0.0 and place == 1.0):  # late: those that run together begin together
+            first = (first + run_s + room_s) % period_s
 
 
 @compiled

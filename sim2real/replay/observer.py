@@ -89,7 +89,7 @@ def hides_cycles(traces: Traces, station: Station) -> bool:
         return False
     low_m, high_m = np.quantile(level_m, RANGE)
     carried_m_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
-    return traces.rate_s * carried_m_s > high_m - low_m
+    return bool(traces.rate_s * carried_m_s > high_m - low_m)
 
 
 def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observer:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, regimes_of
@@ -102,7 +102,7 @@ class Replay:
         return self._predicted(plant, run.level_m, run.reading)
 
     def readings(self, effects: Sequence[Effect]) -> Floats:
-        """(3, pumps, n) flow, head and power of each second under effects, as sensors would read them, also missing ones.
+        """(3, pumps, n) flow, head and power of each second under effects, also of sensors that are missing.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class Replay:
         return level_m, reading
 
     def _observer(self) -> Observer:
-        """Observer of the recording; of an inflow that is not measured, with the drift that its calm rows are likeliest of."""
+        """Observer of the recording; where the inflow is not measured, with its likeliest drift by rows at rest."""
         traces, station = self.traces, self.station
         if hides_cycles(traces, station):
             return forced_observer(traces)
@@ -216,16 +216,18 @@ class Replay:
         plant = self._plant(self.own)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         rows = np.isfinite(traces.level_m) & (regimes_of(traces, station).of_station == IDLE)
-        best, least = None, np.inf
-        for drift in DRIFTS:
-            observer = row_observer(traces, station, drift * carried_m_s**2)
-            level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
-            variance_m2 = observer.deviation_m[rows] ** 2
-            squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
-            unlikely = float(np.sum(np.log(variance_m2) + np.minimum(squares, MOST_SQUARE)))
-            if best is None or unlikely < least:
-                best, least = observer, unlikely
-        return best
+        observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
+        return min(observers, key=lambda observer: self._unlikely(observer, plant, rows))
+
+    def _unlikely(self, observer: Observer, plant: PlantParameters, rows: Flags) -> float:
+        """Twice the negative logarithm of the likelihood of some levels, of which none counts for much."""
+        if observer.deviation_m is None:
+            return 0.0
+        traces = self.traces
+        level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
+        variance_m2 = observer.deviation_m[rows] ** 2
+        squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
+        return float(np.sum(np.log(variance_m2) + np.minimum(squares, MOST_SQUARE)))
 
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""

@@ -43,8 +43,8 @@ def configured_noise(sensors: Sensors) -> dict[AnalogueQuantity, float]:
 def noise_of(stretches: list[Floats], configured: float, tolerance: float, block: int = BLOCK_S) -> Noise:
     """Noise from stretches in which nothing is switched.
 
-    What means over twenty seconds, or single rows where these are slower, scatter about a straight line, beyond what white noise explains, is slow noise;
-    constant errors and trends do not count as noise.
+    What means over twenty seconds, or single rows where these are slower, scatter about a straight line, beyond what
+    white noise explains, is slow noise; constant errors and trends do not count as noise.
 
     Parameters
     ----------
