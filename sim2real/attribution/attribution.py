@@ -53,7 +53,7 @@ class Attribution:
     singles: tuple[RankedFit, ...]
     training: Flags
     validation: Flags
-    not_tested: tuple[NotTested, ...]
+    not_tested: tuple[NotTested, ...] = ()
 
     @property
     def after(self) -> Floats:

@@ -9,7 +9,7 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fitter
-from wetwell.sim2real.attribution.gains import LEAST_GAIN
+from wetwell.sim2real.attribution.gains import least_gain
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
@@ -52,7 +52,8 @@ def shown_by(
     each : callable
         Tries candidates, perhaps side by side.
     """
-    are_moving = list(each(lambda candidate: _moves(candidate, fitter, halves, replay), candidates))
+    least = tuple((half, least_gain(fitter.bins, half)) for half in halves)
+    are_moving = list(each(lambda candidate: _moves(candidate, fitter, least, replay), candidates))
     tested = tuple(candidate for candidate, moves in zip(candidates, are_moving, strict=True) if moves)
     names = {candidate.name for candidate in tested}
     hidden = {candidate.name: candidate for candidate in candidates if candidate.name not in names}
@@ -61,7 +62,7 @@ def shown_by(
     )
 
 
-def _moves(candidate: Candidate, fitter: Fitter, halves: tuple[Flags, Flags], replay: Replay) -> bool:
+def _moves(candidate: Candidate, fitter: Fitter, least: tuple[tuple[Flags, float], ...], replay: Replay) -> bool:
     if candidate.name in OF_TELEMETRY:
         is_level = candidate.name == "level_quantisation" and np.isfinite(replay.traces.level_m).any()
         return replay.traces.is_each_second or (bool(is_level) and replay.traces.span_s == 1)
@@ -71,7 +72,7 @@ def _moves(candidate: Candidate, fitter: Fitter, halves: tuple[Flags, Flags], re
             tried = fitter.at((candidate,), (point,))
             if tried is not None:
                 squares = (tried.residuals - plain) ** 2
-                if all(float(squares[half].sum()) > LEAST_GAIN for half in halves):
+                if all(float(squares[half].sum()) > gain for half, gain in least):
                     return True
     return False
 

@@ -34,6 +34,8 @@ UNRESOLVED_STEP = 0.3
 """Change of a pump's speed from one second to the next, as a share of nominal, that a recording does not resolve."""
 UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
 """Share of a jump of a signal that is open then, and in the seconds after: it began somewhere within a second."""
+AREA_TOLERANCE = 0.015
+"""Share by which a right area of the wet well may be off at some level: nobody draws ladders and benches."""
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
 MIN_STRETCH_S = 60
@@ -236,6 +238,7 @@ def level_residuals(
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
     if doubt.level_m is not None:
         noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
+        balance_m = np.hypot(balance_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces)[seconds.second]))
     return SignalResiduals(
         bins=seconds.bins(
             LEVEL,
@@ -253,3 +256,11 @@ def level_residuals(
         is_repeated=repeated(traces.level_m)[seconds.second],
         pattern=patterns.get("level_m"),
     )
+
+
+def moved_m(traces: Traces) -> Floats:
+    """(n,) how far the level moved since the value before; 0 between rows. [m]."""
+    moved = np.zeros(traces.seconds)
+    known = np.flatnonzero(np.isfinite(traces.level_m))
+    moved[known[1:]] = np.abs(np.diff(traces.level_m[known]))
+    return moved
