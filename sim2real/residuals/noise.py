@@ -44,7 +44,8 @@ def noise_of(stretches: list[Floats], configured: float, tolerance: float, block
     """Noise from stretches in which nothing is switched.
 
     What means over twenty seconds, or single rows where these are slower, scatter about a straight line, beyond what
-    white noise explains, is slow noise; constant errors and trends do not count as noise.
+    white noise explains, is slow noise; constant errors and trends do not count as noise. Of slow rows a stretch has
+    few, and a line takes most of slow noise away: there means of stretches that follow each other add theirs.
 
     Parameters
     ----------
@@ -65,8 +66,21 @@ def noise_of(stretches: list[Floats], configured: float, tolerance: float, block
         return Noise(single=float(np.hypot(configured, tolerance)), slow=tolerance)
     most = MOST * configured if configured > 0.0 else np.inf
     single = min(max(fine, spread if np.isfinite(spread) else 0.0, 0.5 * configured), most)
-    slow = min(max(moved**2 - fine**2 / block, 0.0), (most / MOST) ** 2) if np.isfinite(moved) else 0.0
+    slow = max(moved**2 - fine**2 / block, 0.0) if np.isfinite(moved) else 0.0
+    if block < BLOCK_S:
+        slow += _between(stretches, fine)
+    slow = min(slow, (most / MOST) ** 2)
+    if block < BLOCK_S:
+        single = min(max(single, float(np.hypot(fine, np.sqrt(slow)))), most)
     return Noise(single=float(np.hypot(single, tolerance)), slow=float(np.sqrt(slow + tolerance**2)))
+
+
+def _between(stretches: list[Floats], fine: float) -> float:
+    """Variance of the means of stretches about those before and after, beyond what white noise explains."""
+    means = np.array([np.nanmean(values) for values in stretches if np.isfinite(values).any()])
+    counts = [float(np.isfinite(values).sum()) for values in stretches]
+    bends = _robust_sd([np.diff(means, n=2)], np.sqrt(6.0))
+    return max(bends**2 - fine**2 / float(np.median(counts)), 0.0) if np.isfinite(bends) else 0.0
 
 
 def _robust_sd(pieces: list[Floats], gain: float) -> float:
