@@ -14,7 +14,7 @@ from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
 
-STRENGTHS = (0.3, 1.0)
+PROBED = (0.3, 1.0)
 """Strengths that are tried, as shares of the way from neutral to either end of the range."""
 CHANGED = 0.01
 """Share of a reading by which an effect changes it."""
@@ -78,7 +78,7 @@ def _moves(candidate: Candidate, fitter: Fitter, least: tuple[tuple[Flags, float
 
 
 def _points(candidate: Candidate) -> list[list[Floats]]:
-    return candidate.start_grids({}, STRENGTHS)
+    return candidate.start_grids({}, PROBED)
 
 
 def _reason(candidate: Candidate, replay: Replay, regimes: Regimes) -> str:

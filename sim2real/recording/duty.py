@@ -10,7 +10,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.drives import PLACES, STANDING_HZ, Drives
 from wetwell.simulator.parameters import plant_parameters
 
-FULL = 0.995
+THROUGHOUT = 0.995
 """Share of an interval from which a drive ran for all of it."""
 OTHER_COUNT = 1.5
 """Factor by which there may be more or fewer runs in an interval than the wet well lets one expect."""
@@ -77,7 +77,7 @@ def drives_of_means(frequency_hz: Floats, running: Floats, intervals: Intervals,
 
 def _speeds(mean_hz: Floats, share: Floats, nominal_hz: float) -> Floats:
     """(rows,) speed of a drive while it runs: its mean where it ran throughout, else as it mostly ran."""
-    is_full = np.where(np.isfinite(share), share >= FULL, mean_hz >= FULL * nominal_hz)
+    is_full = np.where(np.isfinite(share), share >= THROUGHOUT, mean_hz >= THROUGHOUT * nominal_hz)
     usual_hz = (
         float(np.median(mean_hz[is_full & (mean_hz > 0.0)])) if np.any(is_full & (mean_hz > 0.0)) else nominal_hz
     )
@@ -91,11 +91,11 @@ def _poured(on_s: Floats, length_s: int, ramp_s: float) -> Floats:
     """
     poured = on_s.copy()
     share = np.r_[0.0, on_s, 0.0] / length_s
-    is_part = (share > 0.0) & (share < FULL)
+    is_part = (share > 0.0) & (share < THROUGHOUT)
     begins = np.flatnonzero(is_part[1:] & ~is_part[:-1])
     ends = np.flatnonzero(~is_part[1:] & is_part[:-1])
     for begin, end in zip(begins, ends, strict=True):
-        was_on, goes_on = share[begin] >= FULL, share[end + 1] >= FULL
+        was_on, goes_on = share[begin] >= THROUGHOUT, share[end + 1] >= THROUGHOUT
         if end - begin < 2 or was_on == goes_on:
             continue
         left_s, together = float(on_s[begin:end].sum()), np.zeros(end - begin)
@@ -113,10 +113,10 @@ def _runs(on_s: Floats, length_s: int, station: Station) -> Floats:
     if control.is_external:
         return np.zeros(on_s.shape[1])
     volume_m3 = station.sump.mean_area_m2 * (control.start_levels_m[0] - control.stop_levels_m[0])
-    carried_m3_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0
+    carried_m3h = float(np.max(plant_parameters(station).rated_flow_m3h))
     share = np.minimum(on_s.sum(axis=0) / length_s, 1.0)
     active = np.maximum(np.sum(on_s > 0.0, axis=0), 1)
-    return np.asarray(share * (1.0 - share) * carried_m3_s * length_s / volume_m3 / active)
+    return np.asarray(share * (1.0 - share) * carried_m3h / 3600.0 * length_s / volume_m3 / active)
 
 
 @compiled

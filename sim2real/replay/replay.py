@@ -217,17 +217,20 @@ class Replay:
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         rows = np.isfinite(traces.level_m) & (regimes_of(traces, station).of_station == IDLE)
         observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
-        return min(observers, key=lambda observer: self._unlikely(observer, plant, rows))
+        tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
+        best, squares, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
+        scale = np.sqrt(max(float(np.mean(squares)), 1.0)) if squares.size else 1.0
+        return replace(best, deviation_m=None if best.deviation_m is None else scale * best.deviation_m)
 
-    def _unlikely(self, observer: Observer, plant: PlantParameters, rows: Flags) -> float:
-        """Twice the negative logarithm of the likelihood of some levels, of which none counts for much."""
-        if observer.deviation_m is None:
-            return 0.0
+    def _squares(self, observer: Observer, plant: PlantParameters, rows: Flags) -> tuple[Floats, Floats]:
+        """Squares of standardised errors of some levels, none of which counts for much; logarithms of variances."""
         traces = self.traces
+        if observer.deviation_m is None:
+            return np.zeros(0), np.zeros(0)
         level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
         variance_m2 = observer.deviation_m[rows] ** 2
         squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
-        return float(np.sum(np.log(variance_m2) + np.minimum(squares, MOST_SQUARE)))
+        return np.minimum(squares, MOST_SQUARE), np.log(variance_m2)
 
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""
