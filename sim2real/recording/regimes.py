@@ -16,6 +16,8 @@ IDLE, START_RAMP, STEADY, MULTI_PUMP, STOP_RAMP = range(5)
 
 SETTLING_S = 20
 """Seconds after a ramp in which damped sensors, inertia and observers settle."""
+FEWEST_CYCLES, PARTS = 4, 24
+"""Cycles under which a station hardly ever stands still, and the parts of time that take their place."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +41,7 @@ class Regimes:
     of_pumps : (pumps, n) array
         Index into `REGIMES` of each pump; `IDLE` also where it stands and others run.
     cycle : (n,) array
-        Counts up with every start of a pump while all others stand.
+        Counts up with every start of a pump while all others stand; parts of time where that hardly happens.
     events : tuple of Event
     """
 
@@ -92,6 +94,8 @@ def _regimes_of(frequency_hz: Floats, station: Station) -> Regimes:
         _mark(of_station, _falls(commanded[i]), ramp_s, STOP_RAMP, ends=switches)
     any_running = np.asarray(running.any(axis=0))
     cycle = np.cumsum(np.r_[False, any_running[1:] & ~any_running[:-1]])
+    if cycle[-1] < FEWEST_CYCLES:
+        cycle = np.arange(cycle.size) * PARTS // cycle.size
     return Regimes(of_station=of_station, of_pumps=of_pumps, cycle=cycle, events=_events(commanded))
 
 
