@@ -16,7 +16,7 @@ IDLE, START_RAMP, STEADY, MULTI_PUMP, STOP_RAMP = range(5)
 
 SETTLING_S = 20
 """Seconds after a ramp in which damped sensors, inertia and observers settle."""
-FEWEST_CYCLES, PARTS = 4, 24
+FEWEST_CYCLES, TIME_PARTS = 4, 24
 """Cycles under which a station hardly ever stands still, and the parts of time that take their place."""
 
 
@@ -95,7 +95,7 @@ def _regimes_of(frequency_hz: Floats, station: Station) -> Regimes:
     any_running = np.asarray(running.any(axis=0))
     cycle = np.cumsum(np.r_[False, any_running[1:] & ~any_running[:-1]])
     if cycle[-1] < FEWEST_CYCLES:
-        cycle = np.arange(cycle.size) * PARTS // cycle.size
+        cycle = np.arange(cycle.size) * TIME_PARTS // cycle.size
     return Regimes(of_station=of_station, of_pumps=of_pumps, cycle=cycle, events=_events(commanded))
 
 
