@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from wetwell.protocols.quantities import PUMP_METERS, pump_column
 from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import prepared, write_station
 from wetwell.services.reports.gap_page import gap_page
 from wetwell.sim2real.calibration.validation import Validation, validate
@@ -20,6 +22,7 @@ from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
 from wetwell.sim2real.recording.preparation import PreparationReport
+from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.simulator.effects import EFFECTS, effects_of
@@ -79,7 +82,7 @@ def replay_file(
     """Write what the simulator says for a recording.
 
     Teacher-forced, frequency, inflow and level come from the recording, second by second; in a closed loop only the
-    inflow does, and the simulator controls its own pumps.
+    inflow does, and the simulator controls its own pumps. What is written is a mean where the recording has means.
 
     Raises
     ------
@@ -98,17 +101,18 @@ def replay_file(
 def _teacher_forced(rows: Recording, station: Station) -> Recording:
     traces = traces_of(rows, station)
     prediction = Replay(traces, station, effects_of(station)).run()
-    second = ((rows.time_ns - rows.time_ns[0] + 500_000_000) // 1_000_000_000).astype(np.int64)
+    second = ((rows.time_ns - rows.time_ns[0] + NS_PER_S // 2) // NS_PER_S).astype(np.int64) + traces.span_s - 1
+    stored = partial(trailing_means, span_s=traces.span_s)
     columns = {"level_m": prediction.level_m[second]}
     if traces.inflow_m3h is not None:
-        columns["inflow_m3h"] = traces.inflow_m3h[second]
-    for i in range(traces.pumps):
-        columns[pump_column(i + 1, "frequency_hz")] = traces.frequency_hz[i, second]
+        columns["inflow_m3h"] = stored(traces.inflow_m3h)[second]
+    for i, frequency_hz in enumerate(traces.frequency_hz):
+        columns[pump_column(i + 1, "frequency_hz")] = stored(frequency_hz)[second]
         for name in PUMP_METERS:
             if name in prediction.signals:
                 columns[pump_column(i + 1, name)] = prediction.signals[name][i, second]
-        columns[pump_column(i + 1, "running")] = (traces.frequency_hz[i, second] > 0.0).astype(np.float64)
-    return Recording(time_ns=rows.time_ns, columns=columns, station=station.name)
+        columns[pump_column(i + 1, "running")] = stored((frequency_hz > 0.0).astype(np.float64))[second]
+    return Recording(time_ns=rows.time_ns, columns=columns, station=rows.station, value=rows.value)
 
 
 def _notes(preparation: PreparationReport) -> tuple[str, ...]:

@@ -55,6 +55,9 @@ def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
     if report.where:
         sections.append(Section("Residual", _residual(report, diagnosis)))
     sections.append(Section("Ranking of single effects", _ranking(report)))
+    if report.not_tested:
+        rows = [[one.effect, one.reason] for one in report.not_tested]
+        sections.append(Section("Not tested", table(["effect", "why the recording cannot show it"], rows)))
     if report.closed_loop is not None:
         sections.append(Section("Closed loop", _closed_loop(report)))
     if report.detector is not None:

@@ -11,6 +11,7 @@ from wetwell.sim2real.diagnosis.report import GapReport
 
 PLACES = 4
 PRINTED_CANDIDATES = 5
+STORED = {"instant": "a value in", "mean": "means of", "held": "values held, looked at each"}
 
 
 @contextmanager
@@ -25,7 +26,10 @@ def gap_lines(report: GapReport, out: Path) -> str:
     """Summary of a report for people."""
     gap = report.gap
     lines = [
-        f"station '{report.station}', {report.cycles} cycles: {report.verdict}",
+        (
+            f"station '{report.station}', {report.cycles} cycles, {STORED[report.value]} {report.rate_s:g} s: "
+            f"{report.verdict}"
+        ),
         (
             f"gap on held-out cycles: {gap.before:.2f} before, {gap.after:.2f} after, {gap.floor:.0f} is noise; "
             f"shrinkage {gap.shrinkage:.1%} ({gap.shrinkage_ci[0]:.1%} to {gap.shrinkage_ci[1]:.1%})"
@@ -57,6 +61,7 @@ def gap_lines(report: GapReport, out: Path) -> str:
             f"detector: {told.false_per_day_before:g} verdicts a day call a fault with the station as configured, "
             f"{told.false_per_day_after:g} as diagnosed" + ("" if told.has_new_curves else " (same curves)")
         )
+    lines += [f"not tested: {one.effect}: {one.reason}" for one in report.not_tested]
     lines += [f"note: {note}" for note in report.notes]
     lines += [f"next: {report.next_experiment}", f"{out}: report.json, report.html, station.toml"]
     return "\n".join(lines)

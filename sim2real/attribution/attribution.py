@@ -12,8 +12,9 @@ from wetwell.sim2real.attribution.gains import CELL_GAIN, SPAN_GAIN, Gains, Rank
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import intervals_of
 from wetwell.sim2real.attribution.search import Search
+from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
-from wetwell.sim2real.recording.regimes import MULTI_PUMP
+from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.station import StationResiduals
@@ -40,6 +41,8 @@ class Attribution:
         Single candidates by score.
     training, validation : (bins,) array
         Bins that are fitted, and those on which gains and gaps are measured.
+    not_tested : tuple of NotTested
+        Candidates that the recording cannot show.
     """
 
     plain: Floats
@@ -50,6 +53,7 @@ class Attribution:
     singles: tuple[RankedFit, ...]
     training: Flags
     validation: Flags
+    not_tested: tuple[NotTested, ...] = ()
 
     @property
     def after(self) -> Floats:
@@ -60,6 +64,7 @@ class Attribution:
 def attribute(
     replay: Replay,
     residuals: StationResiduals,
+    regimes: Regimes,
     candidates: Sequence[Candidate],
     progress: Callable[[float], None] = lambda _: None,
     each: Each = map,
@@ -70,6 +75,7 @@ def attribute(
     ----------
     replay : Replay
     residuals : StationResiduals
+    regimes : Regimes
     candidates : sequence of Candidate
     progress : callable
         Gets the share of the work that is done, 0 to 1.
@@ -80,7 +86,8 @@ def attribute(
     fitter = Fitter(replay, residuals, training)
     plain = fitter.plain.residuals
     gains = Gains(plain, residuals.bins, validation)
-    guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in candidates}
+    tested, not_tested = shown_by(candidates, fitter, (training, validation), replay, regimes, each)
+    guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, gains, guesses, progress, each)
     singles = trials.singles()
     accepted: Fit | None = None
@@ -99,6 +106,7 @@ def attribute(
         singles=tuple(singles),
         training=training,
         validation=validation,
+        not_tested=not_tested,
     )
 
 

@@ -72,6 +72,7 @@ class Fitter:
     ----------
     rows : (bins,) array
         Those that are fitted.
+    bins : Bins
     plant : PlantParameters
         The station as it is.
     plain : Fit
@@ -82,6 +83,7 @@ class Fitter:
         self._replay = replay
         self._residuals = residuals
         self.rows = rows
+        self.bins = residuals.bins
         prediction = replay.run()
         self.plant = prediction.plant
         self.plain = Fit(candidates=(), points=(), residuals=asinh_loss(residuals.of(prediction)))

@@ -21,7 +21,9 @@ SPAN_GAIN = 1.0
 LEAST_COUNT = 10
 """Bins without which a cell or a span shows no gain."""
 LEAST_GAIN = 200.0
-"""Drop of the sum of squares that a right model may make by chance."""
+"""Drop of the sum of squares that a right model may make, however much there is to compare."""
+LEAST_BY_CHANCE = 40.0
+"""Drop that the library makes of white noise: χ² of four parameters passes it once in ten million fits."""
 PRICE = 0.006
 """Share of the best gain that each free parameter costs: of two equal explanations the simpler is taken."""
 KEPT = 1.0 / 3.0
@@ -76,6 +78,7 @@ class Gains:
         self.plain = plain
         self._floor = bins.floor
         self._rows = rows
+        self._least = least_gain(bins, rows)
         cell = bins.signal * len(REGIMES) + bins.regime
         self._cells = groups_of(cell, rows, len(SIGNALS) * len(REGIMES))
         self._spans = groups_of(cell * 32 + phase(bins), rows)
@@ -94,7 +97,7 @@ class Gains:
 
     def is_real(self, ranked: RankedFit, before: Floats, cell_gain: float, span_gain: float) -> bool:
         """Whether a gain over these residuals is beyond chance, and worth a name in some cell or span."""
-        if not is_significant(ranked.by_cycle) or ranked.gain < LEAST_GAIN:
+        if not is_significant(ranked.by_cycle) or ranked.gain < self._least:
             return False
         gains = before**2 - ranked.fit.residuals**2
         return any(
@@ -107,7 +110,7 @@ class Gains:
         spans = self._spans
         own = spans.sums(gains) - JOIN_SHARE * np.maximum(spans.sums(self.plain**2 - first.fit.residuals**2), 0.0)
         own = own[own > CHANCE * np.sqrt(2.0 * spans.counts)]
-        return float(own.sum()) > max(OWN_SHARE * first.gain, LEAST_GAIN)
+        return float(own.sum()) > max(OWN_SHARE * first.gain, self._least)
 
     def is_worth_more(self, left: Floats, current: Fit, first: RankedFit) -> bool:
         """Whether a further effect could gain enough on what is left."""
@@ -130,6 +133,11 @@ class Gains:
         is_quiet = plain < QUIET * self._signals.counts
         undone = (self._signals.sums(fewer.residuals**2 - self._floor) - plain)[is_quiet]
         return float(np.maximum(undone, 0.0).sum()) > UNDONE_SHARE * float(np.maximum(plain, 0.0).sum())
+
+
+def least_gain(bins: Bins, rows: Flags) -> float:
+    """Drop of the sum of squares of some bins that a right model may make: by its tolerance, or by chance."""
+    return min(LEAST_GAIN, max(LEAST_BY_CHANCE, float(np.sum(bins.tolerance[rows] ** 2))))
 
 
 def penalise(ranked: list[RankedFit], known: float = 0.0) -> list[RankedFit]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
-from wetwell.sim2real.recording.traces import filled
+from wetwell.sim2real.recording.seconds import filled
 
 CLASSES = 20
 POINTS = 1500

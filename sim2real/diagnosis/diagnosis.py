@@ -21,6 +21,7 @@ from wetwell.sim2real.diagnosis.report import (
     Gap,
     GapReport,
     RankedCandidate,
+    UntestedEffect,
     Where,
 )
 from wetwell.sim2real.diagnosis.shrinkage import gap_of, gaps_of, shrinkage
@@ -76,6 +77,11 @@ class Diagnosis:
             detector=detector,
             signals=tuple(self.gap.by_signal),
             cycles=int(self.regimes.cycle.max()),
+            rate_s=self.traces.rate_s,
+            value=self.traces.value,
+            not_tested=tuple(
+                UntestedEffect(effect=one.effect, reason=one.reason) for one in self.attribution.not_tested
+            ),
             notes=(*notes, *limitations(self.traces)),
             next_experiment=next_experiment(self.verdict, names, equivalent, blamed),
         )
@@ -122,9 +128,9 @@ def diagnose(
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
     check_plausible(traces, station, regimes, plain)
-    residuals = StationResiduals(traces, station, regimes, plain)
+    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
     bins = residuals.bins
-    found = _if_much(attribute(replay, residuals, candidates, progress, each), bins)
+    found = _if_much(attribute(replay, residuals, regimes, candidates, progress, each), bins)
     told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it
     verdict = verdict_of(found, bins, traces.pumps, told, plain.plant)
     rng = np.random.default_rng(seed)

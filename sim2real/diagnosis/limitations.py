@@ -12,7 +12,7 @@ WITHOUT = {
     "power_kw": "no power: nothing can be said of the power",
 }
 """What a diagnosis cannot tell without a quantity."""
-PARTS = "the recording is long: parts of four hours, spread over all of it, were diagnosed"
+PARTS = "the recording is long: parts of it, spread over all, were diagnosed"
 
 
 def limitations(traces: Traces) -> tuple[str, ...]:

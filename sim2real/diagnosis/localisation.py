@@ -4,7 +4,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP
-from wetwell.sim2real.replay.replay import LEVEL_TIME_S
+from wetwell.sim2real.replay.observer import LEVEL_TIME_S
 from wetwell.sim2real.residuals.bins import (
     FLOW,
     HEAD,

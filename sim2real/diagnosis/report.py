@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.simulator.effects.effect import Component
 
 Short = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
@@ -103,6 +104,13 @@ class DetectorVerdicts(_Part):
     has_new_curves: bool
 
 
+class UntestedEffect(_Part):
+    """An effect that the recording cannot show, and why; "none" means none of the others."""
+
+    effect: str
+    reason: str
+
+
 class GapReport(_Part):
     """What `wetwell gap diagnose` writes."""
 
@@ -117,5 +125,8 @@ class GapReport(_Part):
     detector: DetectorVerdicts | None = None
     signals: tuple[str, ...]
     cycles: int
+    rate_s: Short = 1.0
+    value: StoredValue = "instant"
+    not_tested: tuple[UntestedEffect, ...] = ()
     notes: tuple[str, ...] = ()
     next_experiment: str

@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.drives import MOVED_HZ
 from wetwell.sim2real.recording.traces import Traces
 
 Regime = Literal["idle", "start_ramp", "steady", "multi_pump", "stop_ramp"]
@@ -15,7 +16,8 @@ IDLE, START_RAMP, STEADY, MULTI_PUMP, STOP_RAMP = range(5)
 
 SETTLING_S = 20
 """Seconds after a ramp in which damped sensors, inertia and observers settle."""
-MOVED_HZ = 0.05
+FEWEST_CYCLES, TIME_PARTS = 4, 24
+"""Cycles under which a station hardly ever stands still, and the parts of time that take their place."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +41,7 @@ class Regimes:
     of_pumps : (pumps, n) array
         Index into `REGIMES` of each pump; `IDLE` also where it stands and others run.
     cycle : (n,) array
-        Counts up with every start of a pump while all others stand.
+        Counts up with every start of a pump while all others stand; parts of time where that hardly happens.
     events : tuple of Event
     """
 
@@ -50,26 +52,50 @@ class Regimes:
 
 
 def regimes_of(traces: Traces, station: Station) -> Regimes:
-    """Regimes of a recording, from its frequencies alone."""
-    running = traces.frequency_hz > 0.0
-    commanded = np.array([_commanded(hz, station.control.min_frequency_hz) for hz in traces.frequency_hz])
+    """Regimes of a recording, from its frequencies alone; a ramp where it is open whether it is one."""
+    found = _regimes_of(traces.frequency_hz, station)
+    for placement in traces.drives.placements if traces.span_s == 1 else ():
+        other = _regimes_of(placement, station)
+        for mine, its in ((found.of_station, other.of_station), (found.of_pumps, other.of_pumps)):
+            is_ramp = (its == START_RAMP) | (its == STOP_RAMP)
+            mine[is_ramp] = its[is_ramp]
+    if traces.span_s > 1:
+        order = (IDLE, STEADY, MULTI_PUMP, START_RAMP, STOP_RAMP)
+        if traces.span_s > station.control.ramp_s + SETTLING_S:
+            order = (IDLE, START_RAMP, STOP_RAMP, STEADY, MULTI_PUMP)
+        for mine in (found.of_station, *found.of_pumps):
+            mine[traces.is_row] = _of_intervals(mine, np.flatnonzero(traces.is_row), traces.span_s, order)
+    return found
+
+
+def _of_intervals(regime: Integers, last: Integers, span_s: int, order: tuple[int, ...]) -> Integers:
+    """(rows,) the last in an order of the regimes that an interval meets."""
+    rank = np.argsort(order)[regime]
+    return np.array([order[int(rank[max(k - span_s + 1, 0) : k + 1].max())] for k in last], dtype=np.int64)
+
+
+def _regimes_of(frequency_hz: Floats, station: Station) -> Regimes:
+    running = frequency_hz > 0.0
+    commanded = np.array([_commanded(hz, station.control.min_frequency_hz) for hz in frequency_hz])
     ramp_s = round(station.control.ramp_s) + SETTLING_S
     of_pumps = np.full(running.shape, IDLE, dtype=np.int64)
     together = running.sum(axis=0) > 1
-    for i in range(traces.pumps):
+    for i in range(running.shape[0]):
         of_pumps[i][running[i]] = STEADY
         of_pumps[i][running[i] & together] = MULTI_PUMP
         _mark(of_pumps[i], _rises(commanded[i]), ramp_s, START_RAMP)
         _mark(of_pumps[i], _falls(commanded[i]), 2 * ramp_s, STOP_RAMP, ends=_rises(commanded[i]))
-    of_station = np.full(traces.seconds, IDLE, dtype=np.int64)
+    of_station = np.full(running.shape[1], IDLE, dtype=np.int64)
     of_station[running.any(axis=0)] = STEADY
     of_station[together] = MULTI_PUMP
     switches = np.sort(np.concatenate([np.r_[_rises(c), _falls(c)] for c in commanded]))
-    for i in range(traces.pumps):
+    for i in range(running.shape[0]):
         _mark(of_station, _rises(commanded[i]), ramp_s, START_RAMP, ends=switches)
         _mark(of_station, _falls(commanded[i]), ramp_s, STOP_RAMP, ends=switches)
     any_running = np.asarray(running.any(axis=0))
     cycle = np.cumsum(np.r_[False, any_running[1:] & ~any_running[:-1]])
+    if cycle[-1] < FEWEST_CYCLES:
+        cycle = np.arange(cycle.size) * TIME_PARTS // cycle.size
     return Regimes(of_station=of_station, of_pumps=of_pumps, cycle=cycle, events=_events(commanded))
 
 

@@ -13,11 +13,6 @@ from wetwell.simulator.telemetry.channels import pump_channel
 from wetwell.simulator.telemetry.sensors import RESTING
 from wetwell.simulator.wet_well import level_at_volume_m, volume_at_level_m3
 
-MOST_FOLLOWED = 0.5
-"""Share of an error that one value may take away, however long there was none."""
-LOST_S = 300
-"""After that long without a level the observer begins anew."""
-
 
 @compiled
 def replay_seconds(
@@ -27,19 +22,21 @@ def replay_seconds(
     damped: Floats,
     frequency_hz: Floats,
     measured_level_m: Floats,
-    level_gain: float,
-    inflow_gain: float,
+    level_gain: Floats,
+    inflow_gain: Floats,
+    span_s: int,
     truth: Truth,
     level_m: Floats,
     reading: Floats,
 ) -> None:
     r"""Go through the seconds of a recording with the plant of the simulator, its frequencies set.
 
-    The true level is followed by an observer with constant gains,
+    The true level is followed by an observer; with gains a second,
 
     $$A \frac{dL}{dt} = Q_{in} + b - \sum_i Q_i + A\,g\,e, \qquad \frac{db}{dt} = A\,g_b\,e, \qquad e = y - \hat y$$
 
-    with y the recorded level and ŷ what the level sensor would read, lag and delay included.
+    with y the recorded level and ŷ what the level sensor would read, lag and delay included, at that second or as the
+    mean of `span_s` seconds.
 
     Parameters
     ----------
@@ -50,8 +47,10 @@ def replay_seconds(
     frequency_hz : (pumps, n) array
     measured_level_m : (n,) array
         NaN is "no value".
-    level_gain, inflow_gain : float
-        g and g_b. [1/s, 1/s²]
+    level_gain, inflow_gain : (n,) arrays
+        Shares of the error that a value of the level takes away; 1 begins anew. [1, 1/s]
+    span_s : int
+        Seconds that a value of the level is the mean of. [s]
     truth : Truth
         Room for one second.
     level_m : (n,) array
@@ -62,7 +61,6 @@ def replay_seconds(
     now, sensor = state.station[0], plant.sensors[LEVEL]
     extra_m3h = 0.0
     sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
-    lost_s = 0
     delay_s = sensor.delay_s
     whole = int(delay_s)
     share = delay_s - whole
@@ -80,11 +78,15 @@ def replay_seconds(
         if delay_s > 0.0 and second > whole:
             expected_m = (1.0 - share) * level_m[second - whole] + share * level_m[second - whole - 1]
         if math.isnan(measured_level_m[second]):
-            lost_s += 1
             continue
+        if span_s > 1:
+            late = max(second - whole, 0)
+            expected_m = 0.0
+            for before in range(span_s):
+                expected_m += level_m[max(late - before, 0)] / span_s
         error_m = measured_level_m[second] - expected_m
-        followed = min(level_gain * (lost_s + 1), MOST_FOLLOWED)
-        if lost_s > LOST_S:
+        followed = level_gain[second]
+        if followed >= 1.0:
             now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], plant.profile[0].level_m), plant.profile)
             sensed_m = measured_level_m[second]
         else:
@@ -94,8 +96,7 @@ def replay_seconds(
             corrected_m3 = now.volume_m3 + followed * error_m * area_m2
             now.volume_m3 = max(corrected_m3, 0.0)
             sensed_m += followed * error_m
-            extra_m3h += inflow_gain * error_m * area_m2 * 3600.0
-        lost_s = 0
+            extra_m3h += inflow_gain[second] * error_m * area_m2 * 3600.0
 
 
 @inlined

@@ -8,6 +8,7 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, STEADY, Regimes
+from wetwell.sim2real.recording.seconds import filled
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
 
@@ -130,6 +131,8 @@ def _inflow_ratio(traces: Traces, station: Station, plain: Prediction) -> float:
     flow_m3h = traces.signals.get("flow_m3h", plain.signals.get("flow_m3h"))
     if traces.inflow_m3h is None or flow_m3h is None:
         return float("nan")
+    if traces.value == "held":
+        flow_m3h = np.array([filled(values, values.size, 0.0) for values in flow_m3h])
     level_m = traces.level_m[np.isfinite(traces.level_m)]
     rise_m = float(level_m[-1] - level_m[0]) if level_m.size else 0.0
     pumped_m3h = (

@@ -5,23 +5,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.traces import Traces, repeated
+from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
+from wetwell.sim2real.recording.seconds import repeated, trailing_means
+from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.kernel import replay_seconds
+from wetwell.sim2real.replay.observer import Observer, constant_observer, forced_observer, hides_cycles, row_observer
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, plant_parameters
 from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels_of
 
-LEVEL_TIME_S = 150.0
-"""Time constant with which the observer follows the recorded level."""
 FIRST = 5
 """Values of the level from which the observer begins."""
-UNKNOWN_INFLOW_TIME_S = 300.0
-"""Time constant with which it follows where the inflow has to be followed too."""
+DRIFTS = tuple(2.0 * 0.05**2 / 900.0 * 8.0**k for k in range(-4, 5))
+"""Rates by which the variance of an unknown inflow may grow, over the square of what a pump carries. [1/s]"""
+MOST_SQUARE = 9.0
+"""Square of a standardised error beyond which it says no more about how an inflow drifts."""
 KEPT_RUNS = 3
 """Runs that are kept: what only the telemetry or the controller does differently is not computed again."""
 
@@ -37,6 +40,18 @@ class Prediction:
     level_m: Floats
     signals: dict[AnalogueQuantity, Floats]
     plant: PlantParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Doubt:
+    """Standard deviations of what a right model predicts, in the unit of the signal.
+
+    `level_m` (n,) has all that the level may be off, its sensor's noise included, or is None where the observer does
+    not know; `signals` (pumps, n) what moments that the rows do not show leave open, empty where they show all.
+    """
+
+    level_m: Floats | None
+    signals: dict[AnalogueQuantity, Floats]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +86,7 @@ class Replay:
         known = np.flatnonzero(np.isfinite(traces.level_m))
         first = traces.level_m[known[:FIRST]]  # a single value may be wrong
         self._first_level_m = float(np.median(first)) if known.size else station.middle_level_m
+        self.observer = self._observer()
 
     def run(self, effects: Sequence[Effect] = ()) -> Prediction:
         """Predict under effects.
@@ -81,22 +97,70 @@ class Replay:
             If an effect does not fit the station.
         """
         acting = (*self.own, *effects)
+        plant = self._plant(acting)
+        run = self._run(acting, plant)
+        return self._predicted(plant, run.level_m, run.reading)
+
+    def readings(self, effects: Sequence[Effect]) -> Floats:
+        """(3, pumps, n) flow, head and power of each second under effects, also of sensors that are missing.
+
+        Raises
+        ------
+        ValueError
+            If an effect does not fit the station.
+        """
+        acting = (*self.own, *effects)
+        plant = self._plant(acting)
+        read = self._run(acting, plant).reading
+        return np.array([later(one, _delay_s(plant, name)) for name, one in zip(PUMP_METERS, read, strict=True)])
+
+    def doubt(self) -> Doubt:
+        r"""What the moments that the rows do not show leave open in what is predicted.
+
+        $$\sigma^2 = \frac{(y_\text{early} - y_\text{late})^2 + (y_\text{long} - y_\text{short})^2}{24}$$
+
+        for starts and stops that lie anywhere in what is possible, one as likely as another, each by itself.
+        """
+        placements = self.traces.drives.placements
+        if not placements:
+            return Doubt(level_m=self.observer.deviation_m, signals={})
+        plant = self._plant(self.own)
+        early, late, long, short = (
+            self._predicted(plant, *self._computed(self.own, plant, placement, self.observer))
+            for placement in placements
+        )
+
+        def spread(*values: Floats) -> Floats:
+            first, second, third, fourth = values
+            return np.sqrt(((first - second) ** 2 + (third - fourth) ** 2) / 24.0)
+
+        signals = {
+            name: spread(*(one.signals[name] for one in (early, late, long, short))) for name in self.traces.signals
+        }
+        level_m = self.observer.deviation_m
+        if level_m is not None and self.traces.span_s > 1:  # the observer knows of instants only
+            level_m = np.hypot(level_m, spread(*(one.level_m for one in (early, late, long, short))))
+        return Doubt(level_m=level_m, signals=signals)
+
+    def _plant(self, acting: Sequence[Effect]) -> PlantParameters:
         plant = plant_parameters(self.station)
         for effect in acting:
             plant = effect.modify(plant)
-        run = self._run(acting, plant)
-        level_m, reading = run.level_m, run.reading
+        return plant
+
+    def _predicted(self, plant: PlantParameters, level_m: Floats, reading: Floats) -> Prediction:
+        """What the sensors read as the recording stores it."""
+        span_s = self.traces.span_s
         signals = {
-            name: later(reading[k], _delay_s(plant, name))
+            name: trailing_means(later(reading[k], _delay_s(plant, name)), span_s)
             for k, name in enumerate(PUMP_METERS)
             if name in self.traces.signals
         }
-        delay_s = plant.sensors[LEVEL].delay_s
-        return Prediction(level_m=later(level_m, delay_s), signals=signals, plant=plant)
+        told_m = later(level_m, plant.sensors[LEVEL].delay_s)
+        return Prediction(level_m=trailing_means(told_m, span_s), signals=signals, plant=plant)
 
     def _run(self, acting: Sequence[Effect], plant: PlantParameters) -> _Run:
         """Run of the kernel; one that is kept, where the plant differs from its plant in nothing that it reads."""
-        traces, pumps = self.traces, self.traces.pumps
         is_held = plant.sensors[LEVEL].deadband > 0.0
         frequency_delay_s = _delay_s(plant, "frequency_hz")
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
@@ -108,27 +172,67 @@ class Replay:
         for run in self._kept:
             if run.key == key:
                 return run
+        observer = self.observer
+        if is_held:
+            is_constant = observer.deviation_m is None
+            told_m = self._told_level_m
+            observer = constant_observer(told_m) if is_constant else replace(observer, level_m=told_m)
+        level_m, reading = self._computed(acting, plant, self.traces.frequency_hz, observer)
+        run = _Run(key=key, level_m=level_m, reading=reading)
+        self._kept = (*self._kept[1 - KEPT_RUNS :], run)
+        return run
+
+    def _computed(
+        self, acting: Sequence[Effect], plant: PlantParameters, frequency_hz: Floats, observer: Observer
+    ) -> tuple[Floats, Floats]:
+        """(n,) level and (3, pumps, n) flow, head and power as the sensors read them, by the kernel."""
+        traces, pumps = self.traces, self.traces.pumps
+        forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         level_m = np.empty(traces.seconds)
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
-        if traces.inflow_m3h is None:
-            gains = 1.4 / UNKNOWN_INFLOW_TIME_S, 1.0 / UNKNOWN_INFLOW_TIME_S**2
-        else:
-            gains = 1.0 / LEVEL_TIME_S, 0.0
         replay_seconds(
-            records,
+            replace(plant, control_delay_s=0.0).records(),
             first_state(plant, max(self._first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
             np.zeros((len(PUMP_METERS), pumps)),
-            np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
-            self._told_level_m if is_held else traces.level_m,
-            *gains,
+            np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
+            observer.level_m,
+            observer.level_gain,
+            observer.inflow_gain,
+            1 if observer.level_m is not traces.level_m and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
             level_m,
             reading,
         )
-        run = _Run(key=key, level_m=level_m, reading=reading)
-        self._kept = (*self._kept[1 - KEPT_RUNS :], run)
-        return run
+        return level_m, reading
+
+    def _observer(self) -> Observer:
+        """Observer of the recording; where the inflow is not measured, with its likeliest drift by rows at rest."""
+        traces, station = self.traces, self.station
+        if hides_cycles(traces, station):
+            return forced_observer(traces)
+        if traces.inflow_m3h is not None:
+            return constant_observer(traces.level_m) if traces.is_each_second else row_observer(traces, station, 0.0)
+        plant = self._plant(self.own)
+        carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
+        regime, is_known = regimes_of(traces, station).of_station, np.isfinite(traces.level_m)
+        rows, calm = (is_known & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
+        observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
+        tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
+        best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
+        squares, _ = self._squares(best, plant, calm)
+        scale = np.sqrt(max(float(np.mean(squares)), 1.0)) if squares.size else 1.0
+        return replace(best, deviation_m=None if best.deviation_m is None else scale * best.deviation_m)
+
+    def _squares(self, observer: Observer, plant: PlantParameters, rows: Flags) -> tuple[Floats, Floats]:
+        """Squares of standardised errors of some levels, none of which counts for much; logarithms of variances."""
+        traces = self.traces
+        if observer.deviation_m is None:
+            return np.zeros(0), np.zeros(0)
+        level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
+        variance_m2 = observer.deviation_m[rows] ** 2
+        squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
+        return np.minimum(squares, MOST_SQUARE), np.log(variance_m2)
 
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""

@@ -11,9 +11,10 @@ from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
 from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.observer import level_noise_m
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
-from wetwell.sim2real.residuals.signals import QUANTUM_SHARE, level_noise_m
+from wetwell.sim2real.residuals.signals import QUANTUM_SHARE
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.telemetry.channels import channels_of
 

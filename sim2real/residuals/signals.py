@@ -10,10 +10,12 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
-from wetwell.sim2real.recording.traces import Traces, repeated
-from wetwell.sim2real.replay.replay import LEVEL_TIME_S, UNKNOWN_INFLOW_TIME_S, Prediction
+from wetwell.sim2real.recording.seconds import repeated, trailing_means
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.observer import LEVEL_TIME_S, level_noise_m
+from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
-from wetwell.sim2real.residuals.noise import GAUSSIAN_MAD, Noise, configured_noise, noise_of
+from wetwell.sim2real.residuals.noise import BLOCK_S, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.telemetry.channels import channels_of
@@ -32,9 +34,15 @@ UNRESOLVED_STEP = 0.3
 """Change of a pump's speed from one second to the next, as a share of nominal, that a recording does not resolve."""
 UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
 """Share of a jump of a signal that is open then, and in the seconds after: it began somewhere within a second."""
+AREA_TOLERANCE = 0.015
+"""Share by which a right area of the wet well may be off at some level: nobody draws ladders and benches."""
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
 MIN_STRETCH_S = 60
+RAMP_ROWS = 4
+"""Rows in a ramp from which it is looked at."""
+TRANSIENT_S = 2.0
+"""Time for which a mean may miss, or have too much of, a flow at each start and stop: nobody sees its form. [s]"""
 QUANTUM_SHARE = 0.75
 """Share of a quantum by which a rounded value may be off: half of it, and the same if it is cut off instead."""
 
@@ -82,6 +90,7 @@ def pump_residuals(
     station: Station,
     regimes: Regimes,
     plain: Prediction,
+    doubt: Doubt,
     patterns: Mapping[AnalogueQuantity, Pattern],
 ) -> list[SignalResiduals]:
     """Of every measured signal of every pump.
@@ -90,32 +99,60 @@ def pump_residuals(
     ----------
     plain : Prediction
         Of the station as it is: what the noise is relative to, the same for every candidate.
+    doubt : Doubt
+        What moments that the rows do not show leave open.
     """
     configured = configured_noise(station.sensors)
     is_step = _steps(traces, plain)
+    is_ramp = (regimes.of_pumps == START_RAMP) | (regimes.of_pumps == STOP_RAMP)
+    is_shown = ~is_ramp | shows_ramps(traces, station)
+    switched = _switched(traces, plain)
+    has_lost = traces.is_each_second and traces.value != "held"
+    block = max(round(BLOCK_S / traces.rate_s), 1)
     found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
-        noise = noise_of(_steady_ratios(recorded, expected, regimes), configured[name], TOLERANCE)
+        noise = noise_of(_steady_ratios(recorded, expected, regimes, has_lost), configured[name], TOLERANCE, block)
         for pump in range(traces.pumps):
             open_ = _unresolved(expected[pump], is_step)
-            one = _one_pump(name, pump, recorded[pump], expected[pump], open_, regimes, noise, patterns.get(name))
+            if name in doubt.signals:
+                open_ = np.hypot(open_, doubt.signals[name][pump])
+            if traces.span_s > 1:
+                open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
+            known = np.where(is_shown[pump], recorded[pump], np.nan)
+            one = _one_pump(name, pump, known, expected[pump], open_, regimes, noise, patterns.get(name))
             if one is not None:
                 found.append(one)
     return found
 
 
-def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes) -> list[Floats]:
+def _steady_ratios(recorded: Floats, expected: Floats, regimes: Regimes, has_lost: bool) -> list[Floats]:
+    """Recorded over expected in stretches in which nothing is switched; seconds without a value are lost, or none."""
     stretches: list[Floats] = []
     for pump in range(recorded.shape[0]):
-        regime = regimes.of_pumps[pump]
+        is_counted = np.isfinite(recorded[pump]) | has_lost
+        regime = regimes.of_pumps[pump, is_counted]
+        ratio = recorded[pump, is_counted] / np.maximum(expected[pump, is_counted], 1e-9)
+        second = np.flatnonzero(is_counted)
         edges = np.flatnonzero(np.diff(regime)) + 1
         stretches += [
-            recorded[pump, rows] / np.maximum(expected[pump, rows], 1e-9)
+            ratio[rows]
             for rows in np.split(np.arange(regime.size), edges)
-            if regime[rows[0]] == STEADY and rows.size >= MIN_STRETCH_S
+            if regime[rows[0]] == STEADY and second[rows[-1]] - second[rows[0]] + 1 >= MIN_STRETCH_S
         ]
     return stretches
+
+
+def shows_ramps(traces: Traces, station: Station) -> bool:
+    """Whether enough rows lie in a ramp to tell what happens there."""
+    return traces.is_each_second or traces.rate_s * RAMP_ROWS <= station.control.ramp_s
+
+
+def _switched(traces: Traces, plain: Prediction) -> Floats:
+    """(pumps, n) how often a drive was switched in the interval of a mean, per second of it."""
+    nominal_hz = plain.plant.nominal_frequency_hz[:, None]
+    moved = np.abs(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1])) / nominal_hz
+    return trailing_means(moved, traces.span_s)
 
 
 def _steps(traces: Traces, plain: Prediction) -> Flags:
@@ -150,6 +187,8 @@ def _one_pump(
     seconds = binned(counted, regime + 10 * regimes.cycle, length_s)
     running = counted & ((regime == STEADY) | (regime == MULTI_PUMP))
     rated = float(np.median(np.abs(recorded[running if running.any() else counted])))
+    if rated == 0.0:
+        return None
     slope = np.gradient(expected)
     size = np.abs(np.where(counted, recorded, 0.0))
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
@@ -179,26 +218,27 @@ def level_residuals(
     station: Station,
     regimes: Regimes,
     plain: Prediction,
+    doubt: Doubt,
     patterns: Mapping[AnalogueQuantity, Pattern],
 ) -> SignalResiduals:
     """Of the level."""
     counted = np.isfinite(traces.level_m)
+    if doubt.level_m is not None:
+        counted &= np.isfinite(doubt.level_m)
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
-    follow_s = UNKNOWN_INFLOW_TIME_S if traces.inflow_m3h is None else LEVEL_TIME_S
     rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
-    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.mean_area_m2 * follow_s
+    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.mean_area_m2 * LEVEL_TIME_S
     flow_m3h = plain.signals["flow_m3h"].sum(axis=0) if "flow_m3h" in plain.signals else np.zeros(regime.size)
     jumps_m3h = np.abs(np.diff(flow_m3h, prepend=flow_m3h[:1])) * _steps(traces, plain)
-    forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * follow_s) / follow_s)
+    forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * LEVEL_TIME_S) / LEVEL_TIME_S)
     open_m = np.convolve(jumps_m3h, forgotten)[: regime.size] / 3600.0 / station.sump.mean_area_m2
     balance_m = np.hypot(off_m, seconds.means(open_m))
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
-    if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know
-        error_m = np.abs(seconds.means_of(traces.level_m[seconds.second] - plain.level_m[seconds.second]))
-        is_idle = seconds.first(regime) == IDLE
-        balance_m = np.hypot(balance_m, np.median(error_m[is_idle]) / GAUSSIAN_MAD if is_idle.any() else 0.0)
+    if doubt.level_m is not None:
+        noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
+        balance_m = np.hypot(balance_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces)[seconds.second]))
     return SignalResiduals(
         bins=seconds.bins(
             LEVEL,
@@ -218,9 +258,9 @@ def level_residuals(
     )
 
 
-def level_noise_m(traces: Traces, station: Station) -> float:
-    """Standard deviation of the level sensor's noise. [m]."""
-    bends = np.diff(traces.level_m, n=2)
-    bends = np.abs(bends[np.isfinite(bends)])
-    seen_m = float(np.median(bends)) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
-    return max(seen_m, 0.5 * station.sensors.level_noise_m, 1e-4)
+def moved_m(traces: Traces) -> Floats:
+    """(n,) how far the level moved since the value before; 0 between rows. [m]."""
+    moved = np.zeros(traces.seconds)
+    known = np.flatnonzero(np.isfinite(traces.level_m))
+    moved[known[1:]] = np.abs(np.diff(traces.level_m[known]))
+    return moved

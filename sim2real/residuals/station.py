@@ -8,7 +8,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import Regimes
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import Bins, joined
 from wetwell.sim2real.residuals.events import event_residuals
 from wetwell.sim2real.residuals.signals import level_residuals, pump_residuals
@@ -27,12 +27,13 @@ class _Part(Protocol):
 class StationResiduals:
     """Residuals of a recording; which they are and what they weigh is the same for every prediction."""
 
-    def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> None:
+    def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction, doubt: Doubt) -> None:
         self.telemetry = telemetry_residuals(traces, station, regimes)
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
-        self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, patterns), self.telemetry]
+        self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, doubt, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
-            self._parts.append(level_residuals(traces, station, regimes, plain, patterns))
+            level = level_residuals(traces, station, regimes, plain, doubt, patterns)
+            self._parts += [level] if level.bins.size else []
             self._parts.append(event_residuals(traces, station, regimes, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 

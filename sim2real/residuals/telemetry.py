@@ -102,6 +102,8 @@ def telemetry_residuals(traces: Traces, station: Station, regimes: Regimes) -> T
 
 
 def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Pattern]:
+    if not traces.is_each_second or traces.value == "held":
+        return _patterns_of_rows(traces)
     running = traces.frequency_hz > 0.0
     found = []
     series: list[tuple[AnalogueQuantity, list[Floats]]] = [("level_m", [traces.level_m])]
@@ -128,6 +130,13 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
             pattern = _held(quantity, parts, is_ramp, jumps, held_share)
             found += [pattern] if pattern is not None else []
     return found
+
+
+def _patterns_of_rows(traces: Traces) -> list[Pattern]:
+    """Lattice of the level; rows tell of no deadband, since what is held for less than one is not repeated."""
+    quantum = _lattice(traces.level_m[traces.is_row]) if np.isfinite(traces.level_m).any() else 0.0
+    is_rounded = quantum >= MIN_QUANTUM_M and traces.span_s == 1
+    return [Pattern(quantity="level_m", quantum=quantum)] if is_rounded else []
 
 
 def _held(

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wetwell.sim2real.recording.drives import Drives
 from wetwell.sim2real.recording.excerpt import BLANK_S, PART_S, excerpt
 from wetwell.sim2real.recording.traces import Traces
 
@@ -11,8 +12,11 @@ def traces(seconds):
     hz = np.where(second % 600 < 200, 50.0, 0.0)[None, :]
     return Traces(
         start_ns=0,
+        rate_s=1.0,
+        value="instant",
         time_s=second.astype(float),
-        frequency_hz=hz,
+        is_row=np.ones(seconds, dtype=bool),
+        drives=Drives(frequency_hz=hz, placements=(), open_s=np.zeros_like(hz)),
         level_m=second.astype(float),
         inflow_m3h=None,
         signals={"flow_m3h": 2.0 * hz},

@@ -1,0 +1,126 @@
+"""Which effects a recording can show at all, and why it cannot show the others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
+from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.fitting import Fitter
+from wetwell.sim2real.attribution.gains import least_gain
+from wetwell.sim2real.attribution.trials import Each
+from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
+from wetwell.sim2real.replay.replay import Replay
+
+PROBED = (0.3, 1.0)
+"""Strengths that are tried, as shares of the way from neutral to either end of the range."""
+CHANGED = 0.01
+"""Share of a reading by which an effect changes it."""
+CALLED: dict[AnalogueQuantity, str] = {"flow_m3h": "flow", "head_m": "head", "power_kw": "power"}
+OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
+"""Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotTested:
+    """An effect that a recording cannot show, and why."""
+
+    effect: str
+    reason: str
+
+
+def shown_by(
+    candidates: Sequence[Candidate],
+    fitter: Fitter,
+    halves: tuple[Flags, Flags],
+    replay: Replay,
+    regimes: Regimes,
+    each: Each,
+) -> tuple[tuple[Candidate, ...], tuple[NotTested, ...]]:
+    """Candidates that move what is counted by more than noise at some size within their ranges, and the others.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    fitter : Fitter
+    halves : two (bins,) arrays
+        Bins that are fitted, and those on which gains are measured: an effect has to move both.
+    replay : Replay
+    regimes : Regimes
+    each : callable
+        Tries candidates, perhaps side by side.
+    """
+    least = tuple((half, least_gain(fitter.bins, half)) for half in halves)
+    are_moving = list(each(lambda candidate: _moves(candidate, fitter, least, replay), candidates))
+    tested = tuple(candidate for candidate, moves in zip(candidates, are_moving, strict=True) if moves)
+    names = {candidate.name for candidate in tested}
+    hidden = {candidate.name: candidate for candidate in candidates if candidate.name not in names}
+    return tested, tuple(
+        NotTested(effect=name, reason=_reason(candidate, replay, regimes)) for name, candidate in hidden.items()
+    )
+
+
+def _moves(candidate: Candidate, fitter: Fitter, least: tuple[tuple[Flags, float], ...], replay: Replay) -> bool:
+    if candidate.name in OF_TELEMETRY:
+        is_level = candidate.name == "level_quantisation" and np.isfinite(replay.traces.level_m).any()
+        return replay.traces.is_each_second or (bool(is_level) and replay.traces.span_s == 1)
+    plain = fitter.plain.residuals
+    for grid in _points(candidate):
+        for point in grid:
+            tried = fitter.at((candidate,), (point,))
+            if tried is not None:
+                squares = (tried.residuals - plain) ** 2
+                if all(float(squares[half].sum()) > gain for half, gain in least):
+                    return True
+    return False
+
+
+def _points(candidate: Candidate) -> list[list[Floats]]:
+    return candidate.start_grids({}, PROBED)
+
+
+def _reason(candidate: Candidate, replay: Replay, regimes: Regimes) -> str:
+    """Why an effect is not tested: by what its component needs, else by what it changes."""
+    traces = replay.traces
+    rows = f"rows of {traces.rate_s:g} s"
+    if candidate.component == "controller":
+        if replay.station.control.is_external:
+            return "the control is external: nobody knows why pumps start and stop"
+        return f"{rows} do not show the level at which a pump was switched"
+    if candidate.name in OF_TELEMETRY:
+        return f"{rows} do not show how single values came"
+    if candidate.component in {"sump", "level_sensor"} and not np.isfinite(traces.level_m).any():
+        return "the level is not measured"
+    if candidate.component == "sump" and traces.inflow_m3h is None:
+        return "the inflow is not measured: the level follows it, whatever comes"
+    return _hidden(_changed(candidate, replay), replay, regimes)
+
+
+def _hidden(changed: set[AnalogueQuantity], replay: Replay, regimes: Regimes) -> str:
+    """Why readings that an effect changes do not show it."""
+    traces = replay.traces
+    missing = [CALLED[name] for name in PUMP_METERS if name in changed - traces.signals.keys()]
+    if missing and not changed & traces.signals.keys():
+        return f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not measured"
+    if changed and not traces.is_each_second:
+        return f"what it changes is over, or within the noise, in rows of {traces.rate_s:g} s"
+    if not np.any(regimes.of_station == MULTI_PUMP):
+        return "no two pumps ran at once"
+    return "it moves nothing that was measured by more than noise"
+
+
+def _changed(candidate: Candidate, replay: Replay) -> set[AnalogueQuantity]:
+    """Readings of each second that an effect changes, measured or not."""
+    plain = replay.readings(())
+    found: set[AnalogueQuantity] = set()
+    for grid in _points(candidate):
+        try:
+            tried = replay.readings((candidate.effect(grid[-1]),))
+        except ValueError:
+            continue
+        for name, before, after in zip(PUMP_METERS, plain, tried, strict=True):
+            if float(np.max(np.abs(after - before), initial=0.0)) > CHANGED * float(np.max(before, initial=0.0)):
+                found.add(name)
+    return found

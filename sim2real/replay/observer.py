@@ -1,0 +1,207 @@
+"""How far each recorded level moves the replay, and how far a right replay may be off before it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.jit import compiled
+from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.simulator.parameters import plant_parameters
+
+LEVEL_TIME_S = 150.0
+"""Time constant with which the observer follows the recorded level where the inflow is measured."""
+MOST_FOLLOWED = 0.5
+"""Share of an error that one value may take away there, however long there was none."""
+LOST_S = 300
+"""After that long without a level, and more than two rows, the observer begins anew."""
+BEGUN_ANEW = 1.0
+"""Share of an error that is taken away by beginning anew, which is all of it."""
+FIRST_SHARE = 0.5
+"""Standard deviation of an inflow before anything is known of it, as a share of what a pump carries."""
+MIN_NOISE_M = 1e-4
+UNKNOWN = 1e6
+"""Variance of a level of which nothing is known, over that of its sensor."""
+RANGE = (0.05, 0.95)
+"""Quantiles of the level between which the wet well is emptied and filled."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observer:
+    """Gains of the observer for each value of the level, and what a right model may be off before it.
+
+    Attributes
+    ----------
+    level_m : (n,) array
+        Level that is followed, NaN where there is none. [m]
+    level_gain, inflow_gain : (n,) arrays
+        Shares of the error of a value by which the level, and the inflow over the area, are moved. [1, 1/s]
+    deviation_m : (n,) array or None
+        Standard deviation of the error under a right model, noise of the value included; None where the gains are
+        constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
+    """
+
+    level_m: Floats
+    level_gain: Floats
+    inflow_gain: Floats
+    deviation_m: Floats | None
+
+
+def constant_observer(level_m: Floats) -> Observer:
+    """Observer of a level of each second under a measured inflow, which follows it with `LEVEL_TIME_S`.
+
+    Parameters
+    ----------
+    level_m : (n,) array
+        NaN is "no value".
+    """
+    place = np.arange(level_m.size)
+    last = np.maximum.accumulate(np.where(np.isfinite(level_m), place, -1))
+    lost_s = place - np.r_[-1, last[:-1]] - 1
+    gain = np.minimum(1.0 / LEVEL_TIME_S * (lost_s + 1), MOST_FOLLOWED)
+    return Observer(
+        level_m=level_m,
+        level_gain=np.where(lost_s > LOST_S, BEGUN_ANEW, gain),
+        inflow_gain=np.zeros(level_m.size),
+        deviation_m=None,
+    )
+
+
+def forced_observer(traces: Traces) -> Observer:
+    """Observer that takes the level from the rows, along straight lines, and predicts none."""
+    rows = np.flatnonzero(np.isfinite(traces.level_m))
+    middle = rows - 0.5 * (traces.span_s - 1)
+    place = np.arange(traces.seconds)
+    return Observer(
+        level_m=np.interp(place, middle, traces.level_m[rows]) if rows.size else traces.level_m,
+        level_gain=np.full(traces.seconds, BEGUN_ANEW),
+        inflow_gain=np.zeros(traces.seconds),
+        deviation_m=np.full(traces.seconds, np.inf),
+    )
+
+
+def hides_cycles(traces: Traces, station: Station) -> bool:
+    """Whether the wet well can be emptied or filled between two rows, so that the level between them is unknown."""
+    level_m = traces.level_m[np.isfinite(traces.level_m)]
+    if traces.is_each_second or level_m.size == 0:
+        return False
+    low_m, high_m = np.quantile(level_m, RANGE)
+    carried_m_s = float(np.max(plant_parameters(station).rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
+    return bool(traces.rate_s * carried_m_s > high_m - low_m)
+
+
+def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observer:
+    r"""Observer of a level in rows, or of one whose inflow is not measured: Kalman's filter of level and inflow.
+
+    $$x = \begin{pmatrix} L \\ b \end{pmatrix}, \quad F = \begin{pmatrix} 1 & \Delta t \\ 0 & 1 \end{pmatrix}, \quad
+    P \leftarrow F P F^T + q \begin{pmatrix} \Delta t^3/3 & \Delta t^2/2 \\ \Delta t^2/2 & \Delta t \end{pmatrix}
+    + \begin{pmatrix} \sum_i (Q_i \tau_i / A)^2 / 12 & 0 \\ 0 & 0 \end{pmatrix}$$
+
+    with τ the time within which a pump was switched at a moment that the rows do not show: the volume that it may
+    hide is taken from the next row and held against nobody. A measured inflow leaves no b; its error between rows
+    goes to L.
+
+    Parameters
+    ----------
+    traces : Traces
+    station : Station
+    drift_m2_s3 : float
+        q, by which the variance of an unknown inflow over the area grows. [m²/s³]
+
+    References
+    ----------
+    Kalman, R. E.: A new approach to linear filtering and prediction problems. J. Basic Eng. 82 (1960) 35-45.
+    """
+    plant = plant_parameters(station)
+    area_m2 = station.sump.mean_area_m2
+    speed_m_s = plant.rated_flow_m3h / 3600.0 / area_m2
+    open_m2 = np.sum((speed_m_s[:, None] * traces.drives.open_s) ** 2, axis=0) / 12.0
+    noise_m = level_noise_m(traces, station)
+    is_free = traces.inflow_m3h is None
+    level_gain, inflow_gain = np.zeros(traces.seconds), np.zeros(traces.seconds)
+    variance_m2 = np.full(traces.seconds, np.nan)
+    _filter(
+        np.isfinite(traces.level_m),
+        open_m2,
+        noise_m**2,
+        drift_m2_s3 if is_free else 0.0,
+        (FIRST_SHARE * float(speed_m_s.max())) ** 2 if is_free else 0.0,
+        0.0 if is_free else (inflow_error_m3h(traces) / 3600.0 / area_m2) ** 2,
+        max(LOST_S, 2.5 * traces.rate_s),
+        0.0 if is_free else 1.0 / LEVEL_TIME_S,
+        level_gain,
+        inflow_gain,
+        variance_m2,
+    )
+    return Observer(
+        level_m=traces.level_m,
+        level_gain=level_gain,
+        inflow_gain=inflow_gain,
+        deviation_m=np.sqrt(variance_m2),
+    )
+
+
+@compiled
+def _filter(
+    is_known: Flags,
+    open_m2: Floats,
+    noise_m2: float,
+    drift: float,
+    first_inflow: float,
+    inflow_error: float,
+    lost_s: float,
+    least_gain: float,
+    level_gain: Floats,
+    inflow_gain: Floats,
+    variance_m2: Floats,
+) -> None:
+    """Write gains, and variances of the error before each value, its own noise included."""
+    level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
+    last, hidden = -1, 0.0
+    for k in range(is_known.size):
+        hidden += open_m2[k]
+        if not is_known[k]:
+            continue
+        step = float(k - last)
+        level += 2.0 * step * both + step**2 * inflow + drift * step**3 / 3.0 + hidden + inflow_error * step**2
+        both += step * inflow + 0.5 * drift * step**2
+        inflow += drift * step
+        if step > lost_s:
+            level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
+        seen = level + noise_m2
+        gain = max(level / seen, min(least_gain * step, 0.5))
+        of_inflow = both / seen
+        variance_m2[k] = seen
+        level_gain[k], inflow_gain[k] = gain, of_inflow
+        if step > lost_s or last < 0:
+            level_gain[k] = 1.0
+        # Joseph's form: right for any gain
+        inflow = inflow - 2.0 * of_inflow * both + of_inflow**2 * seen
+        both = (1.0 - gain) * (both - of_inflow * level) + gain * of_inflow * noise_m2
+        level = (1.0 - gain) ** 2 * level + gain**2 * noise_m2
+        last, hidden = k, 0.0
+
+
+def inflow_error_m3h(traces: Traces) -> float:
+    """Standard deviation of the mean inflow between two rows, as the bends of the measured one show it. [m³/h]."""
+    if traces.inflow_m3h is None:
+        return 0.0
+    bends = np.diff(traces.inflow_m3h[traces.is_row], n=2)
+    return float(np.median(np.abs(bends))) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
+
+
+def level_noise_m(traces: Traces, station: Station) -> float:
+    """Standard deviation of the level sensor's noise, from rows between which nothing is switched. [m]."""
+    level_m = traces.level_m
+    if not traces.is_each_second:
+        moved = np.any(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1]) != 0.0, axis=0)
+        moves = np.cumsum(moved)[traces.is_row]
+        level_m = level_m[traces.is_row]
+    bends = np.diff(level_m, n=2)
+    if not traces.is_each_second:
+        bends = bends[moves[2:] == moves[:-2]]
+    bends = np.abs(bends[np.isfinite(bends)])
+    seen_m = float(np.median(bends)) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
+    return max(seen_m, 0.5 * station.sensors.level_noise_m, MIN_NOISE_M)

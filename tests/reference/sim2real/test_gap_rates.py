@@ -1,0 +1,147 @@
+"""The diagnosis on recordings as historians store them: slow rows, means, values that are held, missing signals."""
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
+from wetwell.protocols.station.station_file import EffectTable
+from wetwell.services.batch.gap import replay_file
+from wetwell.services.stations import find_scenario
+from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.sim2real.recording.regimes import REGIMES, regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.bins import SIGNALS
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.simulation import Simulation
+
+LENGTH_S = 43_200
+RATES = [(1, "instant"), (5, "instant"), (10, "instant"), (60, "instant"), (10, "mean"), (60, "mean"), (900, "mean")]
+
+
+def record(station, effects=(), seed=23):
+    tables = tuple(EffectTable.model_validate(effect) for effect in effects)
+    true = station.model_copy(update={"effect": tables})
+    return Simulation(true, find_scenario("nominal"), seed).advance(LENGTH_S, truth=False)
+
+
+def stored(recording, every, value="instant", without=()):
+    """What a historian keeps of a recording of each second."""
+    columns = {n: v for n, v in recording.columns.items() if not any(word in n for word in without)}
+    if value == "mean":
+        count = len(recording) // every
+        return Recording(
+            time_ns=recording.time_ns[every - 1 :: every][:count],
+            columns={n: v[: count * every].reshape(count, every).mean(axis=1) for n, v in columns.items()},
+            value="mean",
+        )
+    rows = slice(0, None, every)
+    kept = {n: v[rows] for n, v in columns.items()}
+    if value == "held":
+        kept = {n: v if n.endswith(("_hz", "running")) else _held(v) for n, v in kept.items()}
+    return Recording(time_ns=recording.time_ns[rows], columns=kept, value=value)
+
+
+def _held(values):
+    """Values that are stored when they have moved by a fiftieth of their range."""
+    last, kept = values[0], values.copy()
+    for row, value in enumerate(values):
+        if abs(value - last) > 0.02 * np.ptp(values):
+            last = value
+        kept[row] = last
+    return kept
+
+
+@pytest.fixture(scope="module")
+def plain(alpha):
+    return record(alpha)
+
+
+@pytest.mark.parametrize("without", [(), ("inflow",)])
+@pytest.mark.parametrize(("every", "value"), RATES)
+def test_the_true_model_is_off_by_about_what_it_may_be(alpha, plain, every, value, without):
+    """Mean squares of standardised residuals by signal and regime: noise makes 1, tolerance alone less."""
+    traces = traces_of(stored(plain, every, value, without), alpha)
+    regimes = regimes_of(traces, alpha)
+    replay = Replay(traces, alpha)
+    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt())
+    squares = residuals.of(replay.run()) ** 2
+    cells = list(residuals.bins.cells(np.ones(squares.size, dtype=bool)))
+    assert len(cells) >= 3
+    for signal, regime, cell in cells:
+        is_surging = bool(without) and SIGNALS[signal] == "level"  # by surges that nobody measured
+        assert squares[cell].mean() < (2.2 if is_surging else 1.6), (SIGNALS[signal], REGIMES[regime])
+    assert np.all(residuals.bins.deviation > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("every", "value", "without"),
+    [
+        (10, "instant", ()),
+        (10, "instant", ("inflow", "head")),
+        (60, "instant", ("inflow",)),
+        (60, "instant", ("flow_m3h", "head")),
+        (60, "mean", ("inflow",)),
+        (900, "mean", ("inflow",)),
+        (10, "held", ("inflow",)),
+    ],
+)
+def test_without_a_gap_nobody_is_blamed(alpha, plain, every, value, without):
+    report = diagnose(stored(plain, every, value, without), alpha).report()
+    assert (report.verdict, report.effects) == ("none", ())
+    assert (report.rate_s, report.value) == (float(every), value)
+
+
+@pytest.mark.parametrize(
+    ("every", "value", "without"),
+    [
+        (10, "instant", ("inflow",)),
+        (60, "instant", ()),
+        (60, "mean", ("inflow",)),
+        (900, "mean", ()),
+        (10, "held", ()),
+    ],
+)
+def test_friction_is_told_at_every_rate(alpha, every, value, without):
+    recording = stored(record(alpha, [{"name": "friction_bias", "factor": 1.4}]), every, value, without)
+    report = diagnose(recording, alpha).report()
+    assert report.verdict == "effect"
+    found = [effect for effect in report.effects if effect.name == "friction_bias"]
+    if found:
+        assert found[0].parameters["factor"].value == pytest.approx(1.4, rel=0.1)
+    else:
+        assert any("friction_bias" in effect.equivalent for effect in report.effects)
+
+
+def test_what_cannot_be_shown_is_listed_with_the_reason(alpha, plain):
+    report = diagnose(stored(plain, 60, without=("inflow", "head")), alpha).report()
+    reasons = {one.effect: one.reason for one in report.not_tested}
+    assert reasons["head_sensor_offset"] == "head is not measured"
+    assert reasons["threshold_shift"] == "rows of 60 s do not show the level at which a pump was switched"
+    assert "friction_bias" not in reasons
+    assert {one.name for one in report.candidates}.isdisjoint(reasons)
+
+
+def test_a_recording_of_each_second_shows_all_but_what_never_happens(alpha, plain):
+    reasons = {one.effect: one.reason for one in diagnose(plain, alpha).report().not_tested}
+    assert set(reasons) <= {"common_header"}
+
+
+def test_a_replay_stands_for_what_the_rows_do(alpha, plain, tmp_path):
+    means = stored(plain, 60, "mean")
+    write_recording(means, tmp_path / "means.parquet")
+    replay_file(alpha, tmp_path / "means.parquet", tmp_path / "replay.parquet", closed_loop=False)
+    predicted = read_recording(tmp_path / "replay.parquet")
+    assert (predicted.value, len(predicted)) == ("mean", len(means))
+    for name in ("pump1_flow_m3h", "pump1_frequency_hz", "level_m"):
+        error = np.abs(predicted.column(name) - means.column(name))
+        assert np.median(error) < 0.02 * np.ptp(means.column(name)), name
+
+
+def test_too_few_rows_and_no_signal_are_refused_in_one_line(alpha, plain):
+    hourly = stored(plain, 3600)
+    with pytest.raises(ValueError, match="more slowly than every 900 s"):
+        traces_of(hourly, alpha)
+    blind = stored(plain, 10, without=("flow", "head", "power", "level"))
+    with pytest.raises(ValueError, match="flow, head, power and level have no values"):
+        traces_of(blind, alpha)

@@ -1,0 +1,66 @@
+"""How recorded levels move the replay."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wetwell.sim2real.recording.drives import Drives
+from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.observer import constant_observer, forced_observer, hides_cycles, row_observer
+
+SECONDS = 7200
+
+
+@pytest.fixture
+def traces(alpha):
+    """Rows of a minute; one start whose moment is open."""
+    pumps = len(alpha.pump)
+    is_row = np.arange(SECONDS) % 60 == 0
+    level_m = np.where(is_row, 1.0 + 0.3 * np.sin(np.arange(SECONDS) / 900.0), np.nan)
+    open_s = np.zeros((pumps, SECONDS))
+    open_s[0, 3600] = 50.0
+    return Traces(
+        start_ns=0,
+        rate_s=60.0,
+        value="instant",
+        time_s=np.arange(SECONDS, dtype=float),
+        is_row=is_row,
+        drives=Drives(frequency_hz=np.zeros((pumps, SECONDS)), placements=(), open_s=open_s),
+        level_m=level_m,
+        inflow_m3h=np.full(SECONDS, 100.0),
+        signals={},
+    )
+
+
+def test_a_level_of_each_second_is_followed_slowly_and_begun_anew_after_a_pause():
+    level_m = np.ones(1000)
+    level_m[100:110] = level_m[200:600] = np.nan
+    observer = constant_observer(level_m)
+    assert observer.level_gain[50] == pytest.approx(1.0 / 150.0)
+    assert observer.level_gain[110] == pytest.approx(11.0 / 150.0)
+    assert observer.level_gain[600] == 1.0
+    assert not observer.inflow_gain.any()
+
+
+def test_after_a_start_whose_moment_is_open_the_level_is_taken_from_the_row_and_nobody_is_blamed(alpha, traces):
+    observer = row_observer(traces, alpha, 0.0)
+    carried_m = 50.0 * 3600.0**-1 / alpha.sump.area_m2
+    assert observer.deviation_m[3600] > 10.0 * observer.deviation_m[3540] > 0.1 * carried_m
+    assert observer.level_gain[3600] > 0.99 > observer.level_gain[3540]
+
+
+def test_an_inflow_that_is_not_measured_is_followed_but_for_what_a_start_may_hide(alpha, traces):
+    observer = row_observer(replace(traces, inflow_m3h=None), alpha, 1e-12)
+    assert observer.inflow_gain[3540] > 0.0
+    assert observer.inflow_gain[3600] < 0.1 * observer.inflow_gain[3540]
+    assert np.all(observer.deviation_m[3660:3780:60] >= observer.deviation_m[3540])
+
+
+def test_where_the_well_is_emptied_between_rows_the_level_is_taken_from_them(alpha, traces):
+    assert not hides_cycles(traces, alpha)
+    small = alpha.model_copy(update={"sump": alpha.sump.model_copy(update={"area_m2": 1.0})})
+    assert hides_cycles(traces, small)
+    observer = forced_observer(traces)
+    assert observer.level_m[30] == pytest.approx(0.5 * (traces.level_m[0] + traces.level_m[60]))
+    assert np.isinf(observer.deviation_m).all()
