@@ -14,17 +14,21 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from wetwell.protocols.quantities import STATION_QUANTITIES
-from wetwell.protocols.station.station_file import Control, EffectTable, Pump, Station
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.pump import Pump
+from wetwell.protocols.station.rising_main import RisingMain
+from wetwell.protocols.station.station_file import EffectTable, Station
+from wetwell.protocols.station.sump import Sump
 from wetwell.protocols.timestamps import LEARNING_S
-from wetwell.simulator.duty import check_operable
+from wetwell.simulator.duty import check_operable, duty_flows_m3h
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import Profile, PumpFault, SensorFault, SystemFault
-from wetwell.simulator.hydraulics import common_flows
 from wetwell.simulator.inflow import INFLOWS
 from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.power import electrical_power_kw
 from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import check_driven
 
 FaultClass = Literal["normal", "pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault"]
 
@@ -119,7 +123,8 @@ def item_of(bases: Sequence[Station], seed: int, number: int, length_s: int) -> 
     Raises
     ------
     ValueError
-        If the length is too short, or no plausible station or fault can be sampled around a base.
+        If the length is too short, nobody knows when a base starts its pumps, or no plausible station or fault can
+        be sampled around a base.
 
     Examples
     --------
@@ -134,6 +139,8 @@ def item_of(bases: Sequence[Station], seed: int, number: int, length_s: int) -> 
             f"an item must be at least {MIN_LENGTH_S / 86_400:.3f} days long, got {length_s / 86_400:.3f}"
         )
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+    for base in bases:
+        check_driven(base)
     round_, turn = divmod(number, len(labels()))
     label = labels()[turn]
     kinds = kinds_of(label)
@@ -183,20 +190,15 @@ def _station_table(base: Station, number: int, rng: np.random.Generator) -> dict
     pumps = int(rng.integers(1, MAX_PUMPS + 1))
     area = _log_uniform(rng, 0.6, 1.8)
     head, linear, square = rng.uniform(0.85, 1.15), _log_uniform(rng, 0.8, 1.25), _log_uniform(rng, 0.8, 1.25)
-    main, sump = base.rising_main, base.sump
+    sampled = [base.pump[i % len(base.pump)] for i in range(pumps)]
+    served = sorted({base.main_of_pump[i % len(base.pump)] for i in range(pumps)})
+    pump_tables = [_pump(pump, (float(head), linear, square), rng) for pump in sampled]
+    mains = [_main(base.mains[m], base.middle_level_m, rng) for m in served]
     return {
         "name": f"{base.name[:57]}-{number:06}",
-        "sump": sump.model_dump()
-        | {
-            "area_m2": _rounded(sump.area_m2 * area),
-            "profile": sump.profile and [(level_m, _rounded(area_m2 * area)) for level_m, area_m2 in sump.profile],
-        },
-        "pump": [_pump(base.pump[i % len(base.pump)], (float(head), linear, square), rng) for i in range(pumps)],
-        "rising_main": {
-            "static_head_m": _rounded(main.static_head_m * rng.uniform(0.6, 1.6)),
-            "friction_h2_m5": _rounded(main.friction_h2_m5 * _log_uniform(rng, 0.6, 1.7)),
-            "layout": str(rng.choice(["individual", "common"])),
-        },
+        "sump": _sump(base.sump, area),
+        "pump": pump_tables,
+        **({"rising_main": mains[0]} if base.main is None else {"main": mains}),
         "control": _control(base.control, pumps),
         "electrical": base.electrical.model_dump(),
         "sensors": {
@@ -207,10 +209,36 @@ def _station_table(base: Station, number: int, rng: np.random.Generator) -> dict
     }
 
 
+def _sump(base: Sump, area: float) -> dict[str, Any]:
+    """The wet well with all its areas multiplied."""
+    table = base.model_dump(exclude_none=True)
+    if base.area_m2 is not None:
+        table["area_m2"] = _rounded(base.area_m2 * area)
+    for key in table.keys() & {"profile", "volume_points"}:
+        table[key] = [(level_m, _rounded(value * area)) for level_m, value in table[key]]
+    return table
+
+
 def _pump(base: Pump, factors: tuple[float, float, float], rng: np.random.Generator) -> dict[str, Any]:
     own = rng.uniform(0.98, 1.02, 3)
     curve = [_rounded(c * f * o) for c, f, o in zip(base.coefficients, factors, own.tolist(), strict=True)]
-    return {"curve": curve, "nominal_frequency_hz": base.nominal_frequency_hz}
+    table: dict[str, Any] = {"curve": curve, "nominal_frequency_hz": base.nominal_frequency_hz, "main": base.main}
+    if base.power_points is not None:
+        scale = factors[0] * float(own[0])
+        table["power_points"] = [(flow_m3h, _rounded(power_kw * scale)) for flow_m3h, power_kw in base.power_points]
+    return table | {"efficiency_points": base.efficiency_points}
+
+
+def _main(base: RisingMain, level_m: float, rng: np.random.Generator) -> dict[str, Any]:
+    lift_m = base.static_head_at_m(level_m) * rng.uniform(0.6, 1.6)
+    lift = {"static_head_m": _rounded(lift_m)}
+    if base.delivery_level_m is not None:
+        lift = {"delivery_level_m": _rounded(level_m + lift_m)}
+    return lift | {
+        "name": base.name,
+        "friction_h2_m5": _rounded(base.friction_h2_m5 * _log_uniform(rng, 0.6, 1.7)),
+        "layout": str(rng.choice(["individual", "common"])),
+    }
 
 
 def _control(base: Control, pumps: int) -> dict[str, Any]:
@@ -232,11 +260,9 @@ def _pump_of(effect: EffectTable) -> int:
 def _capacity_m3h(station: Station) -> float:
     """Flow of pump 1 alone at nominal speed."""
     parameters = plant_parameters(station)
-    flow_m3h = np.zeros(len(station.pump))
     speed_ratio = np.zeros(len(station.pump))
     speed_ratio[0] = 1.0
-    common_flows(parameters.curves, speed_ratio, parameters.static_head_m, parameters.friction_h2_m5, 0.0, flow_m3h)
-    return float(flow_m3h[0])
+    return float(duty_flows_m3h(parameters, speed_ratio, parameters.rated_level_m)[0])
 
 
 def _inflow(station: Station, rng: np.random.Generator) -> dict[str, Any]:

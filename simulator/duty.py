@@ -1,14 +1,16 @@
-"""Duty points of a station at nominal speed: what its owner can hold against the datasheet."""
+"""Duty points of a station: what its owner can hold against the datasheet."""
 
 from typing import Any
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.curve_fit import fit_error_m
-from wetwell.protocols.station.station_file import Pump, Station
-from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
-from wetwell.simulator.parameters import PlantParameters, plant_parameters
-from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw
+from wetwell.protocols.station.rising_main import RisingMain
+from wetwell.protocols.station.station_file import Station
+from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h, pump_head_m
+from wetwell.simulator.parameters import PlantParameters, PumpParameters, plant_parameters
+from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw, loaded_power_kw, shaft_power_kw
 
 MIN_EXCESS = 0.01
 """Share by which a shut-off head must exceed the lift: what lies nearer is within the tolerance of any datasheet."""
@@ -24,20 +26,12 @@ def check_operable(station: str, parameters: PlantParameters) -> None:
         pump in service at nominal speed does not exceed the static head at the last start level by `MIN_EXCESS`: it
         would turn and move no water. One line.
     """
-    start_m, stop_m, crest_m = parameters.start_levels_m, parameters.stop_levels_m, parameters.overflow_level_m
     place = f"station '{station}'"
-    if stop_m[0] < 0.0:
-        raise ValueError(
-            f"{place}: control.stop_levels_m[1] = {stop_m[0]:g} lies under the floor: the pump would never stop"
-        )
-    if crest_m <= start_m[0]:
-        raise ValueError(
-            f"{place}: sump.overflow_level_m: got {crest_m:g}, must lie over control.start_levels_m[1] = "
-            f"{start_m[0]:g}, or the wet well overflows before a pump starts"
-        )
-    rise_m = parameters.lift_slope * (start_m[-1] - parameters.lift_reference_m)
-    static_head_m = max(parameters.static_head_m - rise_m, 0.0)
+    if parameters.start_levels_m.size:
+        _check_levels(place, parameters)
+    highest_m = parameters.start_levels_m[-1] if parameters.start_levels_m.size else parameters.rated_level_m
     for number, pump in enumerate(parameters.pumps, start=1):
+        static_head_m = parameters.mains[pump.main].static_head_at_m(highest_m)
         if pump.is_automatic and pump.c0 <= static_head_m * (1.0 + MIN_EXCESS):
             raise ValueError(
                 f"{place}: pump[{number}]: curve does not meet the system curve: shut-off head {pump.c0:g} m must "
@@ -46,53 +40,126 @@ def check_operable(station: str, parameters: PlantParameters) -> None:
             )
 
 
+def _check_levels(place: str, parameters: PlantParameters) -> None:
+    start_m, stop_m, crest_m = parameters.start_levels_m, parameters.stop_levels_m, parameters.overflow_level_m
+    if stop_m[0] < parameters.profile["level_m"][0]:
+        raise ValueError(
+            f"{place}: control.stop_levels_m[1] = {stop_m[0]:g} lies under the floor: the pump would never stop"
+        )
+    if crest_m <= start_m[0]:
+        raise ValueError(
+            f"{place}: sump.overflow_level_m: got {crest_m:g}, must lie over control.start_levels_m[1] = "
+            f"{start_m[0]:g}, or the wet well overflows before a pump starts"
+        )
+
+
+def duty_flows_m3h(parameters: PlantParameters, speed_ratio: Floats, level_m: float) -> Floats:
+    """Duty flows of pumps at their speeds, each main for itself; without air, inertia or faults.
+
+    Parameters
+    ----------
+    parameters : PlantParameters
+    speed_ratio : (pumps,) array
+        Speed over nominal speed; 0 stands. [1]
+    level_m : float
+        Level in the wet well. [m]
+
+    Returns
+    -------
+    flow_m3h : (pumps,) array
+        [m³/h]
+    """
+    flow_m3h = np.zeros(len(parameters.pumps))
+    for m, main in enumerate(parameters.mains):
+        static_head_m, curves = main.static_head_at_m(level_m), parameters.curves
+        pumps = np.flatnonzero([pump.main == m for pump in parameters.pumps])
+        if main.is_common_header:
+            curves[:, 2] -= main.friction_h2_m5 * (1.0 - main.shared_friction)
+            shared_h2_m5 = main.friction_h2_m5 * main.shared_friction
+            common_flows(pumps, curves, speed_ratio, static_head_m, shared_h2_m5, 0.0, flow_m3h)
+        else:
+            for i in pumps:
+                flow_m3h[i] = individual_flow_m3h(
+                    curves[i], speed_ratio[i], static_head_m, main.friction_h2_m5, 0.0, 0.0
+                )
+    return flow_m3h
+
+
 def duty_table(station: Station) -> dict[str, object]:
-    """Duty points of each pump alone and of all pumps together.
+    """Duty points of each pump alone and of all pumps together, at nominal speed.
 
     Returns
     -------
     table : dict
+        `level_m`: where the wet well is meanwhile; `mains`: name, static head there, friction and layout of each;
         `curves`: coefficients, and the root mean square misfit of a curve fitted to datasheet points;
         `each_pump_alone` and `all_pumps_together`: flow, head and power; `total_flow_m3h` of all together.
     """
     count = len(station.pump)
     alone = [_duty(station, [i == pump for i in range(count)])[pump] for pump in range(count)]
     together = _duty(station, [True] * count)
-    curves = [_curve(number, pump) for number, pump in enumerate(station.pump, start=1)]
     return {
         "station": station.name,
-        "curves": curves,
+        "level_m": round(station.middle_level_m, 3),
+        "mains": [_main(station, main) for main in station.mains],
+        "curves": [_curve(station, pump) for pump in range(count)],
         "each_pump_alone": alone,
         "all_pumps_together": together,
         "total_flow_m3h": round(sum(row["flow_m3h"] for row in together), 2),
     }
 
 
-def _curve(number: int, pump: Pump) -> dict[str, object]:
+def _main(station: Station, main: RisingMain) -> dict[str, object]:
+    return {
+        "main": main.name,
+        "static_head_m": round(main.static_head_at_m(station.middle_level_m), 3),
+        "delivery_level_m": main.delivery_level_m,
+        "friction_h2_m5": main.friction_h2_m5,
+        "layout": main.layout,
+    }
+
+
+def _named(station: Station, pump: int) -> dict[str, Any]:
+    """Number, name and main of a pump."""
+    main = station.mains[station.main_of_pump[pump]]
+    return {"pump": pump + 1, "name": station.pump_names[pump], "main": main.name}
+
+
+def _curve(station: Station, number: int) -> dict[str, object]:
+    pump = station.pump[number]
     c0, c1, c2 = pump.coefficients
     misfit_m = None if pump.points is None else round(fit_error_m(pump.points, pump.coefficients), 4)
-    return {"pump": number, "c0": c0, "c1": c1, "c2": c2, "fit_error_m": misfit_m}
+    return _named(station, number) | {"c0": c0, "c1": c1, "c2": c2, "fit_error_m": misfit_m}
 
 
 def _duty(station: Station, running: list[bool]) -> list[dict[str, Any]]:
     parameters = plant_parameters(station)
-    speed_ratio = np.array(running, dtype=float)
-    flow_m3h = np.zeros(len(running))
-    solve = common_flows if parameters.is_common_header else individual_flows
-    solve(parameters.curves, speed_ratio, parameters.static_head_m, parameters.friction_h2_m5, 0.0, flow_m3h)
-    electrical = station.electrical
-    power_kw = electrical_power_kw(electrical.voltage_v, electrical.rated_current_a, electrical.power_factor, 1.0)
+    flows_m3h = duty_flows_m3h(parameters, np.array(running, dtype=float), parameters.rated_level_m)
     rows: list[dict[str, Any]] = []
-    for number, (curve, flow) in enumerate(zip(parameters.curves.tolist(), flow_m3h.tolist(), strict=True), start=1):
-        head_m = pump_head_m(curve[0], curve[1], curve[2], 1.0, flow)
+    for number, (pump, flow_m3h) in enumerate(zip(parameters.pumps, flows_m3h.tolist(), strict=True)):
+        head_m = pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, flow_m3h)
+        shaft_kw, electrical_kw = _powers_kw(station, pump, flow_m3h, head_m)
         rows.append(
-            {
-                "pump": number,
-                "flow_m3h": round(flow, 2),
+            _named(station, number)
+            | {
+                "flow_m3h": round(flow_m3h, 2),
                 "head_m": round(head_m, 2),
-                "hydraulic_power_kw": round(hydraulic_power_kw(flow, head_m), 2),
-                "shaft_power_kw": round(hydraulic_power_kw(flow, head_m) / electrical.efficiency, 2),
-                "electrical_power_kw": round(power_kw, 2),
+                "hydraulic_power_kw": round(hydraulic_power_kw(flow_m3h, head_m), 2),
+                "shaft_power_kw": round(shaft_kw, 2),
+                "electrical_power_kw": round(electrical_kw, 2),
             }
         )
     return rows
+
+
+def _powers_kw(station: Station, pump: PumpParameters, flow_m3h: float, head_m: float) -> tuple[float, float]:
+    """Shaft power and electrical power at nominal speed, by the power model of the station."""
+    electrical = station.electrical
+    if electrical.power_model == "load":
+        shaft_kw = shaft_power_kw(1.0, flow_m3h, pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share)
+        efficiencies = electrical.motor_efficiency, electrical.drive_efficiency
+        return shaft_kw, loaded_power_kw(shaft_kw, pump.rated_shaft_kw, *efficiencies)
+    shaft_kw = hydraulic_power_kw(flow_m3h, head_m) / electrical.efficiency
+    return shaft_kw, electrical_power_kw(
+        electrical.voltage_v, electrical.rated_current_a, electrical.power_factor, 1.0
+    )

@@ -2,7 +2,7 @@
 
 import math
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
 
 FLOW_TOLERANCE_M3H = 1e-10
@@ -66,7 +66,7 @@ def flow_at_head_m3h(
     head_m : float
         Head against which the pump works. [m]
     inertia_m_m3h : float
-        j, see `individual_flows`. [m/(m³/h)]
+        j, see `individual_flow_m3h`. [m/(m³/h)]
 
     Returns
     -------
@@ -89,15 +89,15 @@ def flow_at_head_m3h(
 
 
 @compiled
-def individual_flows(
-    curves: Floats,
-    speed_ratio: Floats,
+def individual_flow_m3h(
+    curve: Floats,
+    speed_ratio: float,
     static_head_m: float,
     friction_h2_m5: float,
     inertia_m_m3h: float,
-    flow_m3h: Floats,
-) -> None:
-    r"""Duty flow of each pump against a rising main of its own.
+    before_m3h: float,
+) -> float:
+    r"""Duty flow of a pump against a pipe of its own.
 
     With inertia the column of water has to be accelerated; one implicit step of
 
@@ -107,30 +107,35 @@ def individual_flows(
 
     Parameters
     ----------
-    curves : (pumps, 3) array
-        c0, c1, c2 of each pump. [m, m/(m³/h), m/(m³/h)²]
-    speed_ratio : (pumps,) array
+    curve : (3,) array
+        c0, c1, c2. [m, m/(m³/h), m/(m³/h)²]
+    speed_ratio : float
         [1]
     static_head_m, friction_h2_m5 : float
         System curve H = H_s + k Q². [m, h²/m⁵]
     inertia_m_m3h : float
         j: head that changes the flow by 1 m³/h within the step. [m/(m³/h)]
-    flow_m3h : (pumps,) array
-        Flows before the step, replaced by those after it. [m³/h]
+    before_m3h : float
+        Flow before the step. [m³/h]
+
+    Returns
+    -------
+    flow_m3h : float
+        Flow after the step. [m³/h]
     """
-    for i in range(speed_ratio.size):
-        flow_m3h[i] = flow_at_head_m3h(
-            curves[i, 0],
-            curves[i, 1],
-            curves[i, 2] - friction_h2_m5,
-            speed_ratio[i],
-            static_head_m - inertia_m_m3h * flow_m3h[i],
-            inertia_m_m3h,
-        )
+    return flow_at_head_m3h(
+        curve[0],
+        curve[1],
+        curve[2] - friction_h2_m5,
+        speed_ratio,
+        static_head_m - inertia_m_m3h * before_m3h,
+        inertia_m_m3h,
+    )
 
 
 @compiled
 def common_flows(
+    pumps: Integers,
     curves: Floats,
     speed_ratio: Floats,
     static_head_m: float,
@@ -148,12 +153,23 @@ def common_flows(
     inside a bracket by bisection. One running pump is solved in closed form. A pump whose shut-off head lies under
     the header's head gives no flow: its check valve is closed.
 
-    Parameters and result as in `individual_flows`; the inertia acts on the total flow.
+    Parameters
+    ----------
+    pumps : (n,) array
+        Places of the pumps that share the header; all others are left as they are.
+    curves : (pumps, 3) array
+        c0, c1, c2 of each pump. [m, m/(m³/h), m/(m³/h)²]
+    speed_ratio : (pumps,) array
+        [1]
+    static_head_m, friction_h2_m5, inertia_m_m3h : float
+        As in `individual_flow_m3h`; friction and inertia act on the total flow.
+    flow_m3h : (pumps,) array
+        Flows before the step, replaced by those after it. [m³/h]
     """
     before_m3h = 0.0
     running = 0
     alone = 0
-    for i in range(speed_ratio.size):
+    for i in pumps:
         before_m3h += flow_m3h[i]
         if speed_ratio[i] > 0.0 or flow_m3h[i] > 0.0:
             running += 1
@@ -163,22 +179,17 @@ def common_flows(
     if running == 0:
         return
     if running == 1:
-        flow_m3h[alone] = flow_at_head_m3h(
-            curves[alone, 0],
-            curves[alone, 1],
-            curves[alone, 2] - friction_h2_m5,
-            speed_ratio[alone],
-            static_head_m - inertia_m_m3h * before_m3h,
-            inertia_m_m3h,
+        flow_m3h[alone] = individual_flow_m3h(
+            curves[alone], speed_ratio[alone], static_head_m, friction_h2_m5, inertia_m_m3h, before_m3h
         )
         return
     lowest_head_m = static_head_m - inertia_m_m3h * before_m3h
     low_m3h = 0.0
-    high_m3h = _flows_at_head(curves, speed_ratio, lowest_head_m, flow_m3h)[0]
+    high_m3h = _flows_at_head(pumps, curves, speed_ratio, lowest_head_m, flow_m3h)[0]
     total_m3h = high_m3h / (1.0 + running)
     for _ in range(MAX_ITERATIONS):
         head_m = lowest_head_m + (inertia_m_m3h + friction_h2_m5 * total_m3h) * total_m3h
-        pumped_m3h, steepness = _flows_at_head(curves, speed_ratio, head_m, flow_m3h)
+        pumped_m3h, steepness = _flows_at_head(pumps, curves, speed_ratio, head_m, flow_m3h)
         excess_m3h = pumped_m3h - total_m3h
         if excess_m3h > 0.0:
             low_m3h = total_m3h
@@ -192,11 +203,13 @@ def common_flows(
 
 
 @compiled
-def _flows_at_head(curves: Floats, speed_ratio: Floats, head_m: float, flow_m3h: Floats) -> tuple[float, float]:
+def _flows_at_head(
+    pumps: Integers, curves: Floats, speed_ratio: Floats, head_m: float, flow_m3h: Floats
+) -> tuple[float, float]:
     """Set the flow of each pump at the header's head; sum of the flows and of their slopes over the head."""
     total_m3h = 0.0
     steepness = 0.0
-    for i in range(speed_ratio.size):
+    for i in pumps:
         flow_m3h[i] = flow_at_head_m3h(curves[i, 0], curves[i, 1], curves[i, 2], speed_ratio[i], head_m, 0.0)
         if flow_m3h[i] > 0.0:
             total_m3h += flow_m3h[i]

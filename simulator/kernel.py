@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.quantities import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.control.drive import turned_ratio
 from wetwell.simulator.control.supervision import drive, supervise
 from wetwell.simulator.forcing import Forcing
-from wetwell.simulator.hydraulics import common_flows, individual_flows, pump_head_m
+from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h, pump_head_m
 from wetwell.simulator.parameters import PlantRecords
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
 from wetwell.simulator.state import PlantState, Truth
@@ -85,18 +85,23 @@ def move_plant(
     """Move pumps and water on by a second, and note the truth; whether any pump turned or had water moving in it."""
     station, now = plant.station[0], state.station[0]
     level_m = level_at_volume_m(now.volume_m3, plant.profile)
-    static_head_m = station.static_head_m - station.lift_slope * (level_m - station.lift_reference_m)
-    static_head_m += forcing.static_rise_m[second]
-    friction_h2_m5 = station.friction_h2_m5 * forcing.friction_factor[second]
+    for m in range(plant.mains.size):
+        main = plant.mains[m]
+        static_head_m = main.static_head_m - main.level_slope * level_m
+        static_head_m -= main.lift_slope * (level_m - main.lift_reference_m)
+        state.static_head_m[m] = static_head_m + forcing.static_rise_m[second]
+        state.friction_h2_m5[m] = main.friction_h2_m5 * forcing.friction_factor[second]
     is_moving = is_moving_now(state)
     if is_moving:
         turn_pumps(plant, state, forcing, second)
-        move_water(plant, state, static_head_m, friction_h2_m5)
-    if station.air_head_m > 0.0:
-        gather_air(plant, state)
+        for m in range(plant.mains.size):
+            move_water(plant, state, m)
+    for m in range(plant.mains.size):
+        if plant.mains[m].air_head_m > 0.0:
+            gather_air(plant, state, m)
     over_m3h = overflow_m3h(level_m, station.overflow_level_m, station.weir_width_m, plant.profile)
     inflow_m3h = forcing.inflow_m3h[second] + station.unmetered_inflow_m3h + extra_inflow_m3h
-    inflow_m3h += back_flow_m3h(plant, state, forcing, second, static_head_m, friction_h2_m5)
+    inflow_m3h += back_flow_m3h(plant, state, forcing, second)
     now.volume_m3 = next_volume_m3(now.volume_m3, inflow_m3h, over_m3h, state.mean_flow_m3h)
     if is_moving:
         load_pumps(plant, state, forcing.voltage_factor[second], truth, at_truth)
@@ -149,94 +154,92 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
 
 
 @inlined
-def move_water(plant: PlantRecords, state: PlantState, static_head_m: float, friction_h2_m5: float) -> None:
-    """Set the flows after the second and their means over it."""
+def move_water(plant: PlantRecords, state: PlantState, m: int) -> None:
+    """Set the flows of main m after the second and their means over it."""
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    inertia_s2_m2 = plant.mains[m].inertia_s2_m2
     flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
-    inertia_s2_m2 = plant.station[0].inertia_s2_m2
     if inertia_s2_m2 <= 0.0:
-        _solve_flows(plant, state, static_head_m, friction_h2_m5, 0.0)
-        for i in range(mean_m3h.size):
+        _solve_flows(plant, state, m, 0.0)
+        for i in pumps:
             mean_m3h[i] = flow_m3h[i]
         return
     inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * INERTIA_STEPS / STAGE
-    for i in range(mean_m3h.size):
+    for i in pumps:
         mean_m3h[i] = 0.0
     for _ in range(INERTIA_STEPS):
-        for i in range(mean_m3h.size):
+        for i in pumps:
             before_m3h[i] = flow_m3h[i]
-        _solve_flows(plant, state, static_head_m, friction_h2_m5, inertia_m_m3h)
-        for i in range(mean_m3h.size):
+        _solve_flows(plant, state, m, inertia_m_m3h)
+        for i in pumps:
             mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / INERTIA_STEPS
             flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
-        _solve_flows(plant, state, static_head_m, friction_h2_m5, inertia_m_m3h)
-        for i in range(mean_m3h.size):
+        _solve_flows(plant, state, m, inertia_m_m3h)
+        for i in pumps:
             mean_m3h[i] += STAGE * flow_m3h[i] / INERTIA_STEPS
 
 
 @inlined
-def _solve_flows(
-    plant: PlantRecords, state: PlantState, static_head_m: float, friction_h2_m5: float, inertia_m_m3h: float
-) -> None:
-    """Set the flows by the layout of the mains, each with its own air."""
-    station, curves, speed_ratio, flow_m3h = plant.station[0], state.curves, state.speed_ratio, state.flow_m3h
-    lift_m = max(static_head_m + state.pumps[0].air_m, 0.0)
-    if station.is_common_header:
-        own_h2_m5 = friction_h2_m5 * (1.0 - station.shared_friction)
-        for i in range(flow_m3h.size):
+def _solve_flows(plant: PlantRecords, state: PlantState, m: int, inertia_m_m3h: float) -> None:
+    """Set the flows of main m by its layout; pipes of their own have air of their own."""
+    main, curves, flow_m3h = plant.mains[m], state.curves, state.flow_m3h
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    static_head_m, friction_h2_m5 = state.static_head_m[m], state.friction_h2_m5[m]
+    if main.is_common_header:
+        lift_m = max(static_head_m + state.pumps[pumps[0]].air_m, 0.0)
+        own_h2_m5 = friction_h2_m5 * (1.0 - main.shared_friction)
+        for i in pumps:
             curves[i, 2] -= own_h2_m5
-        common_flows(curves, speed_ratio, lift_m, friction_h2_m5 * station.shared_friction, inertia_m_m3h, flow_m3h)
-        for i in range(flow_m3h.size):
+        common_flows(
+            pumps, curves, state.speed_ratio, lift_m, friction_h2_m5 * main.shared_friction, inertia_m_m3h, flow_m3h
+        )
+        for i in pumps:
             curves[i, 2] += own_h2_m5
-    elif station.air_head_m > 0.0:
-        for i in range(flow_m3h.size):
-            one = slice(i, i + 1)
-            lift_m = max(static_head_m + state.pumps[i].air_m, 0.0)
-            individual_flows(curves[one], speed_ratio[one], lift_m, friction_h2_m5, inertia_m_m3h, flow_m3h[one])
-    else:
-        individual_flows(curves, speed_ratio, lift_m, friction_h2_m5, inertia_m_m3h, flow_m3h)
+        return
+    for i in pumps:
+        lift_m = max(static_head_m + state.pumps[i].air_m, 0.0)
+        flow_m3h[i] = individual_flow_m3h(
+            curves[i], state.speed_ratio[i], lift_m, friction_h2_m5, inertia_m_m3h, flow_m3h[i]
+        )
 
 
 @inlined
-def gather_air(plant: PlantRecords, state: PlantState) -> None:
-    """Let the air of each main grow while no water moves in it, and be purged while some does."""
-    station = plant.station[0]
-    is_one = station.is_common_header or station.is_air_shared
-    total_m3h = sum_of(state.mean_flow_m3h)
-    for i in range(state.pumps.size):
+def gather_air(plant: PlantRecords, state: PlantState, m: int) -> None:
+    """Let the air of main m grow while no water moves in it, and be purged while some does."""
+    main = plant.mains[m]
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    is_one = main.is_common_header or main.is_air_shared
+    total_m3h = sum_of(state.mean_flow_m3h, pumps)
+    for i in pumps:
         pump = state.pumps[i]
         flow_m3h = total_m3h if is_one else state.mean_flow_m3h[i]
         if flow_m3h > 0.0:
-            pump.air_m -= pump.air_m / station.air_purge_s
+            pump.air_m -= pump.air_m / main.air_purge_s
         else:
-            pump.air_m += (station.air_head_m - pump.air_m) / station.air_growth_s
+            pump.air_m += (main.air_head_m - pump.air_m) / main.air_growth_s
 
 
 @inlined
-def back_flow_m3h(
-    plant: PlantRecords,
-    state: PlantState,
-    forcing: Forcing,
-    second: int,
-    static_head_m: float,
-    friction_h2_m5: float,
-) -> float:
+def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int) -> float:
     """Flow back into the wet well through the check valves of standing pumps: K sqrt(H), H the head behind."""
     back_m3h = 0.0
     for i in range(state.pumps.size):
         leak_m3h = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
         if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
-            head_m = max(static_head_m + state.pumps[i].air_m, 0.0)
-            if plant.station[0].is_common_header:
-                head_m += friction_h2_m5 * sum_of(state.mean_flow_m3h) ** 2
+            m = plant.pumps[i].main
+            head_m = max(state.static_head_m[m] + state.pumps[i].air_m, 0.0)
+            if plant.mains[m].is_common_header:
+                pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+                head_m += state.friction_h2_m5[m] * sum_of(state.mean_flow_m3h, pumps) ** 2
             back_m3h += leak_m3h * math.sqrt(head_m)
     return back_m3h
 
 
 @inlined
-def sum_of(flow_m3h: Floats) -> float:
-    """Sum of flows, in the order of the pumps. [m³/h]."""
+def sum_of(flow_m3h: Floats, pumps: Integers) -> float:
+    """Sum of the flows of some pumps, in their order. [m³/h]."""
     total_m3h = 0.0
-    for i in range(flow_m3h.size):
+    for i in pumps:
         total_m3h += flow_m3h[i]
     return total_m3h
 
@@ -253,11 +256,10 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
         power_kw = 0.0
         if now.shaft_ratio > 0.0:  # a standing pump reads 0, also while the water still moves through it
             head_m = pump_head_m(curve[0], curve[1], curve[2], state.speed_ratio[i], flow_m3h)
-            rated_shaft_kw = pump.rated_hydraulic_kw / station.pump_efficiency
             shaft_kw = shaft_power_kw(
-                now.shaft_ratio, flow_m3h, pump.rated_flow_m3h, rated_shaft_kw, station.shutoff_power_share
+                now.shaft_ratio, flow_m3h, pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share
             )
-            now.load = shaft_kw / (rated_shaft_kw * now.shaft_ratio)
+            now.load = shaft_kw / (pump.rated_shaft_kw * now.shaft_ratio)
             if now.frequency_hz > 0.0:
                 by_load = station.load_share
                 power_kw = (1.0 - by_load) * electrical_power_kw(
@@ -268,7 +270,7 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
                 )
                 if by_load > 0.0:
                     power_kw += by_load * loaded_power_kw(
-                        shaft_kw, rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
+                        shaft_kw, pump.rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
                     )
                 power_kw *= voltage_factor
         truth.flow_m3h[i, second] = flow_m3h

@@ -7,13 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, AnalogueQuantity
-from wetwell.protocols.station.station_file import Sensors, Station
-from wetwell.simulator.power import hydraulic_power_kw
+from wetwell.protocols.station.pump import Pump
+from wetwell.protocols.station.rising_main import RisingMain
+from wetwell.protocols.station.station_file import Electrical, Sensors, Station
+from wetwell.simulator.power import hydraulic_power_kw, power_line, shaft_points
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
-from wetwell.simulator.wet_well import ProfilePoint, profile_of
+from wetwell.simulator.wet_well import ProfileSlice, profile_of_slices
 
 ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)
 ROTATIONS = ("round_robin", "fixed", "least_run_time")
@@ -23,23 +25,55 @@ SMALLEST_HEAD_M = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PumpParameters:
-    """A pump: its curve and rated duty, and what is not as new.
+    """A pump: its main, its curve and rated duty, and what is not as new.
 
-    Rags take speed, in a run ever more, towards `ragging_limit` with time constant `ragging_s`. `slip` is the loss of
-    speed at rated torque. While the pump stands, `valve_leak_m3h` flows back through its check valve at 1 m of head.
+    Its shaft power is a line over the flow, from `shutoff_power_share` of the rated one at no flow. Rags take speed,
+    in a run ever more, towards `ragging_limit` with time constant `ragging_s`. `slip` is the loss of speed at rated
+    torque. While the pump stands, `valve_leak_m3h` flows back through its check valve at 1 m of head.
     """
 
     c0: float
     c1: float
     c2: float
     nominal_frequency_hz: float
-    rated_hydraulic_kw: float
+    main: int
     rated_flow_m3h: float
+    rated_shaft_kw: float
+    shutoff_power_share: float
     ragging_limit: float = 0.0
     ragging_s: float = math.inf
     slip: float = 0.0
     valve_leak_m3h: float = 0.0
     is_automatic: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MainParameters:
+    """A rising main.
+
+    Its static head is that at level 0 of the wet well and falls by `level_slope` for each metre of level, and by
+    `lift_slope` for each metre above `lift_reference_m`. On a common header, the share `shared_friction` of k acts on
+    the total flow, the rest on each pump's own. `inertia_s2_m2` = length / (g area). Air grows idle and purges
+    running: in a common header for all pumps, else for each by itself or, where `is_air_shared`, at one high point.
+    """
+
+    static_head_m: float
+    level_slope: float
+    friction_h2_m5: float
+    is_common_header: bool
+    shared_friction: float = 1.0
+    lift_slope: float = 0.0
+    lift_reference_m: float = 0.0
+    inertia_s2_m2: float = 0.0
+    air_head_m: float = 0.0
+    air_growth_s: float = math.inf
+    air_purge_s: float = math.inf
+    is_air_shared: bool = False
+
+    def static_head_at_m(self, level_m: float) -> float:
+        """Static head with the wet well at a level, without air; never negative. [m]."""
+        falling_m = self.level_slope * level_m + self.lift_slope * (level_m - self.lift_reference_m)
+        return max(self.static_head_m - falling_m, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,32 +101,21 @@ class SensorParameters:
 class PlantParameters:
     """A station as the kernel reads it.
 
-    Wet well: profile, an overflow weir, inflow that no meter sees. Pumps: see `PumpParameters`. Rising main:
-    on a common header, the share `shared_friction` of k acts on the total flow, the rest on each pump's own;
-    static head that falls by `lift_slope` for each metre of level above `lift_reference_m`; `inertia_s2_m2` =
-    length / (g area); air that grows idle and purges running, in each main. Drive: shape of the ramp. Control:
-    levels, delay, rotation, limits, level controller. Electrical: a power that follows the frequency, or the load,
+    Wet well: profile, an overflow weir, inflow that no meter sees. Pumps: see `PumpParameters`. Mains: see
+    `MainParameters`. Drive: shape of the ramp. Control: levels, delay, rotation, limits, level controller.
+    `rated_level_m` is where the rated duties are told. Electrical: a power that follows the frequency, or the load,
     or between the two by `load_share`. Sensors: one a channel.
     """
 
-    profile: Records[ProfilePoint]
+    profile: Records[ProfileSlice]
     overflow_level_m: float
     weir_width_m: float
     unmetered_inflow_m3h: float = 0.0
 
     pumps: tuple[PumpParameters, ...]
 
-    static_head_m: float
-    friction_h2_m5: float
-    is_common_header: bool
-    shared_friction: float = 1.0
-    lift_slope: float = 0.0
-    lift_reference_m: float = 0.0
-    inertia_s2_m2: float = 0.0
-    air_head_m: float = 0.0
-    air_growth_s: float = math.inf
-    air_purge_s: float = math.inf
-    is_air_shared: bool = False
+    mains: tuple[MainParameters, ...]
+    rated_level_m: float
 
     ramp_s: float
     min_frequency_hz: float
@@ -115,10 +138,8 @@ class PlantParameters:
     voltage_v: float
     rated_current_a: float
     power_factor: float
-    pump_efficiency: float
     motor_efficiency: float
     drive_efficiency: float
-    shutoff_power_share: float
     load_share: float
 
     sensors: tuple[SensorParameters, ...]
@@ -143,6 +164,14 @@ class PlantParameters:
         pumps = [changed(pump) if number in {0, i} else pump for i, pump in enumerate(self.pumps, start=1)]
         return replace(self, pumps=tuple(pumps))
 
+    def with_mains(self, changed: Callable[[MainParameters], MainParameters]) -> "PlantParameters":
+        """The same plant with all its mains changed."""
+        return replace(self, mains=tuple(changed(main) for main in self.mains))
+
+    def main_of(self, pump: int) -> MainParameters:
+        """Main of a pump, counted from 0."""
+        return self.mains[self.pumps[pump].main]
+
     def with_sensors(
         self, changed: Callable[[SensorParameters], SensorParameters], quantity: AnalogueQuantity
     ) -> "PlantParameters":
@@ -153,9 +182,13 @@ class PlantParameters:
 
     def records(self) -> "PlantRecords":
         """What compiled code reads, of its own: it may be changed."""
+        mains = np.array([pump.main for pump in self.pumps])
         return PlantRecords(
             station=records_of([self]),
+            mains=records_of(self.mains),
             pumps=records_of(self.pumps),
+            pumps_by_main=np.argsort(mains, kind="stable"),
+            pumps_until=np.cumsum([0, *np.bincount(mains, minlength=len(self.mains))]),
             sensors=records_of(self.sensors),
             profile=self.profile,
             start_levels_m=self.start_levels_m.copy(),
@@ -164,27 +197,32 @@ class PlantParameters:
 
 
 class PlantRecords(NamedTuple):
-    """Parameters of a plant in records; of the station there is one."""
+    """Parameters of a plant in records; of the station there is one.
+
+    Main m has the pumps `pumps_by_main[pumps_until[m]:pumps_until[m + 1]]`, counted from 0.
+    """
 
     station: Records[PlantParameters]
+    mains: Records[MainParameters]
     pumps: Records[PumpParameters]
+    pumps_by_main: Integers
+    pumps_until: Integers
     sensors: Records[SensorParameters]
-    profile: Records[ProfilePoint]
+    profile: Records[ProfileSlice]
     start_levels_m: Floats
     stop_levels_m: Floats
 
 
 def plant_parameters(station: Station) -> PlantParameters:
     """Parameters of a station without its effects."""
-    control, electrical, main = station.control, station.electrical, station.rising_main
+    control, electrical = station.control, station.electrical
     return PlantParameters(
-        profile=profile_of(station.sump.profile or [(0.0, station.sump.area_m2)]),
+        profile=profile_of_slices(station.sump.slices),
         overflow_level_m=math.inf if station.sump.overflow_level_m is None else station.sump.overflow_level_m,
         weir_width_m=station.sump.weir_width_m,
         pumps=_pump_parameters(station),
-        static_head_m=main.static_head_m,
-        friction_h2_m5=main.friction_h2_m5,
-        is_common_header=main.layout == "common",
+        mains=tuple(_main_parameters(main) for main in station.mains),
+        rated_level_m=station.middle_level_m,
         ramp_s=control.ramp_s,
         min_frequency_hz=control.min_frequency_hz,
         dwell_s=control.dwell_s,
@@ -200,36 +238,60 @@ def plant_parameters(station: Station) -> PlantParameters:
         voltage_v=electrical.voltage_v,
         rated_current_a=electrical.rated_current_a,
         power_factor=electrical.power_factor,
-        pump_efficiency=electrical.efficiency,
         motor_efficiency=electrical.motor_efficiency,
         drive_efficiency=electrical.drive_efficiency,
-        shutoff_power_share=electrical.shutoff_power_share,
         load_share=1.0 if electrical.power_model == "load" else 0.0,
         sensors=_sensor_parameters(station.sensors, len(station.pump)),
     )
 
 
-def _pump_parameters(station: Station) -> tuple[PumpParameters, ...]:
-    """Pumps with their rated duty: each alone at nominal speed."""
-    main = station.rising_main
-    c0, c1, c2 = np.array([pump.coefficients for pump in station.pump]).T
-    lift_m = c0 - main.static_head_m
-    flow_m3h = 2.0 * lift_m / (-c1 + np.sqrt(c1**2 + 4.0 * (main.friction_h2_m5 - c2) * lift_m))
-    head_m = np.maximum(c0 + c1 * flow_m3h + c2 * flow_m3h**2, SMALLEST_HEAD_M)
-    return tuple(
-        PumpParameters(
-            c0=pump.coefficients[0],
-            c1=pump.coefficients[1],
-            c2=pump.coefficients[2],
-            nominal_frequency_hz=pump.nominal_frequency_hz,
-            rated_hydraulic_kw=hydraulic_power_kw(rated_m3h, rated_m),
-            rated_flow_m3h=rated_m3h,
-            is_automatic=number not in station.control.out_of_service,
-        )
-        for number, (pump, rated_m3h, rated_m) in enumerate(
-            zip(station.pump, flow_m3h.tolist(), head_m.tolist(), strict=True), start=1
-        )
+def _main_parameters(main: RisingMain) -> MainParameters:
+    return MainParameters(
+        static_head_m=main.lift_at_zero_m,
+        level_slope=main.level_slope,
+        friction_h2_m5=main.friction_h2_m5,
+        is_common_header=main.layout == "common",
     )
+
+
+def _pump_parameters(station: Station) -> tuple[PumpParameters, ...]:
+    """Pumps with their rated duty: each alone at nominal speed, with the wet well at its middle level."""
+    mains = [station.mains[main] for main in station.main_of_pump]
+    static_head_m = np.array([main.static_head_at_m(station.middle_level_m) for main in mains])
+    friction_h2_m5 = np.array([main.friction_h2_m5 for main in mains])
+    c0, c1, c2 = np.array([pump.coefficients for pump in station.pump]).T
+    lift_m = c0 - static_head_m
+    flow_m3h = 2.0 * lift_m / (-c1 + np.sqrt(c1**2 + 4.0 * (friction_h2_m5 - c2) * lift_m))
+    head_m = np.maximum(c0 + c1 * flow_m3h + c2 * flow_m3h**2, SMALLEST_HEAD_M)
+    parameters: list[PumpParameters] = []
+    for i, (rated_m3h, rated_m) in enumerate(zip(flow_m3h.tolist(), head_m.tolist(), strict=True)):
+        pump = station.pump[i]
+        shaft_kw, shutoff_share = _rated_power(pump, station.electrical, rated_m3h, rated_m)
+        parameters.append(
+            PumpParameters(
+                c0=pump.coefficients[0],
+                c1=pump.coefficients[1],
+                c2=pump.coefficients[2],
+                nominal_frequency_hz=pump.nominal_frequency_hz,
+                main=station.main_of_pump[i],
+                rated_flow_m3h=rated_m3h,
+                rated_shaft_kw=shaft_kw,
+                shutoff_power_share=shutoff_share,
+                is_automatic=i + 1 not in station.control.out_of_service,
+            )
+        )
+    return tuple(parameters)
+
+
+def _rated_power(pump: Pump, electrical: Electrical, rated_m3h: float, rated_m: float) -> tuple[float, float]:
+    """Shaft power of a pump at its rated duty, and the share of it at no flow: its own, or that of the station."""
+    points = shaft_points(pump.coefficients, pump.power_points, pump.efficiency_points)
+    share = electrical.shutoff_power_share
+    if not points:
+        return hydraulic_power_kw(rated_m3h, rated_m) / electrical.efficiency, share
+    shutoff_kw, slope_kwh_m3 = power_line(points, share, rated_m3h)
+    rated_kw = shutoff_kw + slope_kwh_m3 * rated_m3h
+    return rated_kw, shutoff_kw / rated_kw
 
 
 def _sensor_parameters(sensors: Sensors, pumps: int) -> tuple[SensorParameters, ...]:

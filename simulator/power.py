@@ -1,8 +1,13 @@
 """Electrical and hydraulic power."""
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from wetwell.protocols.jit import compiled
+
+Points = Sequence[tuple[float, float]]
 
 WATER_DENSITY_KG_M3 = 1000.0
 GRAVITY_M_S2 = 9.81
@@ -74,6 +79,83 @@ def shaft_power_kw(
         * rated_shaft_kw
         * (shutoff_share * speed_ratio + (1.0 - shutoff_share) * flow_m3h / rated_flow_m3h)
     )
+
+
+def shaft_points(
+    curve: tuple[float, float, float],
+    power_points: Points | None,
+    efficiency_points: Points | None,
+) -> Points:
+    r"""Points (flow, shaft power) of a datasheet; of efficiencies $P = \rho g Q H(Q) / \eta$.
+
+    Parameters
+    ----------
+    curve : (c0, c1, c2)
+        At nominal speed. [m, m/(m³/h), m/(m³/h)²]
+    power_points, efficiency_points : sequence of (flow_m3h, power_kw) and (flow_m3h, share), optional
+        At nominal speed, at most one of them. [m³/h, kW; m³/h, 1]
+
+    Returns
+    -------
+    points : sequence of (flow_m3h, power_kw)
+        Empty without any. [m³/h, kW]
+
+    Examples
+    --------
+    >>> [(flow_m3h, round(kw, 2)) for flow_m3h, kw in shaft_points((36.0, 0.0, -2.5e-4), None, [(200.0, 0.8)])]
+    [(200.0, 17.71)]
+    """
+    if power_points is not None:
+        return power_points
+    c0, c1, c2 = curve
+    return [
+        (flow_m3h, hydraulic_power_kw(flow_m3h, c0 + (c1 + c2 * flow_m3h) * flow_m3h) / share)
+        for flow_m3h, share in efficiency_points or ()
+    ]
+
+
+def power_line(points: Points, shutoff_share: float, rated_flow_m3h: float) -> tuple[float, float]:
+    r"""Line of the shaft power over the flow, nearest to points of a datasheet.
+
+    $$P = P_0 + b\, Q, \qquad P_0 \ge 0,\ P_0 + b\, Q_n > 0$$
+
+    Points at one flow only give its size; its shut-off share is then the given one.
+
+    Parameters
+    ----------
+    points : sequence of (flow_m3h, power_kw)
+        At least one. [m³/h, kW]
+    shutoff_share : float
+        Share of the power at the rated flow that is taken at no flow. [1]
+    rated_flow_m3h : float
+        [m³/h]
+
+    Returns
+    -------
+    shutoff_kw, slope_kwh_m3 : float
+        P0 and b. [kW, kWh/m³]
+
+    Examples
+    --------
+    >>> line = power_line([(0.0, 6.0), (100.0, 11.0), (200.0, 16.0)], 0.4, 200.0)
+    >>> round(line[0], 9), round(line[1], 9)
+    (6.0, 0.05)
+    >>> line = power_line([(100.0, 7.0)], 0.4, 200.0)
+    >>> round(line[0], 9), round(line[1], 9)
+    (4.0, 0.03)
+    """
+    flow_m3h, power_kw = np.array(points, dtype=float).T
+    spread = flow_m3h - flow_m3h.mean()
+    if np.any(spread != 0.0):
+        slope_kwh_m3 = float(spread @ power_kw / (spread @ spread))
+        shutoff_kw = float(power_kw.mean() - slope_kwh_m3 * flow_m3h.mean())
+        if shutoff_kw < 0.0:
+            shutoff_kw, slope_kwh_m3 = 0.0, float(flow_m3h @ power_kw / (flow_m3h @ flow_m3h))
+        if shutoff_kw + slope_kwh_m3 * rated_flow_m3h > 0.0:
+            return shutoff_kw, slope_kwh_m3
+    at_flow = shutoff_share + (1.0 - shutoff_share) * float(flow_m3h.mean()) / rated_flow_m3h
+    rated_kw = float(power_kw.mean()) / at_flow
+    return shutoff_share * rated_kw, (1.0 - shutoff_share) * rated_kw / rated_flow_m3h
 
 
 @compiled

@@ -5,7 +5,8 @@ from typing import Annotated
 from pydantic import Field
 
 from wetwell.protocols.messages.message import Stamp
-from wetwell.protocols.station.station_file import NAME_PATTERN, NonNegative, Positive, Table
+from wetwell.protocols.station.station_file import NAME_PATTERN
+from wetwell.protocols.station.table import NonNegative, Positive, Table
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.inflow import Inflow
 from wetwell.simulator.inflow.empirical import EmpiricalInflow

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_ANALOGUES, pump_column
 from wetwell.protocols.recordings.recording import Recording
-from wetwell.protocols.station.station_file import Station, check_levels
+from wetwell.protocols.station.control import check_levels
+from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import Fault
@@ -38,10 +39,12 @@ class Simulation:
     Raises
     ------
     ValueError
-        If a fault names a pump that the station does not have, or an effect of the station is not known or wrong.
+        If a fault names a pump that the station does not have, an effect of the station is not known or wrong, or
+        nobody knows when it starts its pumps.
     """
 
     def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
+        check_driven(station)
         self._effects = effects_of(station)
         for number, fault in enumerate(scenario.fault, start=1):
             if (pump := _pump_of(fault)) > len(station.pump):
@@ -159,6 +162,21 @@ class Simulation:
                 f"truth_pump{i + 1}_power_kw": true.power_kw[i],
             }
         return columns
+
+
+def check_driven(station: Station) -> None:
+    """Refuse a station whose pumps nothing in the simulator may start or stop.
+
+    Raises
+    ------
+    ValueError
+        One line.
+    """
+    if station.control.is_external:
+        raise ValueError(
+            f"station '{station.name}': control.mode: 'external': nobody knows when pumps start: replay a recording "
+            "of the station instead"
+        )
 
 
 def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:

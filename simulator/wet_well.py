@@ -16,43 +16,79 @@ WEIR_COEFFICIENT_M05_S = 1.84
 
 
 @dataclass(frozen=True, slots=True)
-class ProfilePoint:
-    """A point of the profile of the wet well, with the volume under it."""
+class ProfileSlice:
+    """A slice of the wet well: level and area of its foot, growth of the area with height, the volume under it."""
 
     level_m: float
     area_m2: float
+    slope_m: float
     volume_m3: float
 
 
-def profile_of(points: Sequence[tuple[float, float]]) -> Records[ProfilePoint]:
-    """Profile of points (level_m, area_m2), at least one, from the floor up.
+def profile_of(points: Sequence[tuple[float, float]]) -> Records[ProfileSlice]:
+    """Profile of points (level_m, area_m2), at least one, from the floor up; the area is linear between them.
 
     Examples
     --------
     >>> profile_of([(0.0, 2.0), (1.0, 4.0), (2.0, 4.0)])["volume_m3"]
     array([0., 3., 7.])
     """
-    levels_m, areas_m2 = np.array(points, dtype=float).T
-    slices_m3 = 0.5 * (areas_m2[1:] + areas_m2[:-1]) * np.diff(levels_m)
-    volumes_m3 = np.concatenate([[0.0], np.cumsum(slices_m3)])
-    return records_of([ProfilePoint(*point) for point in zip(levels_m, areas_m2, volumes_m3, strict=True)])
+    tops_m2 = [area_m2 for _, area_m2 in [*points[1:], points[-1]]]
+    return profile_of_slices([(*point, top_m2) for point, top_m2 in zip(points, tops_m2, strict=True)])
+
+
+def profile_of_slices(slices: Sequence[tuple[float, float, float]]) -> Records[ProfileSlice]:
+    """Profile of slices (level_m, area_m2 at the foot, area_m2 at the top), from the floor up; the last is endless.
+
+    Examples
+    --------
+    >>> profile_of_slices([(-1.0, 2.0, 2.0), (1.0, 4.0, 4.0)])["volume_m3"]
+    array([0., 4.])
+    """
+    levels_m, areas_m2, tops_m2 = np.array(slices, dtype=float).T
+    heights_m = np.diff(levels_m)
+    slopes_m = np.concatenate([(tops_m2 - areas_m2)[:-1] / heights_m, [0.0]])
+    volumes_m3 = np.concatenate([[0.0], np.cumsum((0.5 * (tops_m2 + areas_m2))[:-1] * heights_m)])
+    return records_of([ProfileSlice(*each) for each in zip(levels_m, areas_m2, slopes_m, volumes_m3, strict=True)])
+
+
+def areas_m2(profile: Records[ProfileSlice], levels_m: Floats) -> tuple[Floats, Floats]:
+    """Areas at the feet and at the tops of the slices between levels; they differ where the walls have a step.
+
+    Parameters
+    ----------
+    profile : records
+    levels_m : (n,) array
+        Rising, with all levels of the profile among them. [m]
+
+    Returns
+    -------
+    feet_m2, tops_m2 : (n,) arrays
+        Above each level, and under the one that follows; the last slice is endless. [m²]
+
+    Examples
+    --------
+    >>> areas_m2(profile_of_slices([(0.0, 2.0, 2.0), (1.0, 4.0, 4.0)]), np.array([0.0, 0.5, 1.0]))
+    (array([2., 2., 4.]), array([2., 2., 4.]))
+    """
+    k = np.searchsorted(profile["level_m"], levels_m, side="right") - 1
+    feet_m2 = profile["area_m2"][k] + profile["slope_m"][k] * (levels_m - profile["level_m"][k])
+    tops_m2 = profile["area_m2"][k] + profile["slope_m"][k] * (
+        np.r_[levels_m[1:], levels_m[-1]] - profile["level_m"][k]
+    )
+    next_m2 = np.r_[feet_m2[1:], feet_m2[-1]]
+    return feet_m2, np.where(np.isclose(tops_m2, next_m2), next_m2, tops_m2)
 
 
 @compiled
-def _slope_m(profile: Records[ProfilePoint], k: int) -> float:
-    """Growth of the area with the height in slice k, in m."""
-    return (profile[k + 1].area_m2 - profile[k].area_m2) / (profile[k + 1].level_m - profile[k].level_m)
-
-
-@compiled
-def level_at_volume_m(volume_m3: float, profile: Records[ProfilePoint]) -> float:
+def level_at_volume_m(volume_m3: float, profile: Records[ProfileSlice]) -> float:
     r"""Level at which the wet well holds a volume.
 
     Within a slice with area $a + s x$ at height x the volume is $a x + s x^2 / 2$, so that
 
     $$x = \frac{2 V}{a + \sqrt{a^2 + 2 s V}}$$
 
-    Above the last point of the profile its area goes on.
+    Above the foot of the last slice its area goes on.
 
     Parameters
     ----------
@@ -75,13 +111,13 @@ def level_at_volume_m(volume_m3: float, profile: Records[ProfilePoint]) -> float
         k -= 1
     rest_m3 = volume_m3 - profile[k].volume_m3
     area_m2 = profile[k].area_m2
-    slope_m = _slope_m(profile, k)
+    slope_m = profile[k].slope_m
     height_m = 2.0 * rest_m3 / (area_m2 + math.sqrt(area_m2**2 + 2.0 * slope_m * rest_m3))
     return profile[k].level_m + height_m
 
 
 @compiled
-def volume_at_level_m3(level_m: float, profile: Records[ProfilePoint]) -> float:
+def volume_at_level_m3(level_m: float, profile: Records[ProfileSlice]) -> float:
     """Volume in the wet well at a level: the inverse of `level_at_volume_m`.
 
     Examples
@@ -98,12 +134,12 @@ def volume_at_level_m3(level_m: float, profile: Records[ProfilePoint]) -> float:
         k -= 1
     height_m = level_m - profile[k].level_m
     area_m2 = profile[k].area_m2
-    slope_m = _slope_m(profile, k)
+    slope_m = profile[k].slope_m
     return profile[k].volume_m3 + height_m * (area_m2 + 0.5 * slope_m * height_m)
 
 
 @compiled
-def overflow_m3h(level_m: float, crest_m: float, width_m: float, profile: Records[ProfilePoint]) -> float:
+def overflow_m3h(level_m: float, crest_m: float, width_m: float, profile: Records[ProfileSlice]) -> float:
     r"""Flow over the overflow weir.
 
     $$Q = C\, b\, h^{3/2}, \qquad h = L - L_\text{crest}$$

@@ -132,8 +132,8 @@ def datasheet_of(station: Station) -> Datasheet:
     return Datasheet(
         curves=tuple(pump.coefficients for pump in station.pump),
         frequencies_hz=tuple(pump.nominal_frequency_hz for pump in station.pump),
-        static_head_m=station.rising_main.static_head_m,
-        friction_h2_m5=station.rising_main.friction_h2_m5,
-        is_common_header=station.rising_main.layout == "common",
-        area_m2=station.sump.area_m2,
+        static_head_m=station.mains[0].lift_at_zero_m,
+        friction_h2_m5=station.mains[0].friction_h2_m5,
+        is_common_header=station.mains[0].layout == "common",
+        area_m2=station.sump.mean_area_m2,
     )

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from wetwell.detector.inference.posterior import FAULT_STATES
 from wetwell.protocols.messages.verdict import State
-from wetwell.protocols.station.station_file import NonNegative, Table
+from wetwell.protocols.station.table import NonNegative, Table
 
 
 class Costs(Table):

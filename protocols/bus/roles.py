@@ -11,7 +11,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from wetwell.protocols.bus.keys import ROOT, tail_key
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.station.station_file import NAME_PATTERN, Table, load_toml
+from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
+from wetwell.protocols.station.table import Table
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Key = Annotated[str, Field(pattern=r"^[^/\s#?]+(/[^/\s#?]+)*$")]

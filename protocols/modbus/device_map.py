@@ -15,7 +15,8 @@ from wetwell.protocols.modbus.device_csv import read_map_csv
 from wetwell.protocols.modbus.device_signal import ByteOrder, Signal, check_signal
 from wetwell.protocols.modbus.registers import MAX_PUMPS
 from wetwell.protocols.quantities import pumps_of
-from wetwell.protocols.station.station_file import NAME_PATTERN, NonNegative, Positive, Table, load_station, load_toml
+from wetwell.protocols.station.station_file import NAME_PATTERN, load_station, load_toml
+from wetwell.protocols.station.table import NonNegative, Positive, Table
 
 
 class Tls(Table):

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_of
-from wetwell.protocols.station.station_file import Finite, Table
+from wetwell.protocols.station.table import Finite, Table
 from wetwell.protocols.units import factor, house_unit
 
 SignalTable = Literal["coil", "discrete", "holding", "input"]

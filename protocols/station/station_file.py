@@ -1,139 +1,21 @@
 """Station file: what the owner of a pump station knows of it, in TOML, checked to the last key."""
 
-import math
 import tomllib
-from functools import cached_property
-from itertools import pairwise
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.station.curve_fit import fit_error_m, fit_pump_curve
+from wetwell.protocols.station.control import DEFAULT_START_LEVELS_M, DEFAULT_STOP_LEVELS_M, Control
+from wetwell.protocols.station.pump import Pump
+from wetwell.protocols.station.rising_main import RisingMain
+from wetwell.protocols.station.sump import Sump
+from wetwell.protocols.station.table import Fraction, NonNegative, Positive, Table
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Fraction = Annotated[float, Field(gt=0, le=1)]
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 """A station's name is a chunk of a Zenoh key and of a file name."""
-
-MAX_MISFIT = 0.1
-"""Root mean square distance of datasheet points from their curve over its shut-off head, at the most."""
-
-
-def check_levels(start_levels_m: tuple[float, ...], stop_levels_m: tuple[float, ...]) -> None:
-    """Refuse start and stop levels that cannot work together.
-
-    Raises
-    ------
-    ValueError
-        If the numbers of levels differ, a level is not finite, a stop level is not under its start level, or levels
-        fall with n.
-    """
-    if len(start_levels_m) != len(stop_levels_m):
-        raise ValueError(
-            f"as many stop_levels_m as start_levels_m are needed, got {len(stop_levels_m)} and {len(start_levels_m)}"
-        )
-    for n, (start_m, stop_m) in enumerate(zip(start_levels_m, stop_levels_m, strict=True), start=1):
-        if not (math.isfinite(start_m) and math.isfinite(stop_m)):
-            raise ValueError(f"start and stop level {n} must be finite, got {start_m:g} and {stop_m:g}")
-        if stop_m >= start_m:
-            raise ValueError(f"stop_levels_m[{n}] = {stop_m:g} must lie under start_levels_m[{n}] = {start_m:g}")
-    if sorted(start_levels_m) != list(start_levels_m) or sorted(stop_levels_m) != list(stop_levels_m):
-        raise ValueError("start_levels_m and stop_levels_m must not fall from one pump to the next")
-
-
-class Table(BaseModel):
-    """Base of the tables of a TOML file: frozen, an unknown key is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Sump(Table):
-    """The wet well: an area, or a profile of points (level, area) with the area linear between them; an overflow."""
-
-    area_m2: Positive
-    profile: tuple[tuple[Finite, Positive], ...] | None = None
-    overflow_level_m: Positive | None = None
-    weir_width_m: Positive = 1.0
-
-    @model_validator(mode="after")
-    def _check_profile(self) -> Self:
-        levels_m = [level_m for level_m, _ in self.profile or ()]
-        if levels_m and (levels_m[0] != 0.0 or any(low >= high for low, high in pairwise(levels_m))):
-            raise ValueError(f"profile: levels must rise from 0, got {levels_m}")
-        if self.profile is not None and not levels_m:
-            raise ValueError("profile: at least one point (level_m, area_m2) is needed")
-        return self
-
-
-class Pump(Table):
-    """One pump: its curve at nominal speed, by coefficients or by datasheet points."""
-
-    curve: tuple[Finite, Finite, Finite] | None = None
-    points: tuple[tuple[NonNegative, Finite], ...] | None = None
-    nominal_frequency_hz: Positive = 50.0
-
-    @model_validator(mode="after")
-    def _check_curve(self) -> Self:
-        if (self.curve is None) == (self.points is None):
-            raise ValueError("give either 'curve' or 'points'")
-        c0, c1, c2 = self.coefficients
-        if c0 <= 0:
-            raise ValueError(f"curve: shut-off head c0 must be positive, got {c0:g} m")
-        if c1 > 0 or c2 > 0 or c1 + c2 == 0:
-            raise ValueError(f"curve: head must fall with flow (c1 <= 0, c2 <= 0), got c1 = {c1:g}, c2 = {c2:g}")
-        misfit_m = fit_error_m(self.points, self.coefficients) if self.points else 0.0
-        if misfit_m > MAX_MISFIT * c0:
-            raise ValueError(
-                f"points: the best falling curve misses them by {misfit_m:.3g} m, more than {MAX_MISFIT:.0%} of its "
-                f"shut-off head of {c0:.3g} m; is a point [flow_m3h, head_m], and does the head fall?"
-            )
-        return self
-
-    @cached_property
-    def coefficients(self) -> tuple[float, float, float]:
-        """(c0, c1, c2) of H = c0 N² + c1 N Q + c2 Q², Q in m³/h."""
-        if self.curve is not None:
-            return self.curve
-        return fit_pump_curve(self.points or ())
-
-
-class RisingMain(Table):
-    """System curve H = static_head_m + friction_h2_m5 Q², Q in m³/h."""
-
-    static_head_m: NonNegative = 2.0
-    friction_h2_m5: NonNegative = 6.0e-4
-    layout: Literal["individual", "common"] = "individual"
-
-
-class Control(Table):
-    """Start and stop by level, with ramps. Fewer levels than pumps: the others stand by in rotation.
-
-    Mode "pid" starts and stops by the same levels, and holds `setpoint_m` by the speed of the running pumps.
-    `max_starts_per_hour` is for each pump, 0 sets no limit; `out_of_service` counts pumps from 1.
-    """
-
-    mode: Literal["on_off", "pid"] = "on_off"
-    start_levels_m: Annotated[tuple[Finite, ...], Field(min_length=1)] = (1.6, 1.8, 2.0)
-    stop_levels_m: Annotated[tuple[Finite, ...], Field(min_length=1)] = (0.5, 0.8, 1.0)
-    ramp_s: Positive = 10.0
-    min_frequency_hz: NonNegative = 0.0
-    dwell_s: NonNegative = 0.0
-    rotation: Literal["round_robin", "fixed", "least_run_time"] = "round_robin"
-    max_starts_per_hour: Annotated[int, Field(ge=0, le=60)] = 0
-    out_of_service: tuple[Annotated[int, Field(ge=1)], ...] = ()
-    setpoint_m: Finite = 1.0
-    gain_hz_m: Positive = 20.0
-    integral_s: Positive = 120.0
-    derivative_s: NonNegative = 0.0
-
-    @model_validator(mode="after")
-    def _check_levels(self) -> Self:
-        check_levels(self.start_levels_m, self.stop_levels_m)
-        return self
 
 
 class Electrical(Table):
@@ -174,12 +56,16 @@ class EffectTable(BaseModel):
 
 
 class Station(Table):
-    """A pump station. Pumps are in rotation order."""
+    """A pump station. Pumps are in rotation order.
+
+    A file has one `[rising_main]` or several `[[main]]`; code asks for `mains`, and for the main of each pump.
+    """
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]
     sump: Sump
     pump: Annotated[tuple[Pump, ...], Field(min_length=1, max_length=32)]
-    rising_main: RisingMain = RisingMain()
+    rising_main: RisingMain | None = None
+    main: Annotated[tuple[RisingMain, ...], Field(min_length=1)] | None = None
     control: Control = Control()
     electrical: Electrical = Electrical()
     sensors: Sensors = Sensors()
@@ -187,16 +73,23 @@ class Station(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _fit_default_levels(cls, data: Any) -> Any:
-        """Without levels in the file, take as many of the default ones as there are pumps."""
-        if not isinstance(data, dict) or not isinstance(data.get("pump"), list | tuple):
+    def _fill_defaults(cls, data: Any) -> Any:
+        """Without a main in the file take the default one; without levels, as many of them as there are pumps."""
+        if not isinstance(data, dict):
             return data
+        if data.get("rising_main") is data.get("main") is None:
+            data = {**data, "rising_main": RisingMain()}
         control = data.get("control", {})
-        if not isinstance(control, dict):
+        if not isinstance(data.get("pump"), list | tuple) or not isinstance(control, dict):
+            return data
+        if control.get("mode") == "external":
             return data
         defaults = {
-            key: Control.model_fields[key].default[: len(data["pump"])]
-            for key in ("start_levels_m", "stop_levels_m")
+            key: levels_m[: len(data["pump"])]
+            for key, levels_m in (
+                ("start_levels_m", DEFAULT_START_LEVELS_M),
+                ("stop_levels_m", DEFAULT_STOP_LEVELS_M),
+            )
             if key not in control
         }
         if len(defaults) == 1 and len(data["pump"]) > 0:
@@ -213,18 +106,104 @@ class Station(Table):
         absent = [number for number in self.control.out_of_service if number > pumps]
         if absent:
             raise ValueError(f"control.out_of_service: got {absent[0]}, there are {pumps} pumps")
+        check_names(self.pump_names, "pump")
+        self._check_mains()
         for number, pump in enumerate(self.pump, start=1):
-            if pump.coefficients[0] <= self.rising_main.static_head_m:
-                raise ValueError(
-                    f"pump[{number}]: shut-off head {pump.coefficients[0]:g} m must exceed "
-                    f"rising_main.static_head_m = {self.rising_main.static_head_m:g} m, or no water flows"
-                )
-            if self.control.min_frequency_hz >= pump.nominal_frequency_hz:
-                raise ValueError(
-                    f"control.min_frequency_hz: got {self.control.min_frequency_hz:g}, must lie under "
-                    f"pump[{number}].nominal_frequency_hz = {pump.nominal_frequency_hz:g}"
-                )
+            self._check_pump(number, pump)
         return self
+
+    def _check_mains(self) -> None:
+        if self.rising_main is not None and self.main is not None:
+            raise ValueError("main: give either [rising_main] or [[main]]")
+        names = [main.name for main in self.main or ()]
+        if None in names:
+            raise ValueError(f"main[{names.index(None) + 1}].name: missing")
+        check_names(names, "main")
+        known = [main.name for main in self.mains if main.name is not None]
+        told = f"there are {', '.join(map(repr, known))}" if known else "no main has a name"
+        for number, pump in enumerate(self.pump, start=1):
+            if pump.main is None and len(self.mains) > 1:
+                raise ValueError(f"pump[{number}].main: missing, {told}")
+            if pump.main is not None and pump.main not in known:
+                raise ValueError(f"pump[{number}].main: got {pump.main!r}, {told}")
+        idle = sorted(set(range(len(self.mains))) - set(self.main_of_pump))
+        if idle:
+            raise ValueError(f"main[{idle[0] + 1}]: no pump has main = {names[idle[0]]!r}")
+
+    def _check_pump(self, number: int, pump: Pump) -> None:
+        main = self.mains[self.main_of_pump[number - 1]]
+        place = "rising_main" if self.main is None else f"main[{self.main_of_pump[number - 1] + 1}]"
+        if pump.coefficients[0] <= main.static_head_at_m(self.middle_level_m):
+            lift = (
+                f"{place}.static_head_m = {main.lift_at_zero_m:g} m"
+                if main.delivery_level_m is None
+                else f"{place}.delivery_level_m = {main.delivery_level_m:g} less a level of {self.middle_level_m:g} m"
+            )
+            raise ValueError(
+                f"pump[{number}]: shut-off head {pump.coefficients[0]:g} m must exceed {lift}, or no water flows"
+            )
+        if self.control.min_frequency_hz >= pump.nominal_frequency_hz:
+            raise ValueError(
+                f"control.min_frequency_hz: got {self.control.min_frequency_hz:g}, must lie under "
+                f"pump[{number}].nominal_frequency_hz = {pump.nominal_frequency_hz:g}"
+            )
+        key = "power_points" if pump.power_points is not None else "efficiency_points"
+        if getattr(pump, key) is not None and self.electrical.power_model != "load":
+            raise ValueError(f"pump[{number}].{key}: electrical.power_model must be 'load', or they mean nothing")
+
+    @property
+    def mains(self) -> tuple[RisingMain, ...]:
+        """Rising mains, at least one."""
+        return self.main or (self.rising_main or RisingMain(),)
+
+    @property
+    def main_of_pump(self) -> tuple[int, ...]:
+        """Place of each pump's main in `mains`, from 0."""
+        places = {main.name: place for place, main in enumerate(self.mains)}
+        return tuple(places.get(pump.main, 0) for pump in self.pump)
+
+    @property
+    def pump_names(self) -> tuple[str, ...]:
+        """What people call the pumps; a number where the file has no name."""
+        return tuple(pump.name or str(number) for number, pump in enumerate(self.pump, start=1))
+
+    @property
+    def middle_level_m(self) -> float:
+        """Level at which rated duties are told: between first stop and start level, or that of the sump. [m]."""
+        if self.control.is_external:
+            return self.sump.middle_level_m
+        return 0.5 * (self.control.start_levels_m[0] + self.control.stop_levels_m[0])
+
+    def with_mains(self, mains: Sequence[RisingMain]) -> Self:
+        """The same station with other values of its mains, as many as before; checked.
+
+        Raises
+        ------
+        ValueError
+            If a rule is broken; also pydantic's.
+        """
+        table = {"rising_main": mains[0]} if self.main is None else {"main": tuple(mains)}
+        return type(self).model_validate(self.model_dump(exclude_none=True) | table)
+
+
+def check_names(names: Sequence[str | None], what: str) -> None:
+    """Refuse two equal names.
+
+    Raises
+    ------
+    ValueError
+        Names both places.
+
+    Examples
+    --------
+    >>> check_names(["1", "1"], "pump")
+    Traceback (most recent call last):
+    ...
+    ValueError: pump[2].name: '1' is that of pump[1] already
+    """
+    for number, name in enumerate(names, start=1):
+        if (first := names.index(name) + 1) < number:
+            raise ValueError(f"{what}[{number}].name: {name!r} is that of {what}[{first}] already")
 
 
 def load_toml(path: Path) -> dict[str, Any]:

@@ -18,7 +18,8 @@ import tomli_w
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
-from wetwell.protocols.station.station_file import Station, Table
+from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.station.table import Table
 from wetwell.services.batch.journal import Journal, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.batch.recordings import write_simulated

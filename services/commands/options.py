@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.station.station_file import Table
+from wetwell.protocols.station.table import Table
 from wetwell.services.runtime.settings import HistorianSettings, Settings, load_settings
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.messages.alarm import Priority, RuleName
 from wetwell.protocols.modbus.registers import WordOrder
 from wetwell.protocols.modbus.write_permission import LOOPBACK_WRITES
-from wetwell.protocols.station.station_file import Finite, NonNegative, Positive, Table, load_toml
+from wetwell.protocols.station.station_file import load_toml
+from wetwell.protocols.station.table import Finite, NonNegative, Positive, Table
 
 Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
 

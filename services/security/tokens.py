@@ -16,7 +16,8 @@ from pydantic import Field, ValidationError
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.station.station_file import NAME_PATTERN, Table, load_toml
+from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
+from wetwell.protocols.station.table import Table
 
 Role = Literal["viewer", "operator"]
 """A viewer may look, an operator may also act. Later ones may all that earlier ones may."""

@@ -40,8 +40,7 @@ def initial_guesses(
             guess["deadband"] = pattern.deadband
         if "quantum_m" in names and pattern.quantum > 0.0:
             guess["quantum_m"] = pattern.quantum
-    control = replay.station.control
-    middle_m = 0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])
+    control, middle_m = replay.station.control, replay.station.middle_level_m
     guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
         guess["rated_factor"] = _rated_factor(replay)
@@ -54,7 +53,11 @@ def initial_guesses(
     if "reference_level_m" in names:
         return [guess | {"reference_level_m": far * middle_m} for far in REFERENCES]
     if "exponent" in names:
-        low_m, high_m = control.stop_levels_m[0], control.start_levels_m[0]
+        if control.is_external:
+            known_m = replay.traces.level_m[np.isfinite(replay.traces.level_m)]
+            low_m, high_m = float(known_m.min(initial=middle_m)), float(known_m.max(initial=middle_m))
+        else:
+            low_m, high_m = control.stop_levels_m[0], control.start_levels_m[0]
         bench = {"exponent": BENCH, "top_factor": 1.0}
         edges_m = [low_m + share * (high_m - low_m) for share in EDGES]
         return [guess, *(guess | bench | {"height_m": edge_m} for edge_m in edges_m)]
@@ -64,7 +67,7 @@ def initial_guesses(
 def _rated_factor(replay: Replay) -> float:
     """Recorded power at nominal speed over that of the load by the configured efficiencies."""
     plant = plant_parameters(replay.station)
-    shaft_kw = float(np.mean([pump.rated_hydraulic_kw for pump in plant.pumps])) / plant.pump_efficiency
+    shaft_kw = float(np.mean([pump.rated_shaft_kw for pump in plant.pumps]))
     loaded_kw = loaded_power_kw(shaft_kw, shaft_kw, plant.motor_efficiency, plant.drive_efficiency)
     is_full = replay.traces.frequency_hz > FULL * plant.nominal_frequency_hz[:, None]
     seen_kw = replay.traces.signals["power_kw"][is_full]

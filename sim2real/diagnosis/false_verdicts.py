@@ -67,9 +67,9 @@ def _datasheet(station: Station) -> Datasheet:
     return replace(
         datasheet_of(station),
         curves=tuple((float(c0), float(c1), float(c2)) for c0, c1, c2 in plant.curves),
-        static_head_m=plant.static_head_m,
-        friction_h2_m5=plant.friction_h2_m5,
-        is_common_header=plant.is_common_header,
+        static_head_m=plant.mains[0].static_head_m,
+        friction_h2_m5=plant.mains[0].friction_h2_m5,
+        is_common_header=plant.mains[0].is_common_header,
     )
 
 

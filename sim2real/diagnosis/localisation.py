@@ -151,8 +151,9 @@ def _hydraulic(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParame
     pump = bins.pump[flow]
     _, c1, c2 = plant.curves[pump].T
     rated_m3h = plant.rated_flow_m3h[pump]
+    friction_h2_m5 = np.array([plant.main_of(i).friction_h2_m5 for i in range(len(plant.pumps))])[pump]
     on_curve = c1 + 2.0 * c2 * rated_m3h
-    on_system = 2.0 * plant.friction_h2_m5 * rated_m3h
+    on_system = 2.0 * friction_h2_m5 * rated_m3h
     scale = bins.deviation[flow] / bins.deviation[head]
     directions: dict[Component, tuple[Floats, Floats]] = {
         "rising_main": (np.ones(flow.size), on_curve * scale),

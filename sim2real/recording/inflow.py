@@ -6,7 +6,7 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.simulator.hydraulics import common_flows, individual_flows
+from wetwell.simulator.duty import duty_flows_m3h
 from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.wet_well import volume_at_level_m3
 
@@ -66,20 +66,11 @@ def pumped_m3h(recording: Recording, station: Station) -> Floats:
     nominal_hz = parameters.nominal_frequency_hz[:, None]
     frequency_hz = np.where(np.isnan(frequency_hz), running * nominal_hz, frequency_hz)
     ratios = np.nan_to_num(frequency_hz / nominal_hz)
-    solve = common_flows if parameters.is_common_header else individual_flows
     distinct, where = np.unique(np.round(ratios, 4), axis=1, return_inverse=True)
     duty_m3h = np.zeros_like(distinct)
     for column in range(distinct.shape[1]):
-        flow_m3h = np.zeros(pumps)
-        solve(
-            parameters.curves,
-            np.ascontiguousarray(distinct[:, column]),
-            parameters.static_head_m,
-            parameters.friction_h2_m5,
-            0.0,
-            flow_m3h,
-        )
-        duty_m3h[:, column] = flow_m3h
+        speed_ratio = np.ascontiguousarray(distinct[:, column])
+        duty_m3h[:, column] = duty_flows_m3h(parameters, speed_ratio, parameters.rated_level_m)
     measured_m3h = recording.of_pumps("flow_m3h", pumps)
     total: Floats = np.where(np.isnan(measured_m3h), duty_m3h[:, where.ravel()], measured_m3h).sum(axis=0)
     return total

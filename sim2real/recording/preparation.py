@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from wetwell.protocols.messages.message import Stamp
 from wetwell.protocols.recordings.recording import Recording
-from wetwell.protocols.station.station_file import Finite, Positive, Table
+from wetwell.protocols.station.table import Finite, Positive, Table
 from wetwell.protocols.timestamps import NS_PER_S
 
 

@@ -85,7 +85,7 @@ def replay_seconds(
         error_m = measured_level_m[second] - expected_m
         followed = min(level_gain * (lost_s + 1), MOST_FOLLOWED)
         if lost_s > LOST_S:
-            now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], 0.0), plant.profile)
+            now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], plant.profile[0].level_m), plant.profile)
             sensed_m = measured_level_m[second]
         else:
             area_m2 = (

@@ -101,11 +101,10 @@ def _check_unit(name: str, ratio: float, units: dict[str, float], than: str) -> 
 
 def _check_level(traces: Traces, station: Station) -> None:
     control = station.control
-    middle_m = 0.5 * (control.start_levels_m[0] + control.stop_levels_m[0])
     level_m = traces.level_m[np.isfinite(traces.level_m)]
-    if level_m.size == 0:
+    if level_m.size == 0 or control.is_external:
         return
-    ratio = float(np.median(level_m)) / middle_m
+    ratio = float(np.median(level_m)) / station.middle_level_m
     for unit, factor in UNITS["level_m"].items():
         if ratio > 0.0 and abs(np.log(ratio / factor)) < 2.0 * NEAR:
             raise ValueError(
@@ -133,7 +132,9 @@ def _inflow_ratio(traces: Traces, station: Station, plain: Prediction) -> float:
         return float("nan")
     level_m = traces.level_m[np.isfinite(traces.level_m)]
     rise_m = float(level_m[-1] - level_m[0]) if level_m.size else 0.0
-    pumped_m3h = float(np.nanmean(flow_m3h, axis=1).sum()) + 3600.0 * station.sump.area_m2 * rise_m / traces.seconds
+    pumped_m3h = (
+        float(np.nanmean(flow_m3h, axis=1).sum()) + 3600.0 * station.sump.mean_area_m2 * rise_m / traces.seconds
+    )
     return float(np.mean(traces.inflow_m3h)) / pumped_m3h if pumped_m3h > 0.0 else float("nan")
 
 
@@ -146,7 +147,7 @@ def _area_ratio(traces: Traces, station: Station, regimes: Regimes) -> float:
     if traces.inflow_m3h is None or pairs.sum() < MIN_IDLE_S:
         return float("nan")
     risen_m = float(np.sum(np.diff(traces.level_m)[pairs]))
-    return float(np.sum(traces.inflow_m3h[1:][pairs])) / 3600.0 / station.sump.area_m2 / max(risen_m, 1e-9)
+    return float(np.sum(traces.inflow_m3h[1:][pairs])) / 3600.0 / station.sump.mean_area_m2 / max(risen_m, 1e-9)
 
 
 def _far_off(
@@ -166,6 +167,8 @@ def _far_off(
         far = [f"{name} is {ratio:.2g} times the expected" for name, ratio in part.items() if _is_far(ratio)]
         off += [" and ".join(far)] if far else []
     control = station.control
+    if control.is_external:
+        return off
     first = [event for event in regimes.events if event.is_start and event.number == 1]
     seen_m = traces.level_m[[event.second for event in first]]
     depth_m = control.start_levels_m[0] - control.stop_levels_m[0]

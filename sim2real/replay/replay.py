@@ -70,7 +70,7 @@ class Replay:
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
         first = traces.level_m[known[:FIRST]]  # a single value may be wrong
-        self._first_level_m = float(np.median(first)) if known.size else _middle_level_m(station)
+        self._first_level_m = float(np.median(first)) if known.size else station.middle_level_m
 
     def run(self, effects: Sequence[Effect] = ()) -> Prediction:
         """Predict under effects.
@@ -104,7 +104,7 @@ class Replay:
         read = tuple((sensor.gain, sensor.offset, sensor.followed, sensor.cutoff) for sensor in plant.sensors)
         delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
         station, profile = np.asarray(records.station).tolist(), np.asarray(records.profile).tolist()
-        key = (station, plant.pumps, profile, read, is_held, delays_s, forces)
+        key = (station, plant.mains, plant.pumps, profile, read, is_held, delays_s, forces)
         for run in self._kept:
             if run.key == key:
                 return run
@@ -116,7 +116,7 @@ class Replay:
             gains = 1.0 / LEVEL_TIME_S, 0.0
         replay_seconds(
             records,
-            first_state(plant, max(self._first_level_m, 0.0)),
+            first_state(plant, max(self._first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
             np.zeros((len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(traces.frequency_hz, -frequency_delay_s)),
@@ -161,7 +161,3 @@ def later(values: Floats, delay_s: float) -> Floats:
 
 def _delay_s(plant: PlantParameters, quantity: AnalogueQuantity) -> float:
     return plant.sensors[channels_of(quantity, len(plant.pumps))[0]].delay_s
-
-
-def _middle_level_m(station: Station) -> float:
-    return 0.5 * (station.control.start_levels_m[0] + station.control.stop_levels_m[0])

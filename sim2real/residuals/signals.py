@@ -188,11 +188,11 @@ def level_residuals(
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
     follow_s = UNKNOWN_INFLOW_TIME_S if traces.inflow_m3h is None else LEVEL_TIME_S
     rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
-    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.area_m2 * follow_s
+    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.mean_area_m2 * follow_s
     flow_m3h = plain.signals["flow_m3h"].sum(axis=0) if "flow_m3h" in plain.signals else np.zeros(regime.size)
     jumps_m3h = np.abs(np.diff(flow_m3h, prepend=flow_m3h[:1])) * _steps(traces, plain)
     forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * follow_s) / follow_s)
-    open_m = np.convolve(jumps_m3h, forgotten)[: regime.size] / 3600.0 / station.sump.area_m2
+    open_m = np.convolve(jumps_m3h, forgotten)[: regime.size] / 3600.0 / station.sump.mean_area_m2
     balance_m = np.hypot(off_m, seconds.means(open_m))
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
     if traces.inflow_m3h is None:  # the observer lags behind an inflow that it does not know

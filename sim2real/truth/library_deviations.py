@@ -49,7 +49,7 @@ def _common_header(truth: Truth, p: Mapping[str, Any]) -> None:
 
 
 def _water_inertia(truth: Truth, p: Mapping[str, Any]) -> None:
-    if truth.station.rising_main.layout == "common":
+    if truth.station.mains[0].layout == "common":
         truth.change(shared_inertance=p["inertia_s2_m2"])
     else:
         truth.change(own_inertance=p["inertia_s2_m2"])
@@ -226,7 +226,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
             "offset_m": rounded(
                 d.head_m * d.over(0.06, 0.2)
                 if d.rng.random() < 0.7
-                else -0.8 * min(d.head_m * d.over(0.06, 0.2), d.station.rising_main.static_head_m)
+                else -0.8 * min(d.head_m * d.over(0.06, 0.2), d.station.mains[0].lift_at_zero_m)
             )
         },
         _static_head_bias,
@@ -280,7 +280,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
         ("level_m",),
         lambda d: {
             "leak_m3h": rounded(
-                d.flow_m3h * d.over(0.03, 0.1) / math.sqrt(max(d.station.rising_main.static_head_m, 0.5))
+                d.flow_m3h * d.over(0.03, 0.1) / math.sqrt(max(d.station.mains[0].lift_at_zero_m, 0.5))
             )
         },
         _check_valve_leak,

@@ -107,7 +107,7 @@ OPEN_KINDS: dict[str, Kind] = {
         "rising_main",
         ("flow_m3h", "head_m"),
         lambda d: {
-            "siphon_m": rounded(d.between(0.5, 0.9) * d.station.rising_main.static_head_m),
+            "siphon_m": rounded(d.between(0.5, 0.9) * d.station.mains[0].lift_at_zero_m),
             "flow_share": d.between(0.5, 0.75),
             "prime_s": d.over(20.0, 80.0),
         },
@@ -118,7 +118,7 @@ OPEN_KINDS: dict[str, Kind] = {
         ("flow_m3h", "head_m"),
         lambda d: {
             "opening_m": rounded(
-                d.between(0.35, 0.7) * (d.station.pump[0].coefficients[0] - d.station.rising_main.static_head_m)
+                d.between(0.35, 0.7) * (d.station.pump[0].coefficients[0] - d.station.mains[0].lift_at_zero_m)
             )
         },
         _sticking_check_valve,

@@ -88,7 +88,7 @@ def inflow_of(station: Station, rng: np.random.Generator) -> TrueInflow:
     """An inflow that one pump carries by and large, with rain that needs a second one."""
     flow_m3h, _ = duty_m3h(station)
     has_more = len(station.pump) > 1
-    most = (1.05 if station.rising_main.layout == "common" else 1.5) if has_more else 0.6
+    most = (1.05 if station.mains[0].layout == "common" else 1.5) if has_more else 0.6
     return TrueInflow(
         mean_m3h=flow_m3h * rng.uniform(0.25, 0.5),
         swing=rng.uniform(0.2, 0.5),

@@ -140,12 +140,16 @@ def spec_of(station: Station) -> Spec:
     ValueError
         If the file asks for what this plant does not have.
     """
-    control, electrical, main = station.control, station.electrical, station.rising_main
+    control, electrical, main = station.control, station.electrical, station.mains[0]
     plain = control.mode == "on_off" and control.rotation == "round_robin" and not control.out_of_service
     if not plain or control.min_frequency_hz > 0 or control.dwell_s > 0 or control.max_starts_per_hour > 0:
         raise ValueError(f"station '{station.name}': the truth plant knows plain on/off control in rotation only")
     if station.sump.profile is not None or station.effect or electrical.power_model != "current":
         raise ValueError(f"station '{station.name}': the truth plant takes no profile, effect or load model")
+    if len(station.mains) > 1 or main.delivery_level_m is not None or station.sump.volume_points is not None:
+        raise ValueError(
+            f"station '{station.name}': the truth plant takes one main, no delivery level and no points of volume"
+        )
     pumps = len(station.pump)
     c0, c1, c2 = np.array([pump.coefficients for pump in station.pump]).T
     is_common = main.layout == "common"
@@ -158,11 +162,11 @@ def spec_of(station: Station) -> Spec:
         ring_leak=np.zeros(pumps),
         rag_limit=np.zeros(pumps),
         rag_half_m3=np.ones(pumps),
-        lift_m=main.static_head_m,
+        lift_m=main.lift_at_zero_m,
         own_loss=0.0 if is_common else loss,
         shared_loss=loss if is_common else 0.0,
         rated_flow=duty_m3h(station)[0] / HOUR_S,
-        area_m2=station.sump.area_m2,
+        area_m2=station.sump.mean_area_m2,
         crest_m=control.start_levels_m[-1] + 3.0,
         ramp_s=control.ramp_s,
         rated_power_w=math.sqrt(3.0) * electrical.voltage_v * electrical.rated_current_a * electrical.power_factor,
@@ -182,12 +186,12 @@ def duty_m3h(station: Station) -> tuple[float, float]:
     (34.0, 26.0)
     """
     c0, c1, c2 = station.pump[0].coefficients
-    main = station.rising_main
+    main = station.mains[0]
     low, high = 0.0, 1.0
-    while c0 + c1 * high + c2 * high**2 > main.static_head_m + main.friction_h2_m5 * high**2:
+    while c0 + c1 * high + c2 * high**2 > main.lift_at_zero_m + main.friction_h2_m5 * high**2:
         high *= 2.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        excess_m = c0 - main.static_head_m + c1 * middle + (c2 - main.friction_h2_m5) * middle**2
+        excess_m = c0 - main.lift_at_zero_m + c1 * middle + (c2 - main.friction_h2_m5) * middle**2
         low, high = (middle, high) if excess_m > 0 else (low, middle)
     return low, c0 + c1 * low + c2 * low**2

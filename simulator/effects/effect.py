@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import Table
+from wetwell.protocols.station.table import Table
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.parameters import PlantParameters
 

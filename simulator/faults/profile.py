@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import STATION_QUANTITIES, SensedQuantity
-from wetwell.protocols.station.station_file import NonNegative, Positive, Table
+from wetwell.protocols.station.table import NonNegative, Positive, Table
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.telemetry.channels import channels_of
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
-from wetwell.protocols.station.station_file import NonNegative, Positive, Table
+from wetwell.protocols.station.table import NonNegative, Positive, Table
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 HOURS = (

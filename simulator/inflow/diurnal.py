@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import Finite, NonNegative, Positive, Table
+from wetwell.protocols.station.table import Finite, NonNegative, Positive, Table
 from wetwell.simulator.inflow.surges import Surges
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import NonNegative, Table
+from wetwell.protocols.station.table import NonNegative, Table
 from wetwell.simulator.inflow.surges import Surges, SurgeStream
 
 PAPER_QUANTILES = ((0.0, 0.0), (0.5, 57.6), (0.95, 115.2), (0.99, 144.0), (1.0, 180.0))

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, PlainSerializer, model_validator
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import Table
+from wetwell.protocols.station.table import Table
 
 
 def _floats(values: Any) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import NonNegative, Table
+from wetwell.protocols.station.table import NonNegative, Table
 
 
 class Surges(Table):

@@ -246,9 +246,9 @@ def test_bad_effects_are_refused_in_one_line(tables, rule, alpha, tmp_path):
 def test_effects_work_on_what_those_before_left(alpha):
     friction, header = EFFECTS["friction_bias"](factor=1.5), EFFECTS["common_header"](shared_fraction=0.7)
     both = effective_parameters(under(alpha, friction, header, friction))
-    assert both.friction_h2_m5 == pytest.approx(6e-4 * 2.25)
-    assert both.is_common_header
-    assert both.shared_friction == 0.7
+    assert both.mains[0].friction_h2_m5 == pytest.approx(6e-4 * 2.25)
+    assert both.mains[0].is_common_header
+    assert both.mains[0].shared_friction == 0.7
     wear = EFFECTS["pump_wear"]
     worn = effective_parameters(under(alpha, wear(head_loss=0.1, pump=2), wear(head_loss=0.5, pump=0)))
     np.testing.assert_allclose(worn.curves[:, 0], 36.0 * np.array([0.5, 0.45, 0.5]))

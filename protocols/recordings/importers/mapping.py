@@ -11,7 +11,8 @@ from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_of
 from wetwell.protocols.recordings.importers.times.time_format import TimeFormat
 from wetwell.protocols.recordings.origin import StoredValue
-from wetwell.protocols.station.station_file import NAME_PATTERN, Finite, Positive, Table, load_toml
+from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
+from wetwell.protocols.station.table import Finite, Positive, Table
 from wetwell.protocols.units import factor, house_unit
 
 Text = Annotated[str, Field(min_length=1)]

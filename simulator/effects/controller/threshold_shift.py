@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.protocols.station.station_file import check_levels
+from wetwell.protocols.station.control import check_levels
 from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters
 

@@ -41,8 +41,7 @@ class LoadDependentPower(Effect):
         if self.share == 0.0:
             return parameters
         return replace(
-            parameters,
+            parameters.with_pumps(lambda pump: replace(pump, shutoff_power_share=self.shutoff_share)),
             load_share=parameters.load_share + (1.0 - parameters.load_share) * self.share,
-            shutoff_power_share=self.shutoff_share,
             motor_efficiency=parameters.motor_efficiency / self.rated_factor,
         )

@@ -44,10 +44,12 @@ class AirPocket(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let air gather."""
-        return replace(
-            parameters,
-            air_head_m=self.head_m,
-            air_growth_s=self.growth_s,
-            air_purge_s=self.purge_s,
-            is_air_shared=self.pocket == "shared",
+        return parameters.with_mains(
+            lambda main: replace(
+                main,
+                air_head_m=self.head_m,
+                air_growth_s=self.growth_s,
+                air_purge_s=self.purge_s,
+                is_air_shared=self.pocket == "shared",
+            )
         )

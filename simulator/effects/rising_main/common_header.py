@@ -12,7 +12,7 @@ class CommonHeader(Effect):
 
     $$H = H_s + \sigma k \Big(\sum_i Q_i\Big)^2 + (1 - \sigma)\, k\, Q_i^2$$
 
-    Its presence is its strength; there is no neutral value.
+    Of several mains each joins its own pumps. Its presence is its strength; there is no neutral value.
 
     Parameters
     ----------
@@ -32,4 +32,6 @@ class CommonHeader(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Join the mains."""
-        return replace(parameters, is_common_header=True, shared_friction=self.shared_fraction)
+        return parameters.with_mains(
+            lambda main: replace(main, is_common_header=True, shared_friction=self.shared_fraction)
+        )

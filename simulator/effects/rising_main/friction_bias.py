@@ -31,4 +31,4 @@ class FrictionBias(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Scale the friction."""
-        return replace(parameters, friction_h2_m5=parameters.friction_h2_m5 * self.factor)
+        return parameters.with_mains(lambda main: replace(main, friction_h2_m5=main.friction_h2_m5 * self.factor))

@@ -12,6 +12,8 @@ class LevelDependentStaticHead(Effect):
 
     $$H_s(L) = H_{s,0} - s\,(L - L_r), \qquad H_s(L) \ge 0$$
 
+    It comes on top of what a configured delivery level does.
+
     Parameters
     ----------
     slope : float
@@ -33,4 +35,6 @@ class LevelDependentStaticHead(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let the lift follow the level."""
-        return replace(parameters, lift_slope=self.slope, lift_reference_m=self.reference_level_m)
+        return parameters.with_mains(
+            lambda main: replace(main, lift_slope=self.slope, lift_reference_m=self.reference_level_m)
+        )

@@ -31,4 +31,4 @@ class StaticHeadBias(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Shift the static head."""
-        return replace(parameters, static_head_m=parameters.static_head_m + self.offset_m)
+        return parameters.with_mains(lambda main: replace(main, static_head_m=main.static_head_m + self.offset_m))

@@ -34,7 +34,9 @@ class WaterInertia(Effect):
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Give the water its inertia."""
-        return replace(parameters, inertia_s2_m2=parameters.inertia_s2_m2 + self.inertia_s2_m2)
+        return parameters.with_mains(
+            lambda main: replace(main, inertia_s2_m2=main.inertia_s2_m2 + self.inertia_s2_m2)
+        )
 
     def is_seen(self, parameters: PlantParameters) -> bool:
         """Whether the time constant I Q / H of a pump at its duty point is a second or more."""

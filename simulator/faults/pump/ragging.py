@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import Positive
+from wetwell.protocols.station.table import Positive
 from wetwell.simulator.faults.profile import PumpFault
 from wetwell.simulator.forcing import Forcing
 

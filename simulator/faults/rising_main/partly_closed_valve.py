@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import Fraction
+from wetwell.protocols.station.table import Fraction
 from wetwell.simulator.faults.profile import SystemFault
 from wetwell.simulator.forcing import Forcing
 

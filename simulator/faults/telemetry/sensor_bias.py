@@ -3,7 +3,7 @@
 from typing import Any, ClassVar, Literal
 
 from wetwell.protocols.arrays import Floats
-from wetwell.protocols.station.station_file import Finite
+from wetwell.protocols.station.table import Finite
 from wetwell.simulator.faults.profile import ChannelFault
 from wetwell.simulator.forcing import Forcing
 

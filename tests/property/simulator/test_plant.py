@@ -5,7 +5,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from wetwell.protocols.station.station_file import Control, EffectTable, Station, Sump
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.station_file import EffectTable, Station
+from wetwell.protocols.station.sump import Sump
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, pump_head_m
@@ -216,7 +218,8 @@ def test_header_balances_and_shares_one_head(pumps, static_head_m, friction_h2_m
     """Each pump meets the header's head, or is behind a closed check valve because it cannot reach it."""
     flow_m3h = np.zeros(len(pumps))
     speed_ratio = np.array([ratio for _, ratio in pumps])
-    common_flows(np.array([c for c, _ in pumps]), speed_ratio, static_head_m, friction_h2_m5, 0.0, flow_m3h)
+    curves = np.array([curve for curve, _ in pumps])
+    common_flows(np.arange(len(pumps)), curves, speed_ratio, static_head_m, friction_h2_m5, 0.0, flow_m3h)
     assert (flow_m3h >= 0).all()
     header_m = static_head_m + friction_h2_m5 * flow_m3h.sum() ** 2
     for (curve, ratio), flow in zip(pumps, flow_m3h, strict=True):

@@ -12,7 +12,8 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq, fsolve
 
-from wetwell.protocols.station.station_file import Control, EffectTable
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.station_file import EffectTable
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.parameters import plant_parameters

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from wetwell.protocols.station.station_file import RisingMain
+from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.simulator.duty import duty_table
-from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, individual_flows, pump_head_m
+from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, individual_flow_m3h, pump_head_m
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw
 
 PAPER_CURVE = (36.0, -0.02333, -1.3333e-4)
@@ -20,9 +20,16 @@ FLAT_CURVE = (30.0, 0.0, -4.0e-4)
 TOLERANCE_M3H = 1e-8
 
 
-def solved(layout, curves, speed_ratio, static_head_m, friction_h2_m5):
+def individual_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
+    pumps = zip(np.array(curves), speed_ratio, strict=True)
+    flows = [individual_flow_m3h(curve, ratio, static_head_m, friction_h2_m5, 0.0, 0.0) for curve, ratio in pumps]
+    return np.array(flows)
+
+
+def header_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
     flow_m3h = np.zeros(len(curves))
-    layout(np.array(curves), np.array(speed_ratio), static_head_m, friction_h2_m5, 0.0, flow_m3h)
+    pumps = np.arange(len(curves))
+    common_flows(pumps, np.array(curves), np.array(speed_ratio), static_head_m, friction_h2_m5, 0.0, flow_m3h)
     return flow_m3h
 
 
@@ -65,17 +72,16 @@ def test_individual_duty_point_against_brentq(curve, speed_ratio, friction_h2_m5
         return 2.0 + friction_h2_m5 * flow_m3h**2
 
     expected = brentq_flow_m3h(curve, speed_ratio, system_head_m)
-    (flow_m3h,) = solved(individual_flows, [curve], [speed_ratio], 2.0, friction_h2_m5)
+    (flow_m3h,) = individual_flows([curve], [speed_ratio], 2.0, friction_h2_m5)
     assert flow_m3h == pytest.approx(expected, abs=TOLERANCE_M3H)
     if flow_m3h > 0:
         assert pump_head_m(*curve, speed_ratio, flow_m3h) == pytest.approx(system_head_m(flow_m3h), abs=1e-9)
 
 
 def test_individual_mains_do_not_know_each_other():
-    together = solved(individual_flows, [PAPER_CURVE, SMALL_CURVE], [1.0, 0.8], 2.0, 6e-4)
+    together = individual_flows([PAPER_CURVE, SMALL_CURVE], [1.0, 0.8], 2.0, 6e-4)
     alone = [
-        solved(individual_flows, [curve], [ratio], 2.0, 6e-4)[0]
-        for curve, ratio in ((PAPER_CURVE, 1.0), (SMALL_CURVE, 0.8))
+        individual_flows([curve], [ratio], 2.0, 6e-4)[0] for curve, ratio in ((PAPER_CURVE, 1.0), (SMALL_CURVE, 0.8))
     ]
     assert together.tolist() == alone
 
@@ -85,7 +91,7 @@ def test_equal_pumps_on_a_header_against_the_closed_form(pumps):
     c0, c1, c2 = PAPER_CURVE
     a, b, c = 6e-4 * pumps**2 - c2, -c1, 2.0 - c0
     each_m3h = (-b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
-    flows = solved(common_flows, [PAPER_CURVE] * pumps, [1.0] * pumps, 2.0, 6e-4)
+    flows = header_flows([PAPER_CURVE] * pumps, [1.0] * pumps, 2.0, 6e-4)
     assert flows == pytest.approx([each_m3h] * pumps, abs=TOLERANCE_M3H)
 
 
@@ -103,13 +109,13 @@ def test_equal_pumps_on_a_header_against_the_closed_form(pumps):
 @pytest.mark.parametrize("friction_h2_m5", [1e-7, 6e-5, 6e-4, 1e-2])
 def test_header_against_brentq(curves, speed_ratio, friction_h2_m5):
     expected = brentq_header(curves, speed_ratio, 2.0, friction_h2_m5)
-    flows = solved(common_flows, curves, speed_ratio, 2.0, friction_h2_m5)
+    flows = header_flows(curves, speed_ratio, 2.0, friction_h2_m5)
     assert flows == pytest.approx(expected, abs=TOLERANCE_M3H)
 
 
-@pytest.mark.parametrize("layout", [individual_flows, common_flows])
+@pytest.mark.parametrize("layout", [individual_flows, header_flows])
 def test_without_friction_every_pump_meets_the_static_head(layout):
-    flows = solved(layout, [FLAT_CURVE, SMALL_CURVE, PAPER_CURVE], [1.0, 0.9, 0.2], 10.0, 0.0)
+    flows = layout([FLAT_CURVE, SMALL_CURVE, PAPER_CURVE], [1.0, 0.9, 0.2], 10.0, 0.0)
     assert flows[0] == pytest.approx(math.sqrt((30.0 - 10.0) / 4e-4), abs=TOLERANCE_M3H)
     expected = brentq_flow_m3h(SMALL_CURVE, 0.9, lambda _: 10.0)
     assert flows[1] == pytest.approx(expected, abs=TOLERANCE_M3H)
@@ -120,17 +126,17 @@ def test_without_friction_every_pump_meets_the_static_head(layout):
 def test_a_weak_pump_stays_behind_its_closed_check_valve(others):
     """At half speed its shut-off head is 9 m, over the static head of 2 m but under the header's head."""
     strong = [PAPER_CURVE] * others
-    flows = solved(common_flows, [PAPER_CURVE, *strong], [0.5, *[1.0] * others], 2.0, 6e-4)
-    alone = solved(common_flows, strong, [1.0] * others, 2.0, 6e-4)
+    flows = header_flows([PAPER_CURVE, *strong], [0.5, *[1.0] * others], 2.0, 6e-4)
+    alone = header_flows(strong, [1.0] * others, 2.0, 6e-4)
     header_head_m = 2.0 + 6e-4 * alone.sum() ** 2
     assert 2.0 < 36.0 * 0.5**2 < header_head_m
     assert flows[0] == 0.0
     assert flows[1:] == pytest.approx(alone, abs=TOLERANCE_M3H)
 
 
-@pytest.mark.parametrize("layout", [individual_flows, common_flows])
+@pytest.mark.parametrize("layout", [individual_flows, header_flows])
 def test_standing_pumps_and_pumps_under_the_static_head_give_nothing(layout):
-    flows = solved(layout, [PAPER_CURVE, PAPER_CURVE], [0.0, math.sqrt(2.0 / 36.0)], 2.0, 6e-4)
+    flows = layout([PAPER_CURVE, PAPER_CURVE], [0.0, math.sqrt(2.0 / 36.0)], 2.0, 6e-4)
     assert flows.tolist() == [0.0, 0.0]
 
 
@@ -142,8 +148,8 @@ def test_a_backward_flow_is_never_given():
 
 def test_paper_duty_points():
     """ERRATA of the paper: with these coefficients its printed duty points come out, to the digits printed."""
-    (clogged,) = solved(individual_flows, [PAPER_CURVE], [1.0], 2.0, 6e-4)
-    (clean,) = solved(individual_flows, [PAPER_CURVE], [1.0], 2.0, 3e-4)
+    (clogged,) = individual_flows([PAPER_CURVE], [1.0], 2.0, 6e-4)
+    (clean,) = individual_flows([PAPER_CURVE], [1.0], 2.0, 3e-4)
     assert clogged == pytest.approx(200.0, abs=0.05)
     assert pump_head_m(*PAPER_CURVE, 1.0, clogged) == pytest.approx(26.0, abs=0.05)
     assert hydraulic_power_kw(clogged, pump_head_m(*PAPER_CURVE, 1.0, clogged)) == pytest.approx(14.2, abs=0.05)

@@ -15,7 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from wetwell.protocols.station.station_file import RisingMain
+from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation

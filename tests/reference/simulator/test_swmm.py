@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wetwell.protocols.station.station_file import Control, EffectTable
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.station_file import EffectTable
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation

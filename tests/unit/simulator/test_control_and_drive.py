@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.protocols.station.station_file import Control
+from wetwell.protocols.station.control import Control
 from wetwell.simulator.control.drive import next_frequency_hz
 from wetwell.simulator.control.rules import NOTHING, next_in_rotation, wanted_change
 from wetwell.simulator.inflow.recorded import RecordedInflow

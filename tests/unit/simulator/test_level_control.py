@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from wetwell.protocols.station.station_file import Control, Sump
+from wetwell.protocols.station.control import Control
+from wetwell.protocols.station.sump import Sump
 from wetwell.simulator.control.rules import controlled_frequency_hz
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.recorded import RecordedInflow

@@ -8,19 +8,26 @@ import pytest
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.records import NUMBERS, records_of
 from wetwell.simulator.state import ChannelState, PumpState, StationState
-from wetwell.simulator.wet_well import ProfilePoint
+from wetwell.simulator.wet_well import ProfileSlice
 
-OTHERWISE = {"profile", "pumps", "start_levels_m", "stop_levels_m", "sensors"}
+OTHERWISE = {"profile", "mains", "pumps", "start_levels_m", "stop_levels_m", "sensors"}
 """Fields of the parameters that the kernel gets as arrays of their own."""
 
 
 def kinds(station):
     parameters = effective_parameters(station)
     states = (StationState(), PumpState(), ChannelState())
-    return [parameters, parameters.pumps[0], parameters.sensors[0], ProfilePoint(1.0, 2.0, 3.0), *states]
+    return [
+        parameters,
+        parameters.mains[0],
+        parameters.pumps[0],
+        parameters.sensors[0],
+        ProfileSlice(1.0, 2.0, 0.5, 3.0),
+        *states,
+    ]
 
 
-@pytest.mark.parametrize("number", range(7))
+@pytest.mark.parametrize("number", range(8))
 def test_every_field_is_in_the_record(alpha, number):
     thing = kinds(alpha)[number]
     record = np.asarray(records_of([thing]))

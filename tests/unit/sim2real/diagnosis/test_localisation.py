@@ -45,7 +45,7 @@ def test_a_speed_that_swings_within_a_run_is_the_drive(alpha, period_s, componen
     bins = bins_of([FLOW, HEAD], STEADY)
     swing = 10.0 * np.sin(2.0 * np.pi * bins.second / period_s)
     plant = plant_parameters(alpha)
-    along = 2.0 * plant.friction_h2_m5 * float(plant.rated_flow_m3h[0]) / HEAD_DEVIATION
+    along = 2.0 * plant.mains[0].friction_h2_m5 * float(plant.rated_flow_m3h[0]) / HEAD_DEVIATION
     assert blamed(np.where(bins.signal == FLOW, swing, along * swing), bins, alpha) == component
 
 
