@@ -14,7 +14,8 @@ from wetwell.protocols.recordings.recording import Recording, read_recording, wr
 from wetwell.protocols.station.station_file import Station, load_toml
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.validation_page import validation_page
-from wetwell.sim2real.calibration.calibration import calibrate, with_estimates
+from wetwell.sim2real.calibration.calibration import calibrate
+from wetwell.sim2real.calibration.fitted_station import with_estimates
 from wetwell.sim2real.calibration.validation import validate
 from wetwell.sim2real.recording.preparation import Preparation, PreparationReport, prepare
 

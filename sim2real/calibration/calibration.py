@@ -6,6 +6,7 @@ from wetwell.protocols.arrays import Flags
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.calibration.estimates import Estimate
+from wetwell.sim2real.calibration.fitted_station import possible_estimates
 from wetwell.sim2real.calibration.main_estimates import main_estimates
 from wetwell.sim2real.calibration.power_estimates import power_estimates
 from wetwell.sim2real.calibration.steady import running_of, steady_duties
@@ -36,9 +37,7 @@ def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple
     if np.any(np.diff(recording.time_ns) <= 0):
         raise ValueError("times must rise: prepare the recording first")
     if recording.pumps > len(station.pump):
-        raise ValueError(
-            f"the recording has {recording.pumps} pumps, station '{station.name}' {len(station.pump)}"
-        )
+        raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {len(station.pump)}")
     rng = np.random.default_rng(seed)
     running = running_of(recording, station)
     estimates: list[Estimate] = []
@@ -46,11 +45,10 @@ def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple
     for main in range(len(station.mains)):
         pumps: Flags = np.array(station.main_of_pump) == main
         duties = steady_duties(recording, station, running, pumps)
-        fit = main_estimates(duties, station, main)
-        estimates += fit
+        estimates += main_estimates(duties, station, main)
         power += power_estimates(duties, station, main)
     estimates += power
     estimates.append(area_estimate(recording, station, running, rng))
     estimates += level_estimates(recording, station, running, rng)
     estimates.append(ramp_estimate(recording, station, running, rng))
-    return tuple(estimates)
+    return tuple(possible_estimates(station, estimates))

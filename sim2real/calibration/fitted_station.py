@@ -39,7 +39,12 @@ def with_estimates(station: Station, estimates: Iterable[Estimate]) -> Station:
         else:
             table[place[-1]] = value
     for i in range(len(station.pump)):
-        _change_pump(tree["pump"][i], station, i, {place[2]: value for place, value in told.items() if place[:2] == ("pump", i)})
+        _change_pump(
+            tree["pump"][i],
+            station,
+            i,
+            {place[2]: value for place, value in told.items() if place[:2] == ("pump", i)},
+        )
     try:
         return Station.model_validate(tree)
     except ValidationError as error:

@@ -54,14 +54,14 @@ def main_estimates(duties: SteadyDuties, station: Station, main: int) -> list[Es
     seen = max((int(witness.run.max()) + 1 for witness in witnesses), default=0)
     if seen < MIN_RUNS:
         reason = f"{seen} runs with steady speed and flow or head, at least {MIN_RUNS} are needed"
-        return [one.kept(reason) for one in _parameters(station, main, members, prior.mean, prior.sd)]
+        kept = [one.kept(reason) for one in _parameters(station, main, members, prior.mean, prior.sd)]
+        return _by_pump(kept, len(members))
     fit = fit_main(model, witnesses, prior)
     own = [sum(int(np.unique(w.run[w.pump == k]).size) for w in witnesses[:1]) for k in range(len(members))]
     estimates = [
-        _judged(one, fit, k, own)
-        for k, one in enumerate(_parameters(station, main, members, prior.mean, prior.sd))
+        _judged(one, fit, k, own) for k, one in enumerate(_parameters(station, main, members, prior.mean, prior.sd))
     ]
-    return estimates + _duty_heads(model, fit, station, main, members, duties.flow_m3h[known])
+    return _by_pump(estimates, len(members)) + _duty_heads(model, fit, station, main, members, duties.flow_m3h[known])
 
 
 def _parameters(station: Station, main: int, members: list[int], mean: Floats, sd: Floats) -> list[Estimate]:
@@ -71,9 +71,7 @@ def _parameters(station: Station, main: int, members: list[int], mean: Floats, s
     name = main_name(station, main)
     lift = "static_head_m" if table.delivery_level_m is None else "delivery_level_m"
     scales = [
-        Estimate(
-            name=f"pump[{i + 1}].{key}", unit="", value=1.0, place=("pump", i, key), prior=(1.0, float(sd[k]))
-        )
+        Estimate(name=f"pump[{i + 1}].{key}", unit="", value=1.0, place=("pump", i, key), prior=(1.0, float(sd[k])))
         for key, first in (("head_scale", 0), ("flow_scale", len(members)))
         for k, i in enumerate(members, start=first)
     ]
@@ -96,6 +94,11 @@ def _parameters(station: Station, main: int, members: list[int], mean: Floats, s
     ]
 
 
+def _by_pump(estimates: list[Estimate], pumps: int) -> list[Estimate]:
+    """Estimates in the order of the fit, put into that of the pumps."""
+    return [estimates[k] for pump in range(pumps) for k in (pump, pumps + pump)] + estimates[2 * pumps :]
+
+
 def main_name(station: Station, main: int) -> str:
     """Name of a main's table in the station file."""
     return "rising_main" if station.main is None else f"main[{main + 1}]"
@@ -109,11 +112,17 @@ def _judged(parameter: Estimate, fit: Posterior, k: int, own: list[int]) -> Esti
     if not fit.is_told[k]:
         if is_scale and own[k % pumps] == 0:
             return parameter.kept("never seen in steady running, and its sisters say too little")
-        what = "the duties seen do not tell head from flow" if is_scale else "lift, friction and curves cannot be told apart"
+        what = (
+            "the duties seen do not tell head from flow"
+            if is_scale
+            else "lift, friction and curves cannot be told apart"
+        )
         return parameter.kept(f"{what}: ±{sd:.2g} after the recording, ±{before:.2g} before")
     lowest = 0.0 if parameter.name.endswith("friction_h2_m5") else -np.inf
     value = parameter.value + float(fit.value[k]) if parameter.unit == "m" else float(fit.value[k])
-    reason = "never seen in steady running: as the pumps with its datasheet" if is_scale and own[k % pumps] == 0 else ""
+    reason = (
+        "never seen in steady running: as the pumps with its datasheet" if is_scale and own[k % pumps] == 0 else ""
+    )
     return parameter.told(value, sd, lowest=lowest, reason=reason)
 
 

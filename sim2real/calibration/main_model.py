@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled
-from wetwell.simulator.hydraulics import common_flows, individual_flows
+from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h
 
 SHIFT, FRICTION = -2, -1
 """Places of the shift of the lift and of the friction in the parameters of a main; before them the pumps' scales."""
@@ -53,7 +53,8 @@ class MainModel:
         curves = np.ascontiguousarray(self.changed_curves(parameters))
         flow_m3h = np.zeros_like(self.speed_ratio)
         lift_m = self.lift_m + parameters[SHIFT]
-        _solve(curves, self.speed_ratio, lift_m, float(parameters[FRICTION]), self.is_common, flow_m3h)
+        pumps = np.arange(self.pumps)
+        _solve(pumps, curves, self.speed_ratio, lift_m, float(parameters[FRICTION]), self.is_common, flow_m3h)
         speed = self.speed_ratio
         head_m = curves[:, 0] * speed**2 + curves[:, 1] * speed * flow_m3h + curves[:, 2] * flow_m3h**2
         return flow_m3h, np.where(flow_m3h > 0.0, head_m, 0.0)
@@ -98,6 +99,7 @@ class MainModel:
 
 @compiled
 def _solve(
+    pumps: Integers,
     curves: Floats,
     speed_ratio: Floats,
     lift_m: Floats,
@@ -108,6 +110,9 @@ def _solve(
     """Set the (n, pumps) duty flows of each point."""
     for point in range(lift_m.size):
         if is_common:
-            common_flows(curves, speed_ratio[point], lift_m[point], friction_h2_m5, 0.0, flow_m3h[point])
-        else:
-            individual_flows(curves, speed_ratio[point], lift_m[point], friction_h2_m5, 0.0, flow_m3h[point])
+            common_flows(pumps, curves, speed_ratio[point], lift_m[point], friction_h2_m5, 0.0, flow_m3h[point])
+            continue
+        for i in range(pumps.size):
+            flow_m3h[point, i] = individual_flow_m3h(
+                curves[i], speed_ratio[point, i], lift_m[point], friction_h2_m5, 0.0, 0.0
+            )

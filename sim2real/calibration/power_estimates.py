@@ -67,7 +67,9 @@ def power_estimates(duties: SteadyDuties, station: Station, main: int) -> list[E
             told = parameter.kept(f"±{fit.sd[k]:.2g} after the recording, ±{fit.prior.sd[k]:.2g} before")
         elif not is_seen[k % len(members)]:
             told = parameter.told(
-                float(fit.value[k]), float(fit.sd[k]), reason="never seen in steady running: as the pumps with its datasheet"
+                float(fit.value[k]),
+                float(fit.sd[k]),
+                reason="never seen in steady running: as the pumps with its datasheet",
             )
         estimates.append(told)
     return estimates

@@ -70,9 +70,7 @@ def regularised_fit(errors: Errors, runs: Sequence[Integers], prior: Prior) -> P
     is_told = np.sqrt(np.diag(covariance)) < TOLD * prior.sd
     if is_told.any() and not is_told.all():
         value, _ = _settled(errors, runs, prior, is_told)
-    return Posterior(
-        value=np.where(is_told, value, prior.mean), covariance=covariance, prior=prior, is_told=is_told
-    )
+    return Posterior(value=np.where(is_told, value, prior.mean), covariance=covariance, prior=prior, is_told=is_told)
 
 
 def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags) -> tuple[Floats, Floats]:

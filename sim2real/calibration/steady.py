@@ -146,7 +146,9 @@ def steady_duties(recording: Recording, station: Station, running: Running, pump
 
     def of_pumps(quantity: str) -> Floats:
         values = recording.of_pumps(quantity, count)[pumps]
-        means = np.array([mean(np.where(on & (value > 0.0), value, np.nan)) for value, on in zip(values, some, strict=True)])
+        means = np.array(
+            [mean(np.where(on & (value > 0.0), value, np.nan)) for value, on in zip(values, some, strict=True)]
+        )
         return means.T
 
     return SteadyDuties(

@@ -6,7 +6,8 @@ import pytest
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_scenario
-from wetwell.sim2real.calibration.calibration import calibrate, with_estimates
+from wetwell.sim2real.calibration.calibration import calibrate
+from wetwell.sim2real.calibration.fitted_station import with_estimates
 from wetwell.simulator.simulation import Simulation
 
 SEEDS = range(12)
