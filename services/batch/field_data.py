@@ -77,8 +77,10 @@ def calibrate_file(station: Station, recording: Path, preparation: Path | None, 
                 "value": float(f"{estimate.value:.6g}"),
                 "low": None if estimate.interval is None else float(f"{estimate.interval[0]:.6g}"),
                 "high": None if estimate.interval is None else float(f"{estimate.interval[1]:.6g}"),
+                "prior": None if estimate.prior is None else float(f"{estimate.prior[0]:.6g}"),
+                "prior_sd": None if estimate.prior is None else float(f"{estimate.prior[1]:.3g}"),
                 "unit": estimate.unit,
-                "kept_because": estimate.reason,
+                "reason": estimate.reason,
             }
             for estimate in estimates
         ],

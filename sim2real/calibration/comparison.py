@@ -80,7 +80,7 @@ class Comparison:
             if quantity == "head_m" or len(members) < 2:
                 continue
             several = list(members)
-            steady = self.is_steady[several].any(axis=0)
+            steady: Flags = np.any(self.is_steady[several], axis=0)
             rows.append(_errors(name, quantity, told[several].sum(axis=0), measured[several].sum(axis=0), steady))
         return rows
 
@@ -197,7 +197,7 @@ def _signals(parameters: PlantParameters, speed: Floats, level_m: Floats) -> dic
 def _power_kw(parameters: PlantParameters, speed: Floats, flow_m3h: Floats) -> Floats:
     """(pumps, n) input power, by frequency and load as the plant has it."""
     full_kw = np.sqrt(3.0) * parameters.voltage_v * parameters.rated_current_a * parameters.power_factor / 1000.0
-    power_kw = (1.0 - parameters.load_share) * full_kw * np.minimum(speed, INRUSH_LIMIT)
+    power_kw: Floats = (1.0 - parameters.load_share) * full_kw * np.minimum(speed, INRUSH_LIMIT)
     if parameters.load_share > 0.0:
         lines = PowerLines(
             rated_flow_m3h=np.array([pump.rated_flow_m3h for pump in parameters.pumps]),
@@ -208,8 +208,8 @@ def _power_kw(parameters: PlantParameters, speed: Floats, flow_m3h: Floats) -> F
         for i, own in enumerate(speed):
             turning = own > 0.0
             rows = np.full(int(turning.sum()), i)
-            power_kw[i, turning] += parameters.load_share * (
-                lines.design(rows, own[turning], flow_m3h[i, turning])[:, i]
+            power_kw[i, turning] += (
+                parameters.load_share * (lines.design(rows, own[turning], flow_m3h[i, turning])[:, i])
             )
     return power_kw
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Integers
 
 RESAMPLES = 200
 CONFIDENCE = 0.95

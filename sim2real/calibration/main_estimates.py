@@ -138,7 +138,7 @@ def _duty_heads(
         seen = seen[np.isfinite(seen)]
         if seen.size == 0:
             continue
-        usual_m3h = float(np.median(seen))
+        usual_m3h = float(f"{np.median(seen):.4g}")
         c0, c1, c2 = curves[k]
         head_m = float(c0 + (c1 + c2 * usual_m3h) * usual_m3h)
         slopes = np.zeros(len(free))
@@ -156,7 +156,7 @@ def _main_duty(model: MainModel, fit: Posterior, station: Station, main: int, fl
     loaded_m3h = loaded_m3h[loaded_m3h > 0.0]
     if loaded_m3h.size == 0:
         return []
-    usual_m3h, lift_m = float(np.median(loaded_m3h)), float(np.median(model.lift_m))
+    usual_m3h, lift_m = float(f"{np.median(loaded_m3h):.4g}"), float(f"{np.median(model.lift_m):.4g}")
     head_m = lift_m + float(fit.value[SHIFT]) + float(fit.value[FRICTION]) * usual_m3h**2
     slopes = np.array([1.0, usual_m3h**2])
     places: Integers = np.array([SHIFT, FRICTION]) + fit.value.size

@@ -14,7 +14,7 @@ from wetwell.simulator.power import STANDING_LOSS_SHARE
 class PowerLines:
     r"""Input power of pumps whose lines of shaft power differ from those of the datasheets in size and slope.
 
-    $$P = \frac{N^3 P_n \left(c_i \left(s + (1 - s) x\right) + d_i (x - 1)\right) + 0.02\, c_i P_n}{1.02\, \eta_m \eta_d},
+    $$P = P_n \frac{N^3 \left(c_i \left(s + (1 - s) x\right) + d_i (x - 1)\right) + 0.02\, c_i}{1.02\, \eta_m \eta_d},
     \qquad x = \frac{Q}{N Q_n}$$
 
     Parameters are (2 pumps,): c of each pump, d of each pump.
@@ -45,7 +45,7 @@ class PowerLines:
         return design
 
     def points(self, parameters: Floats, pump: int) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Two points (flow, shaft power) at nominal speed of a changed line: half the rated flow, and it. [m³/h, kW]."""
+        """Two points (flow, shaft power) of a changed line at nominal speed, at half the rated flow and at it."""
         scale, slope = parameters[pump], parameters[self.rated_flow_m3h.size + pump]
         share, rated_kw = self.shutoff_share[pump], self.rated_shaft_kw[pump]
         rated_m3h = float(self.rated_flow_m3h[pump])

@@ -42,8 +42,8 @@ class RunNoise:
     def of_errors(cls, error: Floats, run: Integers, parameters: float = 0.0) -> "RunNoise":
         r"""Noise of errors, by medians.
 
-        A value in a run of n counts for $1 / (1 + (n - 1) \rho)$ of one that is alone, the design effect of samples in
-        clusters [1]_.
+        A value in a run of n counts for $1 / (1 + (n - 1) \rho)$ of one that is alone, the design effect of samples
+        in clusters [1]_.
 
         Parameters
         ----------
