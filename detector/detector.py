@@ -46,7 +46,7 @@ class Detector:
         self._datasheet = datasheet
         self._runs = RunTracker(datasheet)
         self._live = LiveBlock(datasheet.pumps)
-        self._system = SystemPrior()
+        self._systems = [SystemPrior() for _ in datasheet.mains]
         self._judges = [PumpJudge(pump, datasheet, costs or Costs()) for pump in range(datasheet.pumps)]
 
     @property
@@ -95,7 +95,7 @@ class Detector:
     def snapshot(self) -> bytes:
         """The whole state, from which `restore` goes on bit for bit."""
         memories = [judge.memory for judge in self._judges]
-        return encode_snapshot(self._station, self._datasheet, self._runs.state.remembered(), self._system, memories)
+        return encode_snapshot(self._station, self._datasheet, self._runs.state.remembered(), self._systems, memories)
 
     def restore(self, data: bytes) -> None:
         """Go on from a snapshot of the same station.
@@ -105,9 +105,9 @@ class Detector:
         SnapshotError
             If it is damaged, of another format or station; this detector is left as it was.
         """
-        arrays, system, memories = decode_snapshot(data, self._station, self._datasheet)
+        arrays, systems, memories = decode_snapshot(data, self._station, self._datasheet)
         self._runs.restore(arrays)
-        self._system = system
+        self._systems = systems
         for judge, memory in zip(self._judges, memories, strict=True):
             judge.memory = memory
 
@@ -115,7 +115,7 @@ class Detector:
         """Learn a pump (from 0) anew; what was learnt before is put aside and can be taken back."""
         self._judges[pump].memory.rebaseline(self._runs.seen_s)
         self._runs.begin_anew(pump, is_learning=True)
-        self._system = SystemPrior()
+        self._systems[self._datasheet.main_of_pump[pump]] = SystemPrior()
         return self._told(pump, now_ns, "re-baselined by an operator")
 
     def revert(self, pump: int, now_ns: int) -> Verdict:
@@ -139,7 +139,7 @@ class Detector:
 
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         judge = self._judges[run.pump]
-        judgement = judge.judge(run, time_ns, self._system, [each.memory for each in self._judges])
+        judgement = judge.judge(run, time_ns, self._system(run.pump), [each.memory for each in self._judges])
         self._runs.set_learning(run.pump, is_learning=judge.memory.reference is None)
         return self._verdict(run.pump, time_ns, judgement)
 
@@ -151,7 +151,7 @@ class Detector:
         segments = judge.segments_since_change(self._runs.last_segment(pump))
         if not segments:
             return None
-        judgement = judge.look_early(self._runs.last_segments(pump, segments), self._system)
+        judgement = judge.look_early(self._runs.last_segments(pump, segments), self._system(pump))
         return None if judgement is None else self._verdict(pump, now_ns, judgement)
 
     def _watch_missing(self, pump: int, now_ns: int) -> Verdict | None:
@@ -160,11 +160,17 @@ class Detector:
         judgement = self._judges[pump].watch_missing(gathered, lacking, now_ns)
         return None if judgement is None else self._verdict(pump, now_ns, judgement)
 
+    def _system(self, pump: int) -> SystemPrior:
+        """Prior of the main of a pump."""
+        return self._systems[self._datasheet.main_of_pump[pump]]
+
     def _told(self, pump: int, time_ns: int, reason: str) -> Verdict:
         return self._verdict(pump, time_ns, self._judges[pump].tell(time_ns, reason))
 
     def _verdict(self, pump: int, time_ns: int, judgement: Judgement) -> Verdict:
-        """The verdict with what the last samples show by themselves."""
+        """The verdict with what the last samples show by themselves, and the main where there are several."""
+        if len(self._datasheet.mains) > 1:
+            judgement.evidence["main"] = self._datasheet.main_of(pump).name
         tests = self._runs.rolling_tests(pump)
         if tests is not None:
             judgement.evidence["rolling_f_test"] = rolling_evidence(tests, self._runs.strongest_log_p(pump))

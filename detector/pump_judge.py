@@ -67,6 +67,7 @@ class PumpJudge:
         self._pump = pump
         self._datasheet = datasheet
         self._curve = datasheet.curves[pump]
+        self._friction_h2_m5 = datasheet.main_of(pump).friction_h2_m5
         self._costs = costs
 
     def tell(self, time_ns: int, reason: str) -> Judgement:
@@ -180,7 +181,7 @@ class PumpJudge:
         return self._judgement(run.window_ns, {"sensor_fault": 1.0}, evidence)
 
     def _learn(self, run: Run, learning: Learning, time_ns: int, station: Sequence[PumpMemory]) -> None:
-        baseline = self.memory.learn(learning, run, self._curve, self._datasheet.friction_h2_m5)
+        baseline = self.memory.learn(learning, run, self._curve, self._friction_h2_m5)
         if baseline is None:
             return
         rejection = sibling_rejection(self._pump, [pump.offset_m for pump in station], self._datasheet.curves)
@@ -223,7 +224,7 @@ class PumpJudge:
         self, run: Run, reference: HealthyReference, system: SystemPrior, evidence: dict[str, Any]
     ) -> Posterior:
         """Probability of each cause; what it rests on becomes part of the evidence."""
-        observation = observe(run, reference, self._curve, self._datasheet.friction_h2_m5)
+        observation = observe(run, reference, self._curve, self._friction_h2_m5)
         evidence |= shift_evidence(observation)
         evidence["baseline"] = reference.version
         scales = fault_scales(self._datasheet, self._pump, reference.baseline)
@@ -240,7 +241,7 @@ class PumpJudge:
     ) -> dict[str, Any]:
         """Severity, advice and expected costs."""
         flow_m3h = float(median(run.segments.flow_m3h))
-        friction_m = self._datasheet.friction_h2_m5 * float(median(run.segments.total_m3h)) ** 2
+        friction_m = self._friction_h2_m5 * float(median(run.segments.total_m3h)) ** 2
         healthy_m3h = reference.baseline.explained_flows(run.segments)[0]
         power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
         run_share = run.run_s / max(run.seen_s, 1.0)

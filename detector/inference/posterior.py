@@ -130,7 +130,7 @@ def fault_scales(datasheet: Datasheet, pump: int, baseline: Baseline) -> Scales:
     shutoff_m = datasheet.curves[pump][0]
     return Scales(
         pump_m=PUMP_SHIFT_SHARE * shutoff_m,
-        system_m=SYSTEM_SHIFT_SHARE * datasheet.friction_h2_m5 * baseline.total_m3h**2 + SYSTEM_SHIFT_M,
+        system_m=SYSTEM_SHIFT_SHARE * datasheet.main_of(pump).friction_h2_m5 * baseline.total_m3h**2 + SYSTEM_SHIFT_M,
         head_m=HEAD_SENSOR_SHARE * shutoff_m,
     )
 

@@ -68,12 +68,16 @@ def encode_snapshot(
     station: str,
     datasheet: Datasheet,
     arrays: Mapping[str, npt.NDArray[Any]],
-    system: SystemPrior,
+    systems: Sequence[SystemPrior],
     pumps: Sequence[PumpMemory],
 ) -> bytes:
-    """Bytes of a detector's state; the datasheet is not kept, only its fingerprint."""
+    """Bytes of a detector's state; the datasheet is not kept, only its fingerprint.
+
+    The prior of a station with one main stands for itself, as in all snapshots from before there were several.
+    """
     stored = {_STORED_ARRAYS.get(name, name): array for name, array in arrays.items()}
     stored["rows"] = stored["rows"].view(np.float64).reshape(-1, len(STEADY_SAMPLE.descr))
+    system = systems[0] if len(systems) == 1 else list(systems)
     state = {"arrays": stored, "system": system, "pumps": list(pumps)}
     text = json.dumps(_encoded(state), separators=(",", ":"), allow_nan=False)
     header = {
@@ -87,8 +91,8 @@ def encode_snapshot(
 
 def decode_snapshot(
     data: bytes, station: str, datasheet: Datasheet
-) -> tuple[dict[str, npt.NDArray[Any]], SystemPrior, list[PumpMemory]]:
-    """Arrays, system and pumps in a snapshot; one of an older form is taken over, see `UPGRADES`.
+) -> tuple[dict[str, npt.NDArray[Any]], list[SystemPrior], list[PumpMemory]]:
+    """Arrays, mains and pumps in a snapshot; one of an older form is taken over, see `UPGRADES`.
 
     Raises
     ------
@@ -119,14 +123,23 @@ def decode_snapshot(
         arrays = {_ARRAYS.get(name, name): array for name, array in state["arrays"].items()}
         if "steady_samples" in arrays:
             arrays["steady_samples"] = arrays["steady_samples"].view(STEADY_SAMPLE)[:, 0]
-        return arrays, state["system"], state["pumps"]
+        systems = state["system"] if isinstance(state["system"], list) else [state["system"]]
+        return arrays, systems, state["pumps"]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
 
 
 def _fingerprint(datasheet: Datasheet) -> str:
-    """Hash of a datasheet, under the name that the class bore when form 2 was made."""
-    return hashlib.sha256(repr(datasheet).replace("Datasheet(", "Nominal(", 1).encode()).hexdigest()
+    """Hash of a datasheet; of one main with a fixed lift under the names that were there when form 2 was made."""
+    text = repr(datasheet)
+    if len(datasheet.mains) == 1 and not datasheet.mains[0].level_slope:
+        main = datasheet.mains[0]
+        text = (
+            f"Nominal(curves={datasheet.curves!r}, frequencies_hz={datasheet.frequencies_hz!r}, "
+            f"static_head_m={main.static_head_m!r}, friction_h2_m5={main.friction_h2_m5!r}, "
+            f"is_common_header={main.is_common_header!r}, area_m2={datasheet.area_m2!r})"
+        )
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _attributes(value: object) -> list[str]:

@@ -80,7 +80,9 @@ def process_samples(
             stop = Stop.RUN_BLIND.value
             if collect(table, pumps, now_ns, frame, steady_samples):
                 return row, stop
-        if stop <= Stop.RUN_BLIND and _watch(stuck_sensors, missing_signals, now_ns, state["gap_s"], frame, pumps):
+        if stop <= Stop.RUN_BLIND and _watch(
+            table, stuck_sensors, missing_signals, now_ns, state["gap_s"], frame, pumps
+        ):
             return row, Stop.SEGMENT_GATHERED.value
         segment_samples = period["segment_samples"]
         if _test_steady(pumps, segment_samples, now_ns, state["gap_s"], steady_samples, windows, moments, counts):
@@ -91,10 +93,18 @@ def process_samples(
 
 
 @compiled
-def _watch(stuck_sensors: Any, missing_signals: Any, now_ns: int, gap_s: float, frame: Floats, pumps: Any) -> bool:
+def _watch(
+    table: Records,
+    stuck_sensors: Any,
+    missing_signals: Any,
+    now_ns: int,
+    gap_s: float,
+    frame: Floats,
+    pumps: Any,
+) -> bool:
     """Look at the readings by themselves; whether there is a full segment of a pump without head."""
     watch_sensors(stuck_sensors, now_ns, gap_s, frame, pumps)
-    is_full: bool = gather_segments(missing_signals, now_ns, gap_s, frame, pumps)
+    is_full: bool = gather_segments(table, missing_signals, now_ns, gap_s, frame, pumps)
     return is_full
 
 

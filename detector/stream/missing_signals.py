@@ -16,8 +16,8 @@ MISSING_SIGNALS = np.dtype(
     [(name, np.int64) for name in ("running", "settled_ns", "begin_ns", "last_ns", "samples", "is_full", "is_apart")]
     + [(name, np.float64) for name in PUMP_METERS]
 )
-"""Of one pump: how many pumps run, sums over the segment that is being gathered, whether it is full, and whether it
-is the first since the pump started, others did, or the stream broke."""
+"""Of one pump: how many pumps run on its main, sums over the segment that is being gathered, whether it is full, and
+whether it is the first since the pump started, others did, or the stream broke."""
 
 
 def new_missing_signals(pumps: int) -> Records:
@@ -26,11 +26,14 @@ def new_missing_signals(pumps: int) -> Records:
 
 
 @compiled
-def gather_segments(missing_signals: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any) -> bool:
+def gather_segments(
+    table: Records, missing_signals: Any, time_ns: int, gap_s: float, frame: Floats, pumps: Any
+) -> bool:
     """Gather the readings of pumps that run, are being learnt, and lack flow, head or frequency.
 
     Parameters
     ----------
+    table : Datasheet.table()
     missing_signals : new_missing_signals(pumps)
     time_ns, gap_s, frame
         A sample that has passed the gate.
@@ -42,9 +45,6 @@ def gather_segments(missing_signals: Any, time_ns: int, gap_s: float, frame: Flo
     bool
         Whether there is a pump of which a segment is full.
     """
-    running = 0
-    for number in range(pumps.shape[0]):
-        running += pumps[number]["is_running"] != 0
     any_full = False
     for number in range(pumps.shape[0]):
         segment, at = missing_signals[number], FIRST_PUMP + PUMP_VALUES * number
@@ -52,6 +52,9 @@ def gather_segments(missing_signals: Any, time_ns: int, gap_s: float, frame: Flo
         is_seen = not math.isnan(frame[at + FREQUENCY] + frame[at + FLOW] + frame[at + HEAD])
         if is_seen or not pumps[number]["is_running"] or not pumps[number]["is_learning"]:
             continue
+        running = 0
+        for other in range(pumps.shape[0]):
+            running += pumps[other]["is_running"] != 0 and table[other]["main"] == table[number]["main"]
         is_apart = gap_s == math.inf or seconds_between(segment["last_ns"], time_ns) > 1.5 * gap_s
         segment["last_ns"] = time_ns
         if is_apart or running != segment["running"]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Datasheet, duty_flows
+from wetwell.detector.curves.datasheet import Datasheet, duty_flows, static_head_at_m
 from wetwell.detector.stream.steady_samples import SEGMENT_SAMPLES
 from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
@@ -118,22 +118,23 @@ def _settle(pump: Any, now_ns: int, wait_ns: int) -> None:
 def note_running(table: Records, pumps: Any, period: Any, time_ns: int, gap_s: float, frame: Floats) -> bool:
     """Note which pumps run; whether a run ends with this frame, or a part of one (`is_ending`)."""
     is_broken = is_break(period, gap_s, BREAK_S)
-    is_changed = any_ending = False
+    changed_mains, any_ending = 0, False
     for number in range(pumps.shape[0]):
         pump = pumps[number]
         is_open = pump["is_open"] != 0
         at = FIRST_PUMP + PUMP_VALUES * number
         is_running = _says_running(table[number], frame, at, is_open and not is_broken)
-        is_changed = is_changed or is_running != (pump["is_running"] != 0)
+        if is_running != (pump["is_running"] != 0):
+            changed_mains |= 1 << table[number]["main"]
         pump["is_running"] = is_running
         is_over = is_broken or not is_running or time_ns - pump["part_ns"] >= PART_NS
         pump["is_ending"] = is_open and is_over
         any_ending = any_ending or (is_open and is_over)
         if is_open and is_broken:
             pump["is_open"] = 0
-    if is_changed:
+    if changed_mains:
         for number in range(pumps.shape[0]):
-            if pumps[number]["is_open"]:
+            if pumps[number]["is_open"] and changed_mains >> table[number]["main"] & 1:
                 _settle(pumps[number], time_ns, WARM_UP_NS)
     return any_ending
 
@@ -165,15 +166,29 @@ def drop_ended(pumps: Any, steady_samples: Any, time_ns: int) -> None:
 
 @compiled
 def _note_duty(table: Records, pumps: Any, frame: Floats) -> None:
-    """Flows by the datasheet; worked out anew only when a speed has changed."""
+    """Flows by the datasheet; worked out anew only when a speed has changed, or the level may move a lift."""
     is_new = False
     for number in range(pumps.shape[0]):
+        is_new = is_new or table[number]["level_slope"] > 0.0
         pump, frequency_hz = pumps[number], frame[FIRST_PUMP + PUMP_VALUES * number + FREQUENCY]
         speed = frequency_hz / table[number]["frequency_hz"] if pump["is_running"] and frequency_hz > 0.0 else 0.0
         is_new = is_new or speed != pump["duty_speed"]
         pump["duty_speed"] = speed
     if is_new:
-        duty_flows(table, pumps)
+        duty_flows(table, pumps, frame[LEVEL])
+
+
+@compiled
+def _totals(table: Records, pumps: Any, main: int, frame: Floats) -> tuple[float, float]:
+    """Total flow of a main, as measured and by the datasheet. [m³/h]."""
+    total_m3h = duty_total_m3h = 0.0
+    for number in range(pumps.shape[0]):
+        if table[number]["main"] != main:
+            continue
+        duty_total_m3h += pumps[number]["duty_m3h"]
+        if pumps[number]["is_running"]:
+            total_m3h += frame[FIRST_PUMP + PUMP_VALUES * number + FLOW]
+    return total_m3h, duty_total_m3h
 
 
 @compiled
@@ -191,14 +206,12 @@ def _collect(table: Records, pumps: Any, number: int, time_ns: int, frame: Float
     is_usable = MIN_SPEED_RATIO <= speed_ratio <= MAX_SPEED_RATIO
     if time_ns < pump["steady_from_ns"] or not is_usable or math.isnan(flow_m3h + head_m):
         return False
+    if math.isnan(static_head_at_m(own, frame[LEVEL])):
+        return False
     _note_duty(table, pumps, frame)
     total_m3h, duty_total_m3h = flow_m3h, pump["duty_m3h"]
     if own["is_common_header"]:
-        total_m3h = duty_total_m3h = 0.0
-        for other in range(pumps.shape[0]):
-            duty_total_m3h += pumps[other]["duty_m3h"]
-            if pumps[other]["is_running"]:
-                total_m3h += frame[FIRST_PUMP + PUMP_VALUES * other + FLOW]
+        total_m3h, duty_total_m3h = _totals(table, pumps, own["main"], frame)
         if math.isnan(total_m3h):
             return False
     steady["pump"] = number

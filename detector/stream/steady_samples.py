@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from wetwell.detector.curves.datasheet import static_head_at_m
 from wetwell.detector.curves.residuals import distances
 from wetwell.protocols.arrays import Floats, Records
 from wetwell.protocols.jit import compiled
@@ -52,7 +53,7 @@ def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Any) -> Non
             steady = steady_samples[at]
             pump_m, system_m = distances(
                 *(steady["flow_m3h"], steady["head_m"], steady["speed_ratio"], steady["total_m3h"]),
-                *(own["c0"], own["c1"], own["c2"], own["static_head_m"], own["friction_h2_m5"]),
+                *(own["c0"], own["c1"], own["c2"], static_head_at_m(own, steady["level_m"]), own["friction_h2_m5"]),
             )
             is_closed = steady["total_m3h"] < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
             total["pump_m"] += pump_m

@@ -38,7 +38,7 @@ def run_evidence(run: Run, datasheet: Datasheet, rng: np.random.Generator) -> di
             run.head_m,
             run.speed_ratio,
             curve=datasheet.curves[run.pump],
-            friction_h2_m5=datasheet.friction_h2_m5,
+            friction_h2_m5=datasheet.main_of(run.pump).friction_h2_m5,
             samples_per_segment=run.segments.samples,
             total_flow_m3h=run.total_flow_m3h,
         )

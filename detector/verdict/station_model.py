@@ -46,7 +46,7 @@ class StationModel:
             start_levels_m=self._station.control.start_levels_m,
             stop_levels_m=self._station.control.stop_levels_m,
             floor_area_m2=self._datasheet.area_m2,
-            is_common_header=self._datasheet.is_common_header,
+            is_common_header=len(self._datasheet.mains) == 1 and self._datasheet.mains[0].is_common_header,
             pumps=tuple(self._pump(index, baseline, told.get(index + 1)) for index, baseline in enumerate(baselines)),
         )
 
@@ -54,7 +54,15 @@ class StationModel:
         known = self._known.get(index)
         if known is not None and known[0] is baseline and known[1] is verdict:
             return known[2]
-        model = pump_model(index, self._datasheet, baseline, {} if verdict is None else verdict.evidence)
+        curves = pump_model(index, self._datasheet, baseline, {} if verdict is None else verdict.evidence)
+        main = self._station.main_of_pump[index]
+        on_main = [number for number, other in enumerate(self._station.main_of_pump, start=1) if other == main]
+        names = {
+            "name": self._station.pump[index].name,
+            "main": self._station.mains[main].name,
+            "header": tuple(on_main if self._datasheet.mains[main].is_common_header else ()),
+        }
+        model = curves.model_copy(update=names)
         self._known[index] = baseline, verdict, model
         return model
 
@@ -81,7 +89,9 @@ def pump_model(index: int, datasheet: Datasheet, baseline: Baseline | None, evid
     c0, c1, c2 = datasheet.curves[index]
     flow_m3h = np.linspace(0.0, FLOW_SHARE * datasheet.runout_flow_m3h(index), POINTS)
     pump_m = c0 + c1 * flow_m3h + c2 * flow_m3h**2
-    system_m = datasheet.static_head_m + datasheet.friction_h2_m5 * flow_m3h**2
+    main = datasheet.main_of(index)
+    level_m = datasheet.middle_level_m if baseline is None or not np.isfinite(baseline.level_m) else baseline.level_m
+    system_m = main.static_head_at_m(level_m) + main.friction_h2_m5 * flow_m3h**2
     configured = {"configured_pump": _curve(flow_m3h, pump_m), "configured_system": _curve(flow_m3h, system_m)}
     if baseline is None:
         return PumpModel(pump=index + 1, **configured)

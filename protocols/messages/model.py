@@ -19,10 +19,15 @@ class Curve(Message):
 class PumpModel(Message):
     """Curves of one pump and of its main: as configured, as learnt when healthy, as the last verdict sees them.
 
-    `configured_*` are without a band. `learnt_*` are None until learning has ended, `now_*` until a run was judged.
+    `name` is what people call it, None where it has its number only, `main` what they call its main. `header` are the
+    pumps on its common header, itself among them; over their total flow goes the system curve. `configured_*` are
+    without a band. `learnt_*` are None until learning has ended, `now_*` until a run was judged.
     """
 
     pump: int = Field(ge=1)
+    name: str | None = None
+    main: str | None = None
+    header: tuple[int, ...] = ()
     configured_pump: Curve
     configured_system: Curve
     learnt_pump: Curve | None = None
@@ -32,7 +37,10 @@ class PumpModel(Message):
 
 
 class Model(Message):
-    """Model of a station, published when it changes. On a common header the system curve is over the total flow."""
+    """Model of a station, published when it changes.
+
+    `is_common_header`: all its pumps are on one header, and the system curve is over the total flow.
+    """
 
     schema_name: Literal["wetwell.model/1"] = Field("wetwell.model/1", alias="schema")
     time: Stamp

@@ -281,9 +281,9 @@ def limits_of(settings: AlarmSettings, station: Station | None) -> Limits:
     """Levels that are too high, from the settings and the station file if there is one."""
     high_m, overflow_m = settings.high_level_m, None
     if station is not None:
-        if high_m is None:
+        if high_m is None and station.control.start_levels_m:
             high_m = station.control.start_levels_m[-1] + settings.high_level_margin_m
         if station.sump.overflow_level_m is not None:
             overflow_m = station.sump.overflow_level_m - settings.overflow_margin_m
-            high_m = min(high_m, overflow_m)
+            high_m = overflow_m if high_m is None else min(high_m, overflow_m)
     return Limits(high_m, overflow_m, settings.level_deadband_m)

@@ -80,7 +80,7 @@ def up(
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
         settings = with_data(settings, data, Path(folder))
-        show = line_printer(as_json=as_json)
+        show = line_printer(plant.station.pump_names, as_json=as_json)
 
         def greet() -> None:
             if not as_json:

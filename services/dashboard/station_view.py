@@ -59,6 +59,7 @@ class StationView:
         self._fresh: dict[str, Any] = {}
         self._model: str | None = None
         self._levels: tuple[float, ...] = ()
+        self._names: list[str | None] = []
         self._verdicts: dict[int, deque[str]] = {}
         self._states: dict[int, State] = {}
         self._alarms: dict[str, Alarm] = {}
@@ -124,6 +125,7 @@ class StationView:
         """Take the curves."""
         self._model = model.encode().decode()
         self._levels = model.start_levels_m
+        self._names = [pump.name for pump in model.pumps]
         self._fresh["model"] = self._model
 
     def handle_alarm(self, alarm: Alarm) -> None:
@@ -208,6 +210,7 @@ class StationView:
             "name": self.name,
             "state": self.worst_state,
             "pumps": [self._states.get(pump, "unknown") for pump in range(1, pumps + 1)],
+            "names": self._names,
             "levels": self._levels[-1:],
             "alarms": len(active),
             "unacknowledged": sum(alarm.state in {"unacknowledged", "returned"} for alarm in active),

@@ -1,6 +1,6 @@
 """What `wetwell up` prints: where to look, then each change of state."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.modbus.registers import register_table
@@ -47,8 +47,15 @@ Ctrl-C stops. Verdicts, in the station's time:
 """
 
 
-def line_printer(*, as_json: bool) -> Callable[[Verdict], None]:
-    """Printer of verdicts: every one as JSON, or a line for people where a state changes or learning goes on."""
+def line_printer(names: Sequence[str], *, as_json: bool) -> Callable[[Verdict], None]:
+    """Printer of verdicts: every one as JSON, or a line for people where a state changes or learning goes on.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What people call the pumps.
+    as_json : bool
+    """
     told: dict[int, tuple[State, str]] = {}
 
     def show(verdict: Verdict) -> None:
@@ -58,14 +65,14 @@ def line_printer(*, as_json: bool) -> Callable[[Verdict], None]:
         reason = str(verdict.evidence.get("reason", ""))
         news = (verdict.state, reason.split(".", 1)[0] if verdict.state == "learning" else "")
         if told.get(verdict.pump) != news:
-            print(verdict_line(verdict), flush=True)  # noqa: T201 - this is what the command prints
+            print(verdict_line(verdict, names), flush=True)  # noqa: T201 - this is what the command prints
         told[verdict.pump] = news
 
     return show
 
 
-def verdict_line(verdict: Verdict) -> str:
-    """One line for people.
+def verdict_line(verdict: Verdict, names: Sequence[str] = ()) -> str:
+    """One line for people, with the name of the pump where it is not just its number.
 
     Examples
     --------
@@ -74,7 +81,10 @@ def verdict_line(verdict: Verdict) -> str:
     ...     evidence={"shift_m": {"pump": -5.9, "system": 0.06}}, onset=0, window=(0, 0))))
     1970-01-01T00:00:00Z  pump 2  PUMP FAULT             p = 0.998  pump curve -5.90 m, system curve +0.06 m
     """
-    words = [f"{to_iso(verdict.time)}  pump {verdict.pump}  {WORDS[verdict.state]:<21}"]
+    number = str(verdict.pump)
+    name = names[verdict.pump - 1] if verdict.pump <= len(names) else number
+    pump = number if name == number else f"{number} ({name})"
+    words = [f"{to_iso(verdict.time)}  pump {pump}  {WORDS[verdict.state]:<21}"]
     if verdict.state in verdict.probability and verdict.state != "learning":
         words.append(f"p = {verdict.probability[verdict.state]:.3f}")
     if "shift_m" in verdict.evidence:

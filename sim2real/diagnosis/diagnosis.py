@@ -114,7 +114,9 @@ def diagnose(
         If recording and station do not fit, the recording is too short or in other units, or a name is not in the
         library.
     """
-    candidates = candidates_of(len(station.pump), only=only, without=without)
+    library = candidates_of(len(station.pump), only=only, without=without)
+    is_external = station.control.is_external
+    candidates = [each for each in library if not (is_external and each.component == "controller")]
     traces = excerpt(traces_of(recording, station))
     regimes = regimes_of(traces, station)
     replay = Replay(traces, station, effects_of(station))

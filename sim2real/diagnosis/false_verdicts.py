@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
+from wetwell.detector.curves.datasheet import Datasheet, SystemCurve, datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.evaluation.scores import FAULTS, without_truth
 from wetwell.protocols.recordings.recording import Recording
@@ -67,9 +67,15 @@ def _datasheet(station: Station) -> Datasheet:
     return replace(
         datasheet_of(station),
         curves=tuple((float(c0), float(c1), float(c2)) for c0, c1, c2 in plant.curves),
-        static_head_m=plant.mains[0].static_head_m,
-        friction_h2_m5=plant.mains[0].friction_h2_m5,
-        is_common_header=plant.mains[0].is_common_header,
+        mains=tuple(
+            SystemCurve(
+                static_head_m=main.static_head_m,
+                friction_h2_m5=main.friction_h2_m5,
+                is_common_header=main.is_common_header,
+                level_slope=main.level_slope,
+            )
+            for main in plant.mains
+        ),
     )
 
 

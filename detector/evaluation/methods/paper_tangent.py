@@ -23,6 +23,6 @@ class PaperTangent(IndexMethod):
             run.head_m,
             run.speed_ratio,
             curve=self._datasheet.curves[run.pump],
-            friction_h2_m5=self._datasheet.friction_h2_m5,
+            friction_h2_m5=self._datasheet.main_of(run.pump).friction_h2_m5,
             total_flow_m3h=run.total_flow_m3h,
         )

@@ -39,7 +39,7 @@ class PaperTangentSegments(IndexMethod):
         now, learnt = _segments(run), self._learnt[run.pump][:, np.newaxis]
         step, (middle, _, total, _) = now - learnt, (now + learnt) / 2.0
         psi_p = step[1] - pump_slope(middle, self._datasheet.curves[run.pump]) * step[0]
-        psi_s = step[3] - system_slope(total, self._datasheet.friction_h2_m5) * step[2]
+        psi_s = step[3] - system_slope(total, self._datasheet.main_of(run.pump).friction_h2_m5) * step[2]
         return psi_p, psi_s
 
 

@@ -94,7 +94,7 @@ export function historyPanel(station) {
 
   function names() {
     if (OF_STATION.includes(quantity)) return [{ column: quantity, label: words(quantity.replace(/_[a-z0-9]+$/, "")), number: 1 }];
-    return Array.from({ length: station.pumps }, (_, place) => ({ column: `pump${place + 1}_${quantity}`, label: `pump ${place + 1}`, number: place + 1 }));
+    return Array.from({ length: station.pumps }, (_, place) => ({ column: `pump${place + 1}_${quantity}`, label: `pump ${station.called(place + 1)}`, number: place + 1 }));
   }
 
   function lines() {

@@ -41,7 +41,7 @@ export function kpiPanel(station) {
       const values = [figure(sum(`${prefix}starts`), 0), figure(sum(`${prefix}run_h`), 1), figure(volume, 0), figure(energy, 1), volume > 0 ? figure(energy / volume, 4) : "–"];
       return html("tr", {}, html("th", { scope: "row" }, word), ...values.map((value) => html("td", { class: "number" }, value)));
     };
-    body.replaceChildren(...Array.from({ length: station.pumps }, (_, place) => line(`Pump ${place + 1}`, `pump${place + 1}_`)), line("Station", ""));
+    body.replaceChildren(...Array.from({ length: station.pumps }, (_, place) => line(`Pump ${station.called(place + 1)}`, `pump${place + 1}_`)), line("Station", ""));
     const days = new Map();
     times.forEach((time, place) => {
       const day = Math.floor(time / DAY_MS) * DAY_MS;

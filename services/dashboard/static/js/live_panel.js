@@ -27,12 +27,13 @@ export function livePanel(station, chosen) {
   let drawn = 0;
 
   function pumpLines() {
-    return Array.from({ length: station.pumps }, (_, place) => ({ label: `pump ${place + 1}`, ...pen(place + 1), width: place + 1 === chosen() ? 2.2 : 1.1 }));
+    return Array.from({ length: station.pumps }, (_, place) => ({ label: `pump ${station.called(place + 1)}`, ...pen(place + 1), width: place + 1 === chosen() ? 2.2 : 1.1 }));
   }
 
   function showKey() {
-    if (key.children.length === station.pumps) return;
-    key.replaceChildren(...pumpLines().map((line, place) => html("li", {}, html("span", { class: `stroke pen${(place % 4) + 1}` }), line.label)));
+    const lines = pumpLines();
+    if (key.textContent === lines.map((line) => line.label).join("")) return;
+    key.replaceChildren(...lines.map((line, place) => html("li", {}, html("span", { class: `stroke pen${(place % 4) + 1}` }), line.label)));
   }
 
   function update(changed) {

@@ -104,8 +104,8 @@ export function planePanel(station, chosen) {
     mark(point, "class", runs ? "point" : "point stands");
     mark(point, "visibility", runs || last ? "visible" : "hidden");
     if (runs || last) mark(point, "transform", `translate(${runs ? `${x(flow).toFixed(1)} ${y(head).toFixed(1)}` : last})`);
-    const main = station.totalFlow();
-    const isShared = runs && station.model?.is_common_header && main > 1.02 * flow;
+    const main = station.totalFlow(station.header(chosen()));
+    const isShared = runs && main > 1.02 * flow;
     mark(total, "visibility", isShared ? "visible" : "hidden");
     if (isShared) mark(total, "transform", `translate(${x(main).toFixed(1)} ${y(head).toFixed(1)})`);
     const shift = station.verdict(chosen())?.evidence.shift_m;
@@ -114,7 +114,7 @@ export function planePanel(station, chosen) {
   }
 
   function update(changed) {
-    say(title, `Operating point of pump ${chosen()}`);
+    say(title, `Operating point of pump ${station.called(chosen())}`);
     if (changed.has("model") || changed.has("pump") || changed.has("begin")) drawGround();
     if (["model", "pump", "verdicts", "begin"].some((name) => changed.has(name))) drawCurves();
     drawPoints();

@@ -18,7 +18,7 @@ export function qualityPanel(station) {
     const share = (pick) => station.rows.filter((row) => !Number.isFinite(pick(row))).length / station.rows.length;
     const shares = [["level", share((row) => row[1])]];
     for (let number = 1; number <= station.pumps; number += 1) {
-      for (const name of NAMES) shares.push([`pump ${number} ${name}`, share((row) => station.pump(number, row)[name])]);
+      for (const name of NAMES) shares.push([`pump ${station.called(number)} ${name}`, share((row) => station.pump(number, row)[name])]);
     }
     return shares.filter(([, value]) => value > 0).map(([name, value]) => `${name} ${figure(100 * value, 1)} %`);
   }

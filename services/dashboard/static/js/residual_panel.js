@@ -27,7 +27,7 @@ export function residualPanel(station, chosen) {
 
   function update(changed) {
     if (!changed.has("verdicts") && !changed.has("pump")) return;
-    say(element.querySelector("h2"), `Residuals of each run, pump ${chosen()}`);
+    say(element.querySelector("h2"), `Residuals of each run, pump ${station.called(chosen())}`);
     const judged = (station.verdicts.get(chosen()) ?? []).filter((verdict) => verdict.evidence.shift_sigmas);
     empty.hidden = judged.length > 0;
     sigmas.element.hidden = index.element.hidden = judged.length === 0;

@@ -67,9 +67,12 @@ export function stationPage(name, main, showLink) {
   function showChoice() {
     while (choice.children.length < station.pumps) {
       const number = choice.children.length + 1;
-      choice.append(html("button", { type: "button", onclick: () => choose(number) }, `Pump ${number}`));
+      choice.append(html("button", { type: "button", onclick: () => choose(number) }));
     }
-    [...choice.children].forEach((button, place) => button.setAttribute("aria-pressed", place + 1 === pump));
+    [...choice.children].forEach((button, place) => {
+      say(button, `Pump ${station.called(place + 1)}`);
+      button.setAttribute("aria-pressed", place + 1 === pump);
+    });
   }
 
   const end = follow(`/events?station=${encodeURIComponent(name)}`, `/api/stations/${encodeURIComponent(name)}`, {

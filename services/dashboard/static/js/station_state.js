@@ -95,11 +95,25 @@ export class StationState {
     return this.running[number - 1] ?? (this.pump(number).frequency ?? 0) > 0;
   }
 
-  /** Sum of the flows of all pumps in a row. */
-  totalFlow(row = this.last) {
-    let total = 0;
-    for (let pump = 1; pump <= this.pumps; pump += 1) total += this.pump(pump, row).flow ?? 0;
-    return total;
+  /** Sum of the flows in the last row, of all pumps or of some (from 1). */
+  totalFlow(pumps = Array.from({ length: this.pumps }, (_, place) => place + 1)) {
+    return pumps.reduce((total, pump) => total + (this.pump(pump).flow ?? 0), 0);
+  }
+
+  /** What people call a pump, where the station file has a name for it. */
+  nameOf(number) {
+    return this.model?.pumps.find((each) => each.pump === number)?.name ?? null;
+  }
+
+  /** Number of a pump, with its name where it has one: "7 (2.3)". */
+  called(number) {
+    const name = this.nameOf(number);
+    return name ? `${number} (${name})` : String(number);
+  }
+
+  /** Pumps on the common header of a pump, none where it has a pipe of its own. */
+  header(number) {
+    return this.model?.pumps.find((each) => each.pump === number)?.header ?? [];
   }
 
   verdict(number) {

@@ -103,7 +103,7 @@ function stationLine() {
       name.textContent = station.name;
       name.href = `/station/${encodeURIComponent(station.name)}`;
     }
-    pumps.show(station.pumps, station.running);
+    pumps.show(station.pumps, station.running, station.names);
     const top = (station.levels[0] ?? 2) * 1.2;
     fill.style.transform = `scaleX(${Math.min(1, Math.max(0, (station.level ?? 0) / top))})`;
     say(level, `${figure(station.level, 2)} m`);

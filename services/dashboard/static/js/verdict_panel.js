@@ -71,7 +71,7 @@ export function verdictPanel(station, chosen, choose) {
     });
     const name = station.pumpState(number);
     const badge = svg("g", { class: `is-${state(name).kind}`, transform: `translate(0 ${y + 3})` }, icon(name, 14));
-    return svg("g", {}, badge, svg("text", { x: 20, y: y + 14 }, `Pump ${number}`), ...blocks);
+    return svg("g", {}, svg("title", {}, `Pump ${station.called(number)}`), badge, svg("text", { x: 20, y: y + 14 }, station.nameOf(number) ?? `Pump ${number}`), ...blocks);
   }
 
   function listChanges() {
@@ -84,7 +84,7 @@ export function verdictPanel(station, chosen, choose) {
 
   function update(changed) {
     if (changed.has("pump")) selected = told().some((verdict) => verdict.time === selected) ? selected : null;
-    if (!changed.has("verdicts")) return;
+    if (!changed.has("verdicts") && !changed.has("model")) return;
     draw();
     const held = changes.contains(document.activeElement) ? [...changes.querySelectorAll("button")].indexOf(document.activeElement) : -1;
     listChanges();
@@ -94,7 +94,7 @@ export function verdictPanel(station, chosen, choose) {
     back.disabled = place() <= 0;
     on.disabled = place() >= told().length - 1;
     mark(last, "aria-pressed", selected === null);
-    say(element.querySelector("h2"), `Verdicts, pump ${chosen()}`);
+    say(element.querySelector("h2"), `Verdicts, pump ${station.called(chosen())}`);
   }
 
   return { element, update };

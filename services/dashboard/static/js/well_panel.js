@@ -68,7 +68,7 @@ export function wellPanel(station, chosen, choose) {
     say(inflowText, station.inflow == null ? "inflow" : `inflow ${figure(station.inflow, 0)} m³/h`);
     say(mainText, `rising main ${figure(station.totalFlow(), 0)} m³/h`);
     for (const each of pumps) each.update(station, chosen());
-    const told = pumps.map((_, place) => `pump ${place + 1} ${station.isRunning(place + 1) ? "runs" : "stands"}, ${state(station.pumpState(place + 1)).word}`);
+    const told = pumps.map((_, place) => `pump ${station.called(place + 1)} ${station.isRunning(place + 1) ? "runs" : "stands"}, ${state(station.pumpState(place + 1)).word}`);
     say(words, `Level ${figure(level, 2)} m. ${told.join("; ")}.`);
   }
 
@@ -84,10 +84,11 @@ function pumpDrawing(number, x, choose) {
   const badge = svg("g", { class: "badge", transform: `translate(${x + 14} ${y - 36})` });
   const flow = svg("text", { x: x + 7, y: 66 });
   const head = svg("text", { x: x + 7, y: 82 });
+  const hint = svg("title", {}, `Pump ${number}`);
   const title = svg("text", { class: "name", x, y: 350, "text-anchor": "middle" }, `Pump ${number}`);
   const doing = svg("text", { x, y: 367, "text-anchor": "middle" });
   const condition = svg("text", { class: "condition", x, y: 384, "text-anchor": "middle" });
-  const element = svg("g", { class: "pump", onclick: () => choose(number) }, pipe, body, badge, flow, head, title, doing, condition);
+  const element = svg("g", { class: "pump", onclick: () => choose(number) }, hint, pipe, body, badge, flow, head, title, doing, condition);
   let shown = "";
 
   function update(station, chosen) {
@@ -96,6 +97,8 @@ function pumpDrawing(number, x, choose) {
     const name = station.pumpState(number);
     mark(element, "class", `pump is-${state(name).kind}${runs ? " runs" : ""}${chosen === number ? " chosen" : ""}`);
     mark(element, "data-state", name);
+    say(title, station.nameOf(number) ?? `Pump ${number}`);
+    say(hint, `Pump ${station.called(number)}`);
     impeller.style.animationDuration = runs && frequency > 1 ? `${(45 / frequency).toFixed(1)}s` : "";
     say(flow, runs ? `${figure(flowM3h, 0)} m³/h` : "");
     say(head, runs ? `${figure(headM, 1)} m` : "");

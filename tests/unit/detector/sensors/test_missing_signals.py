@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from wetwell.detector.curves import datasheet
 from wetwell.detector.sensors.missing_signals import REFERENCE_SEGMENTS, MissingSignals
 from wetwell.detector.stream.missing_signals import gather_segments, new_missing_signals
 from wetwell.detector.stream.run_state import PUMP_STATE
@@ -12,6 +13,8 @@ from wetwell.protocols.timestamps import NS_PER_S
 
 NAN = math.nan
 WARM_UP_S = 30
+TABLE = np.zeros(2, dtype=datasheet.TABLE)
+"""Two pumps on one main."""
 LEARNT_S = WARM_UP_S + 25 * REFERENCE_SEGMENTS
 
 
@@ -28,10 +31,18 @@ def told(flows_m3h, *, running=None, period_s=1):
         on = 1 if running is None else running[number]
         pumps["is_running"] = (1, on == 2)
         frame = frame_of((NAN, flow_m3h, NAN, NAN, 1.0), (NAN, flow_m3h, NAN, NAN, float(on == 2)))
-        gather_segments(gathered, number * period_s * NS_PER_S, float(period_s), frame, pumps)
+        gather_segments(TABLE, gathered, number * period_s * NS_PER_S, float(period_s), frame, pumps)
         if gathered["is_full"][0] and watch.update(gathered[0]):
             changes.append((number * period_s, watch.evidence(on)))
     return changes, watch
+
+
+def gathered_in(gathered, values, pumps, begin_s=0, seconds=LEARNT_S):
+    """Whether a segment is full in each of some seconds with the same values."""
+    return [
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps)
+        for second in range(begin_s, begin_s + seconds)
+    ]
 
 
 def noisy(*levels_m3h, samples, seed=0):
@@ -88,21 +99,27 @@ def test_a_pump_that_stands_or_that_can_be_judged_is_left_alone(name):
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     pumps[name] = 0
     values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
-    assert not any(gather_segments(gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
+    assert not any(
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S)
+    )
 
 
 def test_a_pump_that_shows_everything_is_left_alone():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values = frame_of((50.0, 100.0, 26.0, NAN, 1.0))
-    assert not any(gather_segments(gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S))
+    assert not any(
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, pumps) for second in range(LEARNT_S)
+    )
 
 
 def test_a_clock_that_is_set_begins_a_segment_anew():
     gathered, pumps = new_missing_signals(1), np.ones(1, dtype=PUMP_STATE)
     values = frame_of((NAN, 100.0, NAN, NAN, 1.0))
-    begun = [gather_segments(gathered, (10_000 + second) * NS_PER_S, 1.0, values, pumps) for second in range(50)]
+    begun = [
+        gather_segments(TABLE, gathered, (10_000 + second) * NS_PER_S, 1.0, values, pumps) for second in range(50)
+    ]
     set_back = [
-        gather_segments(gathered, second * NS_PER_S, 1.0 if second else math.inf, values, pumps)
+        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0 if second else math.inf, values, pumps)
         for second in range(55)
     ]
     assert sum(begun) == 0
