@@ -165,13 +165,20 @@ def validate(
     html: Annotated[
         Path | None, typer.Option("--html", metavar="FILE", help="Page with plots that is written; needs no network.")
     ] = None,
+    before: Annotated[
+        str | None,
+        typer.Option("--before", metavar="FILE", help="Station file to compare row by row beside it."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run the simulator under the inflow of a recording and compare level, starts and run time."""
+    """Compare a station file with a recording: row by row, and free-running where levels start the pumps."""
     from wetwell.services.batch.field_data import validate_file
     from wetwell.services.stations import find_station
 
-    print_result(validate_file(find_station(station), recording, preparation, out, html), as_json=as_json)
+    other = None if before is None else find_station(before)
+    print_result(
+        validate_file(find_station(station), recording, preparation, out, html, before=other), as_json=as_json
+    )
 
 
 @app.command()

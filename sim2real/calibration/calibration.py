@@ -18,7 +18,8 @@ def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple
 
     Curves, lift and friction of a main are one fit with the datasheets as prior, over steady duties at any rate;
     where no head is measured the flow at a speed and a level stands for it. Area, levels and ramp come from the
-    moments in which pumps are started and stopped. What the recording cannot tell stays as it is in the file, with the reason.
+    moments in which pumps are started and stopped. What the recording cannot tell stays as it is in the file, with
+    the reason.
 
     Parameters
     ----------

@@ -70,9 +70,10 @@ class Comparison:
     names: tuple[str, ...]
 
     def errors(self, quantity: AnalogueQuantity) -> list[Errors]:
-        """Errors of a quantity of each pump, and where it adds up, of each main with several pumps."""
+        """Errors of a quantity of all pumps, of each, and where it adds up, of each main with several pumps."""
         told, measured = self.told[quantity], self.measured[quantity]
-        rows = [
+        rows = [_errors("all pumps", quantity, told.ravel(), measured.ravel(), self.is_steady.ravel())]
+        rows += [
             _errors(f"pump {name}", quantity, told[i], measured[i], self.is_steady[i])
             for i, name in enumerate(self.names)
         ]

@@ -76,8 +76,10 @@ def regularised_fit(errors: Errors, runs: Sequence[Integers], prior: Prior) -> P
 def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags) -> tuple[Floats, Floats]:
     """Parameters of which the free ones have moved, and the covariance of all; steps are in units of the prior."""
     unit = prior.sd
-    precision = np.linalg.inv(prior.covariance / np.outer(unit, unit))
-    value, covariance = prior.mean.copy(), np.linalg.inv(precision)
+    correlation = prior.covariance / np.outer(unit, unit)
+    precision = np.linalg.inv(correlation)
+    least = 1.0 / float(np.linalg.eigvalsh(correlation)[-1])
+    value, covariance = prior.mean.copy(), correlation
     values = sum(run.size for run in runs)
     fitted = 0.0
     for _ in range(MOST_STEPS if values else 0):
@@ -88,13 +90,20 @@ def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags
             told += jacobian.T @ jacobian
             pull -= jacobian.T @ noise.whitened(error)
         normal = precision + told
-        covariance = np.linalg.inv(normal)
+        covariance = _inverse(normal, least)
         fitted = float(np.trace(covariance @ told))
         moving = free & ~((value <= prior.lowest) & (pull < 0.0))
         step = np.zeros_like(value)
-        step[moving] = np.linalg.solve(normal[np.ix_(moving, moving)], pull[moving])
+        step[moving] = _inverse(normal[np.ix_(moving, moving)], least) @ pull[moving]
         longest = float(np.max(np.abs(step)))
         value = np.maximum(value + step * unit * min(1.0, LONGEST_STEP / max(longest, SETTLED)), prior.lowest)
         if longest < SETTLED:
             break
     return value, covariance * np.outer(unit, unit)
+
+
+def _inverse(precision: Floats, least: float) -> Floats:
+    """Inverse of a precision that is in no direction under that of the prior, also where it has lost its digits."""
+    size, directions = np.linalg.eigh(precision)
+    inverse: Floats = (directions / np.maximum(size, least)) @ directions.T
+    return inverse

@@ -20,6 +20,8 @@ SPEED_STEP = 0.02
 """Speed ratios that differ by less are one duty. [1]"""
 LEVEL_STEP_M = 0.5
 """Levels that differ by less are one duty. [m]"""
+FASTEST = 2.0
+"""Speed ratio over which a frequency is taken for a wrong value: no drive turns a pump at twice its speed. [1]"""
 GAP_STEPS = 3.0
 """A step of time that is longer than so many usual ones is a gap: what was switched in it nobody knows."""
 
@@ -81,6 +83,7 @@ def running_of(recording: Recording, station: Station) -> Running:
     frequency_hz = recording.of_pumps("frequency_hz", pumps)
     is_known = np.isfinite(frequency_hz).any(axis=1, keepdims=True)
     speed = np.where(is_known, frequency_hz / nominal_hz, 1.0)
+    speed[speed > FASTEST] = np.nan
     time_s = (recording.time_ns - recording.time_ns[:1]) / NS_PER_S
     starts = np.diff(running, axis=1, prepend=False) & running
     return Running(
