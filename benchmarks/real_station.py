@@ -3,8 +3,8 @@
     python benchmarks/real_station.py FOLDER [--plots DIR] [--diagnose]
 
 FOLDER holds the workbook that the owners published (`Hackathon_HSY_data.xlsx`); without it nothing is measured.
-Mapping and station file stand in `benchmarks/real_station/`. The first eight days are for calibration, the second eight are
-only looked at. `--diagnose` adds the diagnosis of the gap, which takes minutes.
+Mapping and station file stand in `benchmarks/real_station/`. The first eight days are for calibration, the second
+eight are only looked at. `--diagnose` adds the diagnosis of the gap, which takes minutes.
 """
 
 import argparse

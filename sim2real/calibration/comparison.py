@@ -8,8 +8,8 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.calibration.main_model import FRICTION, MainModel
-from wetwell.sim2real.calibration.power_fit import PowerLines
+from wetwell.sim2real.calibration.fit.main_model import FRICTION, MainModel
+from wetwell.sim2real.calibration.fit.power_fit import PowerLines
 from wetwell.sim2real.calibration.steady import RAMP_STEP, Running, running_of
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.parameters import PlantParameters

@@ -5,10 +5,10 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.calibration.estimates import Estimate
-from wetwell.sim2real.calibration.main_fit import fit_main, witness_of
-from wetwell.sim2real.calibration.main_model import FRICTION, SHIFT, MainModel
-from wetwell.sim2real.calibration.prior import main_prior
-from wetwell.sim2real.calibration.regularised_fit import Posterior
+from wetwell.sim2real.calibration.fit.main_fit import fit_main, witness_of
+from wetwell.sim2real.calibration.fit.main_model import FRICTION, SHIFT, MainModel
+from wetwell.sim2real.calibration.fit.prior import main_prior
+from wetwell.sim2real.calibration.fit.regularised_fit import Posterior
 from wetwell.sim2real.calibration.steady import SteadyDuties
 from wetwell.simulator.parameters import plant_parameters
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.calibration.estimates import Estimate
+from wetwell.sim2real.calibration.fit.main_fit import numbered
+from wetwell.sim2real.calibration.fit.power_fit import PowerLines, fit_power
+from wetwell.sim2real.calibration.fit.prior import power_prior
 from wetwell.sim2real.calibration.main_estimates import MIN_RUNS
-from wetwell.sim2real.calibration.main_fit import numbered
-from wetwell.sim2real.calibration.power_fit import PowerLines, fit_power
-from wetwell.sim2real.calibration.prior import power_prior
 from wetwell.sim2real.calibration.steady import SteadyDuties
 from wetwell.simulator.parameters import plant_parameters
 

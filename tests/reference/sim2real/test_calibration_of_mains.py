@@ -9,10 +9,10 @@ from scipy.optimize import least_squares
 
 from wetwell.sim2real.calibration.calibration import calibrate
 from wetwell.sim2real.calibration.comparison import compare
+from wetwell.sim2real.calibration.fit.main_fit import fit_main, witness_of
+from wetwell.sim2real.calibration.fit.main_model import MainModel
+from wetwell.sim2real.calibration.fit.prior import main_prior
 from wetwell.sim2real.calibration.fitted_station import with_estimates
-from wetwell.sim2real.calibration.main_fit import fit_main, witness_of
-from wetwell.sim2real.calibration.main_model import MainModel
-from wetwell.sim2real.calibration.prior import main_prior
 
 SEEDS = range(100, 106)
 """Others than those with which the priors and the noise of runs were thought out."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.calibration.main_model import FRICTION, SHIFT
+from wetwell.sim2real.calibration.fit.main_model import FRICTION, SHIFT
 
 HEAD_SCALE_SD = 0.1
 FLOW_SCALE_SD = 0.1

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.calibration.prior import Prior
-from wetwell.sim2real.calibration.regularised_fit import Posterior, regularised_fit
+from wetwell.sim2real.calibration.fit.prior import Prior
+from wetwell.sim2real.calibration.fit.regularised_fit import Posterior, regularised_fit
 from wetwell.simulator.power import STANDING_LOSS_SHARE
 
 

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.calibration.main_model import MainModel
-from wetwell.sim2real.calibration.prior import Prior
-from wetwell.sim2real.calibration.regularised_fit import Posterior, regularised_fit
+from wetwell.sim2real.calibration.fit.main_model import MainModel
+from wetwell.sim2real.calibration.fit.prior import Prior
+from wetwell.sim2real.calibration.fit.regularised_fit import Posterior, regularised_fit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.calibration.prior import Prior
-from wetwell.sim2real.calibration.run_noise import RunNoise
+from wetwell.sim2real.calibration.fit.prior import Prior
+from wetwell.sim2real.calibration.fit.run_noise import RunNoise
 
 MOST_STEPS = 60
-LONGEST_STEP = 0.5
+FARTHEST = 0.5
 """How far a parameter may move in one step, in standard deviations of its prior."""
-SETTLED = 1e-4
+NEAREST = 1e-4
 """Change of all parameters at which the fit ends, in standard deviations of the prior."""
 TOLD = 0.9
 """Standard deviation after over before the recording, from which on the recording tells nothing of a parameter."""
@@ -77,13 +77,14 @@ def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags
     """Parameters of which the free ones have moved, and the covariance of all; steps are in units of the prior."""
     unit = prior.sd
     correlation = prior.covariance / np.outer(unit, unit)
-    precision = np.linalg.inv(correlation)
+    precision: Floats = np.asarray(np.linalg.inv(correlation), dtype=np.float64)
     least = 1.0 / float(np.linalg.eigvalsh(correlation)[-1])
     value, covariance = prior.mean.copy(), correlation
     values = sum(run.size for run in runs)
     fitted = 0.0
     for _ in range(MOST_STEPS if values else 0):
-        told, pull = np.zeros_like(precision), precision @ ((prior.mean - value) / unit)
+        told: Floats = np.zeros_like(precision)
+        pull: Floats = precision @ ((prior.mean - value) / unit)
         for run, (error, slope) in zip(runs, errors(value), strict=True):
             noise = RunNoise.of_errors(error, run, fitted * run.size / values)
             jacobian = noise.whitened(slope * unit)
@@ -96,8 +97,8 @@ def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags
         step = np.zeros_like(value)
         step[moving] = _inverse(normal[np.ix_(moving, moving)], least) @ pull[moving]
         longest = float(np.max(np.abs(step)))
-        value = np.maximum(value + step * unit * min(1.0, LONGEST_STEP / max(longest, SETTLED)), prior.lowest)
-        if longest < SETTLED:
+        value = np.maximum(value + step * unit * min(1.0, FARTHEST / max(longest, NEAREST)), prior.lowest)
+        if longest < NEAREST:
             break
     return value, covariance * np.outer(unit, unit)
 
