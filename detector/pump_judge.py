@@ -68,6 +68,7 @@ class PumpJudge:
         self._datasheet = datasheet
         self._curve = datasheet.curves[pump]
         self._friction_h2_m5 = datasheet.main_of(pump).friction_h2_m5
+        self._needed = NEEDED | {"level_m"} if datasheet.main_of(pump).level_slope else NEEDED
         self._costs = costs
 
     def tell(self, time_ns: int, reason: str) -> Judgement:
@@ -162,7 +163,7 @@ class PumpJudge:
 
     def _without_segment(self, run: Run, evidence: dict[str, Any]) -> Judgement:
         """Judge a run without a segment."""
-        memory, lacking = self.memory, sorted(run.missing & NEEDED)
+        memory, lacking = self.memory, sorted(run.missing & self._needed)
         is_learnt = memory.reference is not None
         if lacking and is_learnt:
             return self._sensor_fault(run, evidence | {"lost": lacking})

@@ -11,7 +11,7 @@ from wetwell.simulator.control.drive import turned_ratio
 from wetwell.simulator.control.supervision import drive, supervise
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h, pump_head_m
-from wetwell.simulator.parameters import PlantRecords
+from wetwell.simulator.parameters import MainParameters, PlantRecords
 from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_power_kw
 from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_channel, read_pumps, silence
@@ -85,23 +85,17 @@ def move_plant(
     """Move pumps and water on by a second, and note the truth; whether any pump turned or had water moving in it."""
     station, now = plant.station[0], state.station[0]
     level_m = level_at_volume_m(now.volume_m3, plant.profile)
-    for m in range(plant.mains.size):
-        main = plant.mains[m]
-        static_head_m = main.static_head_m - main.level_slope * level_m
-        static_head_m -= main.lift_slope * (level_m - main.lift_reference_m)
-        state.static_head_m[m] = static_head_m + forcing.static_rise_m[second]
-        state.friction_h2_m5[m] = main.friction_h2_m5 * forcing.friction_factor[second]
     is_moving = is_moving_now(state)
     if is_moving:
         turn_pumps(plant, state, forcing, second)
         for m in range(plant.mains.size):
-            move_water(plant, state, m)
-    for m in range(plant.mains.size):
-        if plant.mains[m].air_head_m > 0.0:
+            move_water(plant, state, forcing, second, m, level_m)
+    if plant.has_air:
+        for m in range(plant.mains.size):
             gather_air(plant, state, m)
     over_m3h = overflow_m3h(level_m, station.overflow_level_m, station.weir_width_m, plant.profile)
     inflow_m3h = forcing.inflow_m3h[second] + station.unmetered_inflow_m3h + extra_inflow_m3h
-    inflow_m3h += back_flow_m3h(plant, state, forcing, second)
+    inflow_m3h += back_flow_m3h(plant, state, forcing, second, level_m)
     now.volume_m3 = next_volume_m3(now.volume_m3, inflow_m3h, over_m3h, state.mean_flow_m3h)
     if is_moving:
         load_pumps(plant, state, forcing.voltage_factor[second], truth, at_truth)
@@ -154,13 +148,22 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
 
 
 @inlined
-def move_water(plant: PlantRecords, state: PlantState, m: int) -> None:
+def static_head_at_m(main: MainParameters, level_m: float, rise_m: float) -> float:
+    """Static head of a main with the wet well at a level, and what a fault adds; may be negative. [m]."""
+    static_head_m = main.static_head_m - main.level_slope * level_m
+    return static_head_m - main.lift_slope * (level_m - main.lift_reference_m) + rise_m
+
+
+@inlined
+def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, m: int, level_m: float) -> None:
     """Set the flows of main m after the second and their means over it."""
+    static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[second])
+    friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[second]
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     inertia_s2_m2 = plant.mains[m].inertia_s2_m2
     flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
     if inertia_s2_m2 <= 0.0:
-        _solve_flows(plant, state, m, 0.0)
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, 0.0)
         for i in pumps:
             mean_m3h[i] = flow_m3h[i]
         return
@@ -170,21 +173,27 @@ def move_water(plant: PlantRecords, state: PlantState, m: int) -> None:
     for _ in range(INERTIA_STEPS):
         for i in pumps:
             before_m3h[i] = flow_m3h[i]
-        _solve_flows(plant, state, m, inertia_m_m3h)
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
         for i in pumps:
             mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / INERTIA_STEPS
             flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
-        _solve_flows(plant, state, m, inertia_m_m3h)
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
         for i in pumps:
             mean_m3h[i] += STAGE * flow_m3h[i] / INERTIA_STEPS
 
 
 @inlined
-def _solve_flows(plant: PlantRecords, state: PlantState, m: int, inertia_m_m3h: float) -> None:
+def _solve_flows(
+    plant: PlantRecords,
+    state: PlantState,
+    m: int,
+    static_head_m: float,
+    friction_h2_m5: float,
+    inertia_m_m3h: float,
+) -> None:
     """Set the flows of main m by its layout; pipes of their own have air of their own."""
     main, curves, flow_m3h = plant.mains[m], state.curves, state.flow_m3h
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
-    static_head_m, friction_h2_m5 = state.static_head_m[m], state.friction_h2_m5[m]
     if main.is_common_header:
         lift_m = max(static_head_m + state.pumps[pumps[0]].air_m, 0.0)
         own_h2_m5 = friction_h2_m5 * (1.0 - main.shared_friction)
@@ -220,17 +229,19 @@ def gather_air(plant: PlantRecords, state: PlantState, m: int) -> None:
 
 
 @inlined
-def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int) -> float:
+def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, level_m: float) -> float:
     """Flow back into the wet well through the check valves of standing pumps: K sqrt(H), H the head behind."""
     back_m3h = 0.0
     for i in range(state.pumps.size):
         leak_m3h = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
         if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
             m = plant.pumps[i].main
-            head_m = max(state.static_head_m[m] + state.pumps[i].air_m, 0.0)
+            static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[second])
+            head_m = max(static_head_m + state.pumps[i].air_m, 0.0)
             if plant.mains[m].is_common_header:
                 pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
-                head_m += state.friction_h2_m5[m] * sum_of(state.mean_flow_m3h, pumps) ** 2
+                friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[second]
+                head_m += friction_h2_m5 * sum_of(state.mean_flow_m3h, pumps) ** 2
             back_m3h += leak_m3h * math.sqrt(head_m)
     return back_m3h
 

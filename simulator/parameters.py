@@ -188,6 +188,7 @@ class PlantParameters:
             mains=records_of(self.mains),
             pumps=records_of(self.pumps),
             pumps_by_main=np.argsort(mains, kind="stable"),
+            has_air=any(main.air_head_m > 0.0 for main in self.mains),
             pumps_until=np.cumsum([0, *np.bincount(mains, minlength=len(self.mains))]),
             sensors=records_of(self.sensors),
             profile=self.profile,
@@ -199,7 +200,8 @@ class PlantParameters:
 class PlantRecords(NamedTuple):
     """Parameters of a plant in records; of the station there is one.
 
-    Main m has the pumps `pumps_by_main[pumps_until[m]:pumps_until[m + 1]]`, counted from 0.
+    Main m has the pumps `pumps_by_main[pumps_until[m]:pumps_until[m + 1]]`, counted from 0. `has_air` says whether
+    air may gather in any.
     """
 
     station: Records[PlantParameters]
@@ -207,6 +209,7 @@ class PlantRecords(NamedTuple):
     pumps: Records[PumpParameters]
     pumps_by_main: Integers
     pumps_until: Integers
+    has_air: bool
     sensors: Records[SensorParameters]
     profile: Records[ProfileSlice]
     start_levels_m: Floats

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from wetwell.protocols.messages.message import Stamp
 from wetwell.protocols.station.station_file import NAME_PATTERN
-from wetwell.protocols.station.table import NonNegative, Positive, Table
+from wetwell.protocols.station.table import Finite, Positive, Table
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.inflow import Inflow
 from wetwell.simulator.inflow.empirical import EmpiricalInflow
@@ -41,7 +41,7 @@ class Scenario(Table):
     description: str = ""
     duration_s: Positive = 172_800.0
     start_time: Stamp | None = None
-    initial_level_m: NonNegative = 1.0
+    initial_level_m: Finite = 1.0
     clock_speed: Positive = 1.0
     inflow: Inflow = EmpiricalInflow()
     fault: tuple[Fault, ...] = ()

@@ -40,7 +40,7 @@ class Simulation:
     ------
     ValueError
         If a fault names a pump that the station does not have, an effect of the station is not known or wrong, or
-        nobody knows when it starts its pumps.
+        nobody knows when it starts its pumps, or the initial level lies under its floor.
     """
 
     def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
@@ -52,6 +52,12 @@ class Simulation:
                     f"scenario '{scenario.name}': fault[{number}].pump: got {pump}, "
                     f"station '{station.name}' has {len(station.pump)} pumps"
                 )
+        floor_m = station.sump.floor_level_m
+        if scenario.initial_level_m < floor_m:
+            raise ValueError(
+                f"scenario '{scenario.name}': initial_level_m: got {scenario.initial_level_m:g}, "
+                f"the floor of station '{station.name}' is at {floor_m:g}"
+            )
         inflow_rng, self._sensor_rng = np.random.default_rng(seed).spawn(2)
         self.station = station
         self.scenario = scenario

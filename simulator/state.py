@@ -63,18 +63,15 @@ class ChannelState:
 class PlantState(NamedTuple):
     """State of a plant; of the station there is one record.
 
-    Each main has its static head and friction in this second. The hydraulics works on arrays of one value a pump:
-    (pumps, 3) curves, the speed that the water sees, the flows now and before a step, and their means over the
-    second. `past` (channels, m) and `level_history` (m,) are rings of the last seconds. `started` holds the commanded
-    pumps in the order of their starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest
-    first.
+    The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
+    now and before a step, and their means over the second. `past` (channels, m) and `level_history` (m,) are rings of
+    the last seconds. `started` holds the commanded pumps in the order of their starts; `recent_starts` (pumps, k) the
+    seconds of the last starts of each, the newest first.
     """
 
     station: Records[StationState]
     pumps: Records[PumpState]
     channels: Records[ChannelState]
-    static_head_m: Floats
-    friction_h2_m5: Floats
     curves: Floats
     speed_ratio: Floats
     flow_m3h: Floats
@@ -103,8 +100,6 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         station=records_of([StationState(volume_m3=volume_at_level_m3(level_m, parameters.profile))]),
         pumps=records_of([PumpState(air_m=parameters.main_of(i).air_head_m) for i in range(pumps)]),
         channels=records_of([ChannelState()] * channels(pumps)),
-        static_head_m=np.zeros(len(parameters.mains)),
-        friction_h2_m5=np.zeros(len(parameters.mains)),
         curves=np.zeros((pumps, 3)),
         speed_ratio=np.zeros(pumps),
         flow_m3h=np.zeros(pumps),

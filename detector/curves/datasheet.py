@@ -78,6 +78,8 @@ class Datasheet:
         Cross-section of the wet well. [m²]
     middle_level_m : float
         Level at which a curve is drawn where no other is known. [m]
+    floor_level_m : float
+        Level at which the wet well is empty. [m]
     """
 
     curves: tuple[Curve, ...]
@@ -86,6 +88,7 @@ class Datasheet:
     main_of_pump: tuple[int, ...]
     area_m2: float
     middle_level_m: float
+    floor_level_m: float = 0.0
 
     @property
     def pumps(self) -> int:
@@ -216,4 +219,5 @@ def datasheet_of(station: Station) -> Datasheet:
         main_of_pump=station.main_of_pump,
         area_m2=station.sump.mean_area_m2,
         middle_level_m=station.middle_level_m,
+        floor_level_m=station.sump.floor_level_m,
     )

@@ -95,6 +95,7 @@ def tangent_residuals(
     friction_h2_m5: float,
     samples_per_segment: int = 1,
     total_flow_m3h: npt.ArrayLike | None = None,
+    system_head_m: npt.ArrayLike | None = None,
 ) -> tuple[Floats, Floats]:
     r"""Part of each move of the duty point that leaves the pump curve, and part that leaves the system curve.
 
@@ -119,6 +120,8 @@ def tangent_residuals(
         1 for differences of samples, 25 as in the paper's numerical study.
     total_flow_m3h : (n,) array, optional
         Flow of the rising main; the pump's own flow if not given. [m³/h]
+    system_head_m : (n,) array, optional
+        Head without what the level in the wet well does to the lift; the measured one if not given. [m]
 
     Returns
     -------
@@ -148,7 +151,7 @@ def tangent_residuals(
         segment_means(values, samples_per_segment) for values in normalise(flow_m3h, head_m, speed_ratio)
     )
     total_flow = segment_means(flow_m3h if total_flow_m3h is None else total_flow_m3h, samples_per_segment)
-    head = segment_means(head_m, samples_per_segment)
+    head = segment_means(head_m if system_head_m is None else system_head_m, samples_per_segment)
     slope_p = pump_slope((nominal_flow[1:] + nominal_flow[:-1]) / 2.0, curve)
     slope_s = system_slope((total_flow[1:] + total_flow[:-1]) / 2.0, friction_h2_m5)
     return (

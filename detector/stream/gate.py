@@ -31,6 +31,7 @@ CONFIRMATIONS = 10
 RESENT_SAMPLES = 1000
 """More samples than a bus sends again after a lost link; they come with numbers that were there before."""
 LEVEL_RANGE_M = (-1.0, 100.0)
+"""Of the level over the floor of the wet well."""
 POWER_RANGE_KW = (-1.0, 1.0e6)
 CENTURY_S = 3.2e9
 
@@ -54,7 +55,11 @@ GATE = np.dtype(
 """Stamp and number of the last sample let through, of the last one that disagreed, counts, time since the sample
 before, and the time in all that the station has been seen."""
 RANGES = np.dtype(
-    [(f"{end}_{name}", np.float64) for name in ("frequency_hz", "flow_m3h", "head_m") for end in ("low", "high")]
+    [
+        (f"{end}_{name}", np.float64)
+        for name in ("level_m", "frequency_hz", "flow_m3h", "head_m")
+        for end in ("low", "high")
+    ]
 )
 
 
@@ -69,14 +74,16 @@ def gate_counts(gate: Any) -> dict[str, int]:
 
 
 def gate_ranges(datasheet: Datasheet) -> Records:
-    """Lowest and highest readings that each pump can show."""
+    """Lowest and highest readings that each pump can show; the level is the same for all."""
     return np.array([_ranges(datasheet, pump) for pump in range(datasheet.pumps)], dtype=RANGES)
 
 
 def _ranges(datasheet: Datasheet, pump: int) -> tuple[float, ...]:
-    """Lowest and highest frequency, flow and head that a pump can show."""
+    """Lowest and highest level, frequency, flow and head that a pump can show."""
     runout_m3h = datasheet.runout_flow_m3h(pump)
     return (
+        datasheet.floor_level_m + LEVEL_RANGE_M[0],
+        datasheet.floor_level_m + LEVEL_RANGE_M[1],
         -0.5,
         2.0 * datasheet.frequencies_hz[pump],
         -0.1 * runout_m3h,
@@ -168,7 +175,7 @@ def let_through(
         return True
     if pumps != ranges.shape[0]:
         state["wrong_pump_count"] += 1
-    frame[LEVEL] = _checked(state, values[LEVEL], LEVEL_RANGE_M[0], LEVEL_RANGE_M[1])
+    frame[LEVEL] = _checked(state, values[LEVEL], ranges[0]["low_level_m"], ranges[0]["high_level_m"])
     if math.isfinite(values[INFLOW]):
         frame[INFLOW] = values[INFLOW]
     for pump in range(min(pumps, ranges.shape[0])):

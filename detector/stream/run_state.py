@@ -28,6 +28,8 @@ SIGNALS = ("frequency_hz", "flow_m3h", "head_m", "level_m", "power_kw")
 NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
 """Without these a pump cannot be told from the system."""
 NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
+LEVEL_BIT = 1 << SIGNALS.index("level_m")
+"""Needed too where the main lifts to a delivery level."""
 BLIND_S = 60.0
 """A run that has lacked one of them for so long is reported at once."""
 WARM_UP_NS, SETTLING_NS, PART_NS, BLIND_NS = (int(s * NS_PER_S) for s in (WARM_UP_S, SETTLING_S, MAX_RUN_S, BLIND_S))
@@ -250,6 +252,7 @@ def collect(table: Records, pumps: Any, time_ns: int, frame: Floats, steady_samp
             at += 1
         if not pump["is_reported_blind"] and time_ns - pump["start_ns"] >= BLIND_NS:
             pump["is_reported_blind"] = 1
-            pump["is_blind"] = pump["seen"] & NEEDED_BITS != NEEDED_BITS
+            needed = NEEDED_BITS | LEVEL_BIT if table[number]["level_slope"] > 0.0 else NEEDED_BITS
+            pump["is_blind"] = pump["seen"] & needed != needed
             any_blind = any_blind or pump["is_blind"] != 0
     return any_blind

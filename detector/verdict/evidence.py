@@ -24,13 +24,16 @@ def run_evidence(run: Run, datasheet: Datasheet, rng: np.random.Generator) -> di
     """Figures of both methods of the paper on a run by itself.
 
     `f_test`: drift of either curve within the run. `tangent`: the attribution index of the steps between its
-    segments, with its block-bootstrap interval.
+    segments, with its block-bootstrap interval. Where the main lifts to a delivery level, what the level in the wet
+    well does to the lift is no motion of the main.
     """
     evidence: dict[str, Any] = {}
+    main = datasheet.main_of(run.pump)
+    system_head_m = run.head_m + main.level_slope * run.level_m if main.level_slope else run.head_m
     if len(run.time_s) >= MIN_SAMPLES:
         evidence["f_test"] = {
             "pump": f_test_figures(pump_curve_f_test(run.time_s, run.flow_m3h, run.head_m, run.speed_ratio)),
-            "system": f_test_figures(system_curve_f_test(run.time_s, run.total_flow_m3h, run.head_m)),
+            "system": f_test_figures(system_curve_f_test(run.time_s, run.total_flow_m3h, system_head_m)),
         }
     if len(run.segments) > 1:
         steps = tangent_residuals(
@@ -38,9 +41,10 @@ def run_evidence(run: Run, datasheet: Datasheet, rng: np.random.Generator) -> di
             run.head_m,
             run.speed_ratio,
             curve=datasheet.curves[run.pump],
-            friction_h2_m5=datasheet.main_of(run.pump).friction_h2_m5,
+            friction_h2_m5=main.friction_h2_m5,
             samples_per_segment=run.segments.samples,
             total_flow_m3h=run.total_flow_m3h,
+            system_head_m=system_head_m,
         )
         evidence["tangent"] = index_figures(*steps, rng)
     return evidence

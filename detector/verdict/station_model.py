@@ -46,6 +46,7 @@ class StationModel:
             start_levels_m=self._station.control.start_levels_m,
             stop_levels_m=self._station.control.stop_levels_m,
             floor_area_m2=self._datasheet.area_m2,
+            floor_level_m=self._datasheet.floor_level_m,
             is_common_header=len(self._datasheet.mains) == 1 and self._datasheet.mains[0].is_common_header,
             pumps=tuple(self._pump(index, baseline, told.get(index + 1)) for index, baseline in enumerate(baselines)),
         )

@@ -49,5 +49,6 @@ class Model(Message):
     start_levels_m: tuple[float, ...]
     stop_levels_m: tuple[float, ...]
     floor_area_m2: float
+    floor_level_m: float = 0.0
     is_common_header: bool = False
     pumps: tuple[PumpModel, ...]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.options import ConfigOption, JsonOption, StationOption, print_result
 from wetwell.services.runtime.settings import load_settings
 
@@ -59,8 +60,13 @@ def modbus_map(
     """Print the register map of a station's Modbus server."""
     from wetwell.protocols.modbus.registers import register_csv, register_table
     from wetwell.services.stations import find_station
+    from wetwell.simulator.simulation import check_driven
 
     plant = find_station(station)
+    try:
+        check_driven(plant)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
     typer.echo(register_csv(register_table(len(plant.pump), len(plant.control.start_levels_m))), nl=False)
 
 

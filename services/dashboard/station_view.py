@@ -59,6 +59,7 @@ class StationView:
         self._fresh: dict[str, Any] = {}
         self._model: str | None = None
         self._levels: tuple[float, ...] = ()
+        self._floor_m = 0.0
         self._names: list[str | None] = []
         self._verdicts: dict[int, deque[str]] = {}
         self._states: dict[int, State] = {}
@@ -125,6 +126,7 @@ class StationView:
         """Take the curves."""
         self._model = model.encode().decode()
         self._levels = model.start_levels_m
+        self._floor_m = model.floor_level_m
         self._names = [pump.name for pump in model.pumps]
         self._fresh["model"] = self._model
 
@@ -212,6 +214,7 @@ class StationView:
             "pumps": [self._states.get(pump, "unknown") for pump in range(1, pumps + 1)],
             "names": self._names,
             "levels": self._levels[-1:],
+            "floor": self._floor_m,
             "alarms": len(active),
             "unacknowledged": sum(alarm.state in {"unacknowledged", "returned"} for alarm in active),
         }

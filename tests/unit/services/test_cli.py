@@ -283,3 +283,38 @@ def test_an_export_is_drafted_and_converted(
     assert told["unmapped"] == [{"tag": "Weather"}]
     assert told["stamps_that_came_again"] == 8
     assert out.read_text().splitlines()[0] == "# wetwell station=export"
+
+
+EXTERNAL = STATION + 'control = {mode = "external"}\n'
+NOBODY_KNOWS = "station 's': control.mode: 'external': nobody knows when pumps start: replay a recording"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["simulate", "--out", "{tmp}/x.csv"],
+        ["up"],
+        ["simulator"],
+        ["plc"],
+        ["dataset", "--count", "1", "--seed", "1", "--out", "{tmp}/set"],
+        ["modbus-map"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_nothing_starts_the_pumps_of_a_station_that_others_control(tmp_path, run_wetwell, capsys, arguments) -> None:
+    file = tmp_path / "external.toml"
+    file.write_text(EXTERNAL)
+    given = [argument.format(tmp=tmp_path) for argument in arguments]
+    assert run_wetwell(*given, "--station", str(file)) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"wetwell: {NOBODY_KNOWS}")
+    assert sorted(tmp_path.iterdir()) == [file]
+
+
+def test_the_duty_points_tell_pumps_and_mains_by_name(run_wetwell, capsys) -> None:
+    assert run_wetwell("station", "show", "twin", "--json") == 0
+    table = json.loads(capsys.readouterr().out)
+    assert [main["main"] for main in table["mains"]] == ["line 1", "line 2"]
+    assert [main["static_head_m"] for main in table["mains"]] == [pytest.approx(14.0 - table["level_m"])] * 2
+    assert [row["name"] for row in table["each_pump_alone"]] == ["1.1", "2.1", "1.2", "2.2"]
+    alone, together = table["each_pump_alone"], table["all_pumps_together"]
+    assert all(one["flow_m3h"] > both["flow_m3h"] for one, both in zip(alone, together, strict=True))

@@ -10,6 +10,7 @@ from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.dataset import check_dataset, plan_of
+from wetwell.services.stations import find_station
 from wetwell.simulator.dataset import MAX_PUMPS, item_of, kinds_of, labels
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import PumpFault, SensorFault
@@ -110,3 +111,20 @@ def test_a_bad_manifest_is_refused(tmp_path, text: str, said: str) -> None:
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(RecordingError, match=said):
         check_dataset(tmp_path)
+
+
+def test_stations_with_several_mains_are_sampled_and_external_ones_refused() -> None:
+    """Mains without a pump in the draw are left out; what is left is a station again, written and read."""
+    twin = find_station("twin")
+    items = [item_of([twin], 4, number, DAY_S) for number in range(24)]
+    assert {len(item.station.mains) for item in items} == {1, 2}
+    for item in items:
+        station = item.station
+        assert {pump.main for pump in station.pump} == {main.name for main in station.mains}
+        assert all(main.delivery_level_m is not None for main in station.mains)
+        assert station.sump.volume_points is not None
+        text = tomli_w.dumps(station.model_dump(exclude_none=True))
+        assert Station.model_validate(tomllib.loads(text)) == station
+    external = Station.model_validate(twin.model_dump(exclude_none=True) | {"control": {"mode": "external"}})
+    with pytest.raises(ValueError, match="'external': nobody knows when pumps start"):
+        item_of([external], 4, 0, DAY_S)

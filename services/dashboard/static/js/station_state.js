@@ -111,6 +111,16 @@ export class StationState {
     return name ? `${number} (${name})` : String(number);
   }
 
+  /** Names of the mains, in the order of their pumps; one without a name where nothing is known of them. */
+  get mains() {
+    return [...new Set(this.model?.pumps.map((each) => each.main ?? null) ?? [null])];
+  }
+
+  /** Place of a pump's main among them. */
+  mainOf(number) {
+    return Math.max(0, this.mains.indexOf(this.model?.pumps.find((each) => each.pump === number)?.main ?? null));
+  }
+
   /** Pumps on the common header of a pump, none where it has a pipe of its own. */
   header(number) {
     return this.model?.pumps.find((each) => each.pump === number)?.header ?? [];

@@ -104,8 +104,9 @@ function stationLine() {
       name.href = `/station/${encodeURIComponent(station.name)}`;
     }
     pumps.show(station.pumps, station.running, station.names);
-    const top = (station.levels[0] ?? 2) * 1.2;
-    fill.style.transform = `scaleX(${Math.min(1, Math.max(0, (station.level ?? 0) / top))})`;
+    const { floor } = station;
+    const depth = ((station.levels[0] ?? floor + 2) - floor) * 1.2;
+    fill.style.transform = `scaleX(${Math.min(1, Math.max(0, ((station.level ?? floor) - floor) / depth))})`;
     say(level, `${figure(station.level, 2)} m`);
     say(cells.flow, figure(station.flow, 0));
     say(cells.power, figure(station.power, 1));

@@ -6,6 +6,7 @@ import { icon, isFault, state } from "./states.js";
 
 const WIDTH = 560;
 const HEIGHT = 400;
+const PIPE = { y: 34, apart: 12 };
 const WELL = { left: 84, right: 534, top: 120, bottom: 330 };
 
 export function wellPanel(station, chosen, choose) {
@@ -27,14 +28,16 @@ export function wellPanel(station, chosen, choose) {
     levelText = svg("text", { class: "big", x: left - 7, "text-anchor": "end" });
     inflowText = svg("text", { x: 4, y: top - 42 });
     mainText = svg("text", { x: right, y: 22, "text-anchor": "end" });
-    pumps = Array.from({ length: station.pumps }, (_, place) => pumpDrawing(place + 1, left + (width * (place + 0.5)) / station.pumps, choose));
+    pumps = Array.from({ length: station.pumps }, (_, place) => pumpDrawing(place + 1, left + (width * (place + 0.5)) / station.pumps, pipeY(station.mainOf(place + 1)), choose));
     const lines = levels().map(({ value, word }) => {
       const y = levelY(value);
       return svg("g", { class: "limit" }, svg("line", { x1: right - 14, x2: right, y1: y, y2: y }), svg("text", { x: right + 5, y: y + 3.5 }, word));
     });
     drawing.replaceChildren(
-      svg("line", { class: "pipe", x1: left, x2: right, y1: 34, y2: 34 }),
-      svg("path", { class: "arrow", d: `M${right} 34l-12 -7v14z` }),
+      ...station.mains.flatMap((_, place) => [
+        svg("line", { class: "pipe", x1: left, x2: right, y1: pipeY(place), y2: pipeY(place) }),
+        svg("path", { class: "arrow", d: `M${right} ${pipeY(place)}l-12 -7v14z` }),
+      ]),
       svg("path", { class: "pipe", d: `M4 ${top - 30}H${left - 22}V${top - 8}` }),
       svg("path", { class: "arrow", d: `M${left - 22} ${top + 4}l-7 -13h14z` }),
       water, svg("path", { class: "wall", d: `M${left} ${top - 8}V${bottom}H${right}V${top - 8}` }),
@@ -43,8 +46,10 @@ export function wellPanel(station, chosen, choose) {
   }
 
   const starts = () => station.model?.start_levels_m ?? [];
-  const highest = () => Math.max(2, ...starts()) * 1.2;
-  const levelY = (level) => WELL.bottom - ((WELL.bottom - WELL.top) * level) / highest();
+  const floor = () => station.model?.floor_level_m ?? 0;
+  const known = () => (starts().length ? starts() : station.rows.map((row) => row[1] ?? floor()));
+  const depth = () => Math.max(2, ...known().map((level) => level - floor())) * 1.2;
+  const levelY = (level) => WELL.bottom - ((WELL.bottom - WELL.top) * (level - floor())) / depth();
 
   function levels() {
     const stops = station.model?.stop_levels_m ?? [];
@@ -55,32 +60,37 @@ export function wellPanel(station, chosen, choose) {
   }
 
   function update() {
-    const form = `${station.pumps} ${starts()}`;
+    const form = `${station.pumps} ${starts()} ${floor()} ${station.mains}`;
     if (form !== made) {
       made = form;
       make();
     }
     const level = station.level;
-    const share = Number.isFinite(level) ? Math.min(1, Math.max(0, level / highest())) : 0;
+    const share = Number.isFinite(level) ? Math.min(1, Math.max(0, (level - floor()) / depth())) : 0;
     water.style.transform = `scaleY(${share})`;
     say(levelText, `${figure(level, 2)} m`);
-    mark(levelText, "y", (levelY(share * highest()) + 6).toFixed(0));
+    mark(levelText, "y", (levelY(floor() + share * depth()) + 6).toFixed(0));
     say(inflowText, station.inflow == null ? "inflow" : `inflow ${figure(station.inflow, 0)} m³/h`);
-    say(mainText, `rising main ${figure(station.totalFlow(), 0)} m³/h`);
+    say(mainText, station.mains.map((name, place) => `${name ?? "rising main"} ${figure(station.totalFlow(pumpsOf(place)), 0)} m³/h`).join(", "));
     for (const each of pumps) each.update(station, chosen());
     const told = pumps.map((_, place) => `pump ${station.called(place + 1)} ${station.isRunning(place + 1) ? "runs" : "stands"}, ${state(station.pumpState(place + 1)).word}`);
     say(words, `Level ${figure(level, 2)} m. ${told.join("; ")}.`);
   }
 
+  const pumpsOf = (main) => pumps.map((_, place) => place + 1).filter((number) => station.mainOf(number) === main);
+
   return { element, update };
 }
 
-function pumpDrawing(number, x, choose) {
+/** Pipes of several mains lie one under the other; the first where a single one is. */
+const pipeY = (main) => PIPE.y + PIPE.apart * main;
+
+function pumpDrawing(number, x, top, choose) {
   const y = 292;
   const impeller = svg("g", { class: "impeller" },
     ...[0, 120, 240].map((turn) => svg("path", { d: "M0 0C2-8 8-12 15-11", transform: `rotate(${turn})` })));
   const body = svg("g", { transform: `translate(${x} ${y})` }, svg("circle", { r: 22 }), impeller);
-  const pipe = svg("path", { class: "pipe", d: `M${x} ${y - 22}V34` });
+  const pipe = svg("path", { class: "pipe", d: `M${x} ${y - 22}V${top}` });
   const badge = svg("g", { class: "badge", transform: `translate(${x + 14} ${y - 36})` });
   const flow = svg("text", { x: x + 7, y: 66 });
   const head = svg("text", { x: x + 7, y: 82 });

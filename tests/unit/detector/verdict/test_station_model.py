@@ -12,6 +12,7 @@ from wetwell.detector.stream.run_state import new_pumps
 from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.keys import model_key
 from wetwell.services.detector.model_publisher import ModelPublisher
+from wetwell.services.stations import find_station
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 
@@ -28,6 +29,19 @@ def test_before_learning_only_the_datasheet_is_known(alpha) -> None:
         assert pump.configured_pump.head_m[0] == 36.0
         assert pump.configured_system.head_m[0] == 2.0
         assert (pump.learnt_pump, pump.now_pump) == (None, None)
+
+
+def test_pumps_bear_their_names_their_main_and_who_shares_it(alpha) -> None:
+    twin = find_station("twin")
+    model = StationModel(twin).message((None,) * 4, {}, 0)
+    assert not model.is_common_header
+    assert [pump.name for pump in model.pumps] == ["1.1", "2.1", "1.2", "2.2"]
+    assert [pump.main for pump in model.pumps] == ["line 1", "line 2"] * 2
+    assert [pump.header for pump in model.pumps] == [(1, 3), (2, 4)] * 2
+    lift_m = 14.0 - twin.middle_level_m
+    assert [pump.configured_system.head_m[0] for pump in model.pumps] == [pytest.approx(lift_m)] * 4
+    plain = StationModel(alpha).message((None,) * 3, {}, 0)
+    assert [(pump.name, pump.main, pump.header) for pump in plain.pumps] == [(None, None, ())] * 3
 
 
 def test_the_learnt_curves_of_a_healthy_station_are_the_datasheets(alpha, learnt) -> None:

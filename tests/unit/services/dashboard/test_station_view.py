@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.history import History
@@ -15,6 +16,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.dashboard.sample_row import past_rows, sample_row, thinned
 from wetwell.services.dashboard.site_view import ROWS, SiteView
 from wetwell.services.dashboard.station_view import LATE_SAMPLES, ROWS_A_FRAME
+from wetwell.services.stations import find_station
 
 
 def sample(second, station="alpha", *, level_m=1.0, running=True):
@@ -228,6 +230,14 @@ def test_the_overview_sends_what_has_changed_only(view) -> None:
     view.advance(0.5)
     second = json.loads(view.site_frame())
     assert second == {"id": view.frame_id, "live": [[1, 2000, 1, 200, 18.5, [1]]], "stations": {}}
+
+
+def test_the_overview_knows_the_names_of_the_pumps(view) -> None:
+    view.handle_model(StationModel(find_station("twin")).message((None,) * 4, {}, 0).encode())
+    view.advance(0.25)
+    summary = json.loads(view.site_state())["stations"]["0"]
+    assert summary["names"] == ["1.1", "2.1", "1.2", "2.2"]
+    assert summary["floor"] == pytest.approx(-2.0 - 5.0 / 9.0)
 
 
 def test_alarms_count_until_they_are_normal(view) -> None:
