@@ -10,12 +10,15 @@ from pydantic import ValidationError
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError, first_fault
+from wetwell.protocols.quantities import PUMP_METERS
 from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station, load_toml
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.validation_page import validation_page
-from wetwell.sim2real.calibration.calibration import calibrate, with_estimates
+from wetwell.sim2real.calibration.calibration import calibrate
+from wetwell.sim2real.calibration.comparison import Errors, compare
+from wetwell.sim2real.calibration.fitted_station import with_estimates
 from wetwell.sim2real.calibration.validation import validate
 from wetwell.sim2real.recording.preparation import Preparation, PreparationReport, prepare
 
@@ -85,8 +88,10 @@ def calibrate_file(
                 "value": float(f"{estimate.value:.6g}"),
                 "low": None if estimate.interval is None else float(f"{estimate.interval[0]:.6g}"),
                 "high": None if estimate.interval is None else float(f"{estimate.interval[1]:.6g}"),
+                "prior": None if estimate.prior is None else float(f"{estimate.prior[0]:.6g}"),
+                "prior_sd": None if estimate.prior is None else float(f"{estimate.prior[1]:.3g}"),
                 "unit": estimate.unit,
-                "kept_because": estimate.reason,
+                "reason": estimate.reason,
             }
             for estimate in estimates
         ],
@@ -100,16 +105,29 @@ def validate_file(
     out: Path | None,
     html: Path | None = None,
     reading: Reading = PLAIN,
+    *,
+    before: Station | None = None,
 ) -> dict[str, Any]:
-    """Compare the free-running simulator with a recording; write the simulated recording and a page where asked.
+    """Compare a station with a recording, row by row, and where levels drive it the free-running simulator too.
+
+    `before` is compared row by row beside it. The simulated recording and a page are written where asked.
 
     Raises
     ------
+    ConfigError
+        If `out` or `html` is asked of a station that is not driven by levels.
     RecordingError
         If the recording cannot be used, or a file cannot be written.
     """
+    if station.control.is_external and (out is not None or html is not None):
+        raise ConfigError(f"station '{station.name}': control.mode 'external': there is no simulated recording")
     rows, _ = prepared(recording, preparation, station, reading)
     try:
+        table = [_error_row(error) for error in _errors(rows, station)]
+        for row, error in zip(table, _errors(rows, before) if before is not None else (), strict=False):
+            row |= {f"before_{key}": value for key, value in _error_row(error).items() if key.startswith("steady_m")}
+        if station.control.is_external:
+            return {"closed_loop": "control.mode 'external': no levels start pumps", "row_by_row": table}
         result, simulated = validate(rows, station)
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error
@@ -136,7 +154,32 @@ def validate_file(
         "run_h_nmae": _rounded(result.run_h_nmae),
         "inflow": result.inflow,
         "days": days,
+        "row_by_row": table,
     }
+
+
+def _errors(rows: Recording, station: Station) -> list[Errors]:
+    """Errors of all pumps and mains in what the recording measures."""
+    comparison = compare(rows, station)
+    return [error for quantity in PUMP_METERS for error in comparison.errors(quantity) if error.rows > 0]
+
+
+def _error_row(error: Errors) -> dict[str, Any]:
+    """Row of a table, in the order in which it is read."""
+    return {
+        "what": error.what,
+        "quantity": error.quantity,
+        "steady_rows": error.steady_rows,
+        "steady_median": _share(error.steady_median),
+        "steady_rms": _share(error.steady_rms),
+        "bias": _share(error.steady_bias),
+        "rows": error.rows,
+        "rms": _share(error.rms),
+    }
+
+
+def _share(value: float) -> float | None:
+    return round(value, 4) if np.isfinite(value) else None
 
 
 def _rounded(values: Floats) -> list[float | None]:

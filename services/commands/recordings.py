@@ -179,17 +179,21 @@ def validate(
     html: Annotated[
         Path | None, typer.Option("--html", metavar="FILE", help="Page with plots that is written; needs no network.")
     ] = None,
+    before: Annotated[
+        str | None,
+        typer.Option("--before", metavar="FILE", help="Station file to compare row by row beside it."),
+    ] = None,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run the simulator under the inflow of a recording and compare level, starts and run time."""
+    """Compare a station file with a recording: row by row, and free-running where levels start the pumps."""
     from wetwell.services.batch.field_data import validate_file
     from wetwell.services.stations import find_station
 
     reading = Reading.said(time_zone, as_station=as_station)
-    plant = find_station(station)
-    print_result(validate_file(plant, recording, preparation, out, html, reading), as_json=as_json)
+    plant, other = find_station(station), None if before is None else find_station(before)
+    print_result(validate_file(plant, recording, preparation, out, html, reading, before=other), as_json=as_json)
 
 
 @app.command()

@@ -67,8 +67,11 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
     Raises
     ------
     ValueError
-        If the numbers of pumps differ, or level or inflow are neither measured nor can be inferred.
+        If the numbers of pumps differ, no levels drive the station, or level or inflow are neither measured nor can
+        be inferred.
     """
+    if station.control.is_external:
+        raise ValueError(f"station '{station.name}': control.mode 'external': no levels start pumps")
     if recording.pumps != len(station.pump):
         raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {len(station.pump)}")
     level_m = recording.column("level_m")

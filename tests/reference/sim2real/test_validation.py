@@ -8,6 +8,7 @@ import pytest
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.services.batch.field_data import validate_file
 from wetwell.services.stations import find_scenario
+from wetwell.sim2real.calibration.comparison import compare
 from wetwell.sim2real.calibration.validation import Validation, validate
 from wetwell.simulator.simulation import Simulation
 
@@ -81,3 +82,30 @@ def test_what_cannot_be_compared_is_said(alpha, recording):
     single = alpha.model_copy(update={"pump": alpha.pump[:1]})
     with pytest.raises(ValueError, match="the recording has 3 pumps, station 'alpha' 1"):
         validate(recording, single)
+
+
+def test_row_by_row_the_right_station_misses_by_the_noise_of_the_meters_and_a_wrong_one_by_more(alpha):
+    calm = Simulation(alpha, find_scenario("nominal"), 5).advance(6 * 3600, truth=False)
+    told = {error.what: error for error in compare(calm, alpha).errors("flow_m3h")}
+    assert told["pump 1"].steady_rms == pytest.approx(alpha.sensors.flow_noise, rel=0.1)
+    assert abs(told["pump 1"].steady_bias) < 0.001
+    rough = alpha.with_mains([alpha.mains[0].model_copy(update={"friction_h2_m5": 9.0e-4})])
+    c0, c1, c2 = alpha.pump[0].coefficients
+    duty_m3h = [max(np.roots([c2 - friction, c1, c0 - 2.0])) for friction in (6.0e-4, 9.0e-4)]
+    wrong = {error.what: error for error in compare(calm, rough).errors("flow_m3h")}
+    assert wrong["pump 1"].steady_bias == pytest.approx(duty_m3h[1] / duty_m3h[0] - 1.0, abs=0.002)
+
+
+def test_a_mean_of_an_interval_with_a_start_in_it_is_told_by_its_share(quiet_alpha):
+    """A quarter of an interval at full frequency: a quarter of the flow of the steady rows."""
+    hz = np.array([0.0, 12.5, 50.0, 50.0, 50.0, 50.0, 20.0, 0.0])
+    means = Recording(
+        time_ns=np.arange(1, 9) * 900 * 10**9,
+        columns={"level_m": np.ones(8)}
+        | {f"pump{i}_frequency_hz": hz if i == 1 else np.zeros(8) for i in (1, 2, 3)}
+        | {f"pump{i}_flow_m3h": np.zeros(8) for i in (1, 2, 3)},
+        value="mean",
+    )
+    told = compare(means, quiet_alpha).told["flow_m3h"][0]
+    assert told[3] > 100.0
+    np.testing.assert_allclose(told / told[3], [0.0, 0.25, 1.0, 1.0, 1.0, 1.0, 0.4, 0.0])

@@ -1,0 +1,1 @@
+"""Regularised fits: datasheets as prior, noise that comes in runs."""
