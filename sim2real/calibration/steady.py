@@ -8,7 +8,7 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.sim2real.recording.traces import STANDING_HZ
+from wetwell.sim2real.recording.drives import STANDING_HZ
 
 SEGMENT_S = 25.0
 """Time that a steady duty has to last, so that its mean is one. [s]"""
