@@ -4,7 +4,8 @@ import pytest
 
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_station
-from wetwell.sim2real.calibration.calibration import calibrate, with_estimates
+from wetwell.sim2real.calibration.calibration import calibrate
+from wetwell.sim2real.calibration.fitted_station import with_estimates
 from wetwell.sim2real.calibration.validation import validate
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.simulator.effects import EFFECTS
@@ -39,5 +40,5 @@ def test_it_is_calibrated_and_only_the_free_run_is_refused(recording, external):
     estimates = calibrate(recording, external)
     assert not any("levels" in estimate.name for estimate in estimates)
     assert with_estimates(external, estimates).control.is_external
-    with pytest.raises(ValueError, match="'external': nobody knows when pumps start"):
+    with pytest.raises(ValueError, match="'external': no levels start pumps"):
         validate(recording, external)
