@@ -27,6 +27,8 @@ from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.simulator.effects import EFFECTS, effects_of
 
+MISSED = 1.5
+"""Pause over that from row to row, from which a row is missing."""
 THREADS = min(os.cpu_count() or 1, 4)
 """The replay is compiled and holds no lock, so that threads try effects side by side."""
 
@@ -60,7 +62,8 @@ def diagnose_file(
         closed_loop = _closed_loop(rows, station, diagnosis.station)
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error
-    report = diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), _notes(preparation))
+    notes = _notes(preparation, diagnosis.traces.rate_s)
+    report = diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), notes)
     page = gap_page(report, diagnosis)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -115,13 +118,14 @@ def _teacher_forced(rows: Recording, station: Station) -> Recording:
     return Recording(time_ns=rows.time_ns, columns=columns, station=rows.station, value=rows.value)
 
 
-def _notes(preparation: PreparationReport) -> tuple[str, ...]:
-    """What was found out of order."""
-    longest_s = max((gap.length_s for gap in preparation.gaps), default=0.0)
+def _notes(preparation: PreparationReport, rate_s: float) -> tuple[str, ...]:
+    """What was found out of order; a pause from row to row is no gap."""
+    gaps_s = [gap.length_s for gap in preparation.gaps if gap.length_s > MISSED * rate_s]
+    longest_s = max(gaps_s, default=0.0)
     said = (
         (preparation.out_of_order, "rows stood before an earlier one and were put in order"),
         (preparation.doubled, "rows with a time that was there already were dropped"),
-        (len(preparation.gaps), f"gaps, the longest of {longest_s:.0f} s: what is in them is not judged"),
+        (len(gaps_s), f"gaps, the longest of {longest_s:.0f} s: what is in them is not judged"),
     )
     return tuple(f"{count} {text}" for count, text in said if count)
 

@@ -26,6 +26,7 @@ from wetwell.simulator.effects import effects_of
 
 DRAWN_CANDIDATES = 8
 SHOWN_S = 1800
+SHOWN_ROWS = 60
 VERDICT_WORDS = {
     "none": "No gap beyond the noise of the sensors.",
     "unknown": "There is a gap that no effect of the library explains.",
@@ -96,12 +97,15 @@ def _parameters(report: GapReport) -> str:
 
 
 def _traces(diagnosis: Diagnosis) -> str:
-    """Half an hour around the worst held-out cycle of the gap."""
+    """Half an hour, or some rows, around the worst held-out cycle of the gap."""
     traces, replay = diagnosis.traces, diagnosis.replay
     found, bins = diagnosis.attribution, diagnosis.bins
     by_cycle = np.bincount(bins.cycle[found.validation], found.plain[found.validation] ** 2)
-    begin = max(int(np.argmax(diagnosis.regimes.cycle == int(np.argmax(by_cycle)))) - SHOWN_S // 6, 0)
-    window = slice(begin, begin + SHOWN_S)
+    length_s = max(SHOWN_S, round(SHOWN_ROWS * traces.rate_s))
+    begin = max(int(np.argmax(diagnosis.regimes.cycle == int(np.argmax(by_cycle)))) - length_s // 6, 0)
+    window = np.arange(begin, min(begin + length_s, traces.seconds))
+    if not traces.is_each_second:
+        window = window[traces.is_row[window]]
     time_ns = traces.start_ns + NS_PER_S * traces.time_s[window].astype(np.int64)
     added = effects_of(diagnosis.station)[len(replay.own) :]
     running = int(np.argmax((traces.frequency_hz[:, window] > 0.0).sum(axis=1)))
