@@ -42,14 +42,6 @@ def told(flows_m3h, *, running=None, period_s=1):
     return changes, watch
 
 
-def gathered_in(gathered, values, pumps, begin_s=0, seconds=LEARNT_S):
-    """Whether a segment is full in each of some seconds with the same values."""
-    return [
-        gather_segments(TABLE, gathered, second * NS_PER_S, 1.0, values, STILL, pumps)
-        for second in range(begin_s, begin_s + seconds)
-    ]
-
-
 def noisy(*levels_m3h, samples, seed=0):
     rng = np.random.default_rng(seed)
     return np.concatenate([level * (1.0 + 0.01 * rng.normal(size=samples)) for level in levels_m3h])
