@@ -28,6 +28,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 MAX_GAP_S = 10.0
 MAX_JUMP_S = 600.0
 MAX_JUMP_STEPS = 10.0
+"""Seconds and usual steps by which a sample may lie ahead of the last one: beyond both its stamp is doubted."""
 MIN_GAP_S = 0.05
 """Samples nearer to each other are taken for one that is doubled."""
 MAX_LOST = 1_000_000

@@ -31,6 +31,7 @@ NEEDED = frozenset({"frequency_hz", "flow_m3h", "head_m"})
 """What a pump is judged by; without a head in all of its runs, by the other two."""
 HEAD_BIT = 1 << SIGNALS.index("head_m")
 NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED)
+"""Places of the head, and of all that is needed, in the bits of the signals that a run has had."""
 LEVEL_BIT = 1 << SIGNALS.index("level_m")
 """Needed too where the main lifts to a delivery level."""
 BLIND_S = 60.0

@@ -6,6 +6,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 
 STEPS_HEARD = 5
+"""Steps of which the usual one is the lower median: two that stand out do not move it."""
 SLOWEST_STEP_S = 1800.0
 """A row in 15 min, of which one is missing: a longer step is a gap or a wrong stamp. [s]"""
 USUAL, NEWEST = 0, 1

@@ -12,6 +12,7 @@ from wetwell.sim2real.diagnosis.report import GapReport
 PLACES = 4
 PRINTED_CANDIDATES = 5
 STORED = {"instant": "a value in", "mean": "means of", "held": "values held, looked at each"}
+"""Words for what a stored value stands for, before the seconds from row to row."""
 
 
 @contextmanager

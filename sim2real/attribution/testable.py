@@ -19,6 +19,7 @@ PROBED = (0.3, 1.0)
 CHANGED = 0.01
 """Share of a reading by which an effect changes it."""
 CALLED: dict[AnalogueQuantity, str] = {"flow_m3h": "flow", "head_m": "head", "power_kw": "power"}
+"""Words for the readings in a reason."""
 OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
 """Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
 

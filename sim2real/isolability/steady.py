@@ -22,6 +22,7 @@ HOLD_S = 30
 """How long the plant is held at a duty point: slip and torque find each other within seconds. [s]"""
 HOUR_S = 3600.0
 SMALL_M3 = 1e-3
+"""Volume by which the area at a level is taken: small beside what a wet well holds. [m³]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,9 +10,10 @@ from wetwell.sim2real.recording.traces import Traces
 
 MOST_DIAGNOSED_S = 172_800
 MOST_OF_ROWS_S = 1_209_600
-"""Most of a recording that is slower than a row a second: its residuals are few."""
+"""Most of a recording of each second, and of one that is slower: its residuals are few. [s]"""
 PART_S = 14_400
 PART_OF_ROWS_S = 86_400
+"""Length of a part of either. [s]"""
 SEARCHED_S = 3_600
 """How far the edge of a part is moved to a second in which no pump runs."""
 BLANK_S = 330

@@ -12,7 +12,7 @@ from wetwell.sim2real.recording.seconds import filled, repeated
 
 MIN_LENGTH_S = 1800
 SLOWEST_S = 900
-"""Seconds to a row at the most."""
+"""A recording is so long at the least, and from row to row it is so long at the most. [s]"""
 MOST_LOST = 10
 """Time that a recording takes over that of its rows at the slowest rate, at the most."""
 EACH_SECOND_S = 1.5

@@ -22,6 +22,7 @@ BEGUN_ANEW = 1.0
 FIRST_SHARE = 0.5
 """Standard deviation of an inflow before anything is known of it, as a share of what a pump carries."""
 MIN_NOISE_M = 1e-4
+"""Standard deviation of a level sensor at the least: a reading without any noise is rounded. [m]"""
 UNKNOWN = 1e6
 """Variance of a level of which nothing is known, over that of its sensor."""
 RANGE = (0.05, 0.95)
@@ -171,7 +172,7 @@ def _filter(
         if step > lost_s:
             level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
         seen = level + noise_m2
-        gain = max(level / seen, min(least_gain * step, 0.5))
+        gain = max(level / seen, min(least_gain * step, MOST_FOLLOWED))
         of_inflow = both / seen
         variance_m2[k] = seen
         level_gain[k], inflow_gain[k] = gain, of_inflow

@@ -14,6 +14,7 @@ from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind, PlantName
 
 FAILED = "failed"
 NOT_TESTED = "not tested"
+"""Column of what a report lists as an effect that its recording cannot show."""
 TELLS = ("effect", "none", "unknown", FAILED)
 PERMUTATIONS = 500
 

@@ -21,10 +21,12 @@ FLOW_STEPS_M3H = (0.1, 0.5, 1.0)
 FREQUENCY_STEPS_HZ = (0.01, 0.1)
 HEAD_STEP_M = 0.01
 POWER_STEP_KW = 0.1
+"""What a historian that rounds rounds to, in the unit of the name; where there are several a case draws one."""
 DEADBANDS = (0.0025, 0.02)
 """Least and largest deadband of flow, head and power, as a share of the duty. [1]"""
 LEVEL_DEADBANDS_M = (0.002, 0.02)
 FREQUENCY_DEADBANDS_HZ = (0.02, 0.2)
+"""Least and largest deadband of the level and of frequencies."""
 REPORTS_S = (60.0, 900.0)
 """Shortest and longest age at which a value that is still within its deadband is stored again. [s]"""
 
@@ -65,6 +67,7 @@ class Storage:
 
 
 EVERY_SECOND = Storage()
+"""All that arrives, as it arrives."""
 
 
 def stored(recording: Recording, storage: Storage) -> Recording:
