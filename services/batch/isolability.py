@@ -5,14 +5,16 @@ from pathlib import Path
 
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.quantities import SensedQuantity
-from wetwell.protocols.recordings.recording import read_recording
+from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.isolability.isolability import Isolability, isolability
 from wetwell.sim2real.isolability.recorded import recorded_points, recorded_signals
 from wetwell.simulator.effects import effective_parameters
 
 
-def isolability_of(station: Station, signals: Sequence[SensedQuantity] | None, recording: Path | None) -> Isolability:
+def isolability_of(
+    station: Station, signals: Sequence[SensedQuantity] | None, recording: Path | None, reading: Reading = PLAIN
+) -> Isolability:
     """What can be told apart by signals, or by those of a recording, at the duty points that occur in it.
 
     Parameters
@@ -22,20 +24,22 @@ def isolability_of(station: Station, signals: Sequence[SensedQuantity] | None, r
         Default: those of the recording.
     recording : Path, optional
         Default: the duty points that the control reaches.
+    reading : Reading
+        How the recording is taken up.
 
     Raises
     ------
     ConfigError
         If there is no pump in service.
     RecordingError
-        If the recording cannot be read, or has no duty point of the station.
+        If the recording cannot be read, is of another station, or has no duty point of the station.
     """
     if recording is None:
         try:
             return isolability(station, signals or ())
         except ValueError as error:
             raise ConfigError(f"station '{station.name}': {error}") from error
-    rows = read_recording(recording)
+    rows = reading.read_of(recording, station)
     try:
         points = recorded_points(rows, station, effective_parameters(station))
         return isolability(station, recorded_signals(rows) if signals is None else signals, points)

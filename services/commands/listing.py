@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.options import ConfigOption, JsonOption, StationOption, print_result, signals_named
+from wetwell.protocols.recordings.reading import Reading
+from wetwell.services.commands.options import (
+    AsStationOption,
+    ConfigOption,
+    JsonOption,
+    StationOption,
+    TimeZoneOption,
+    print_result,
+    signals_named,
+)
 from wetwell.services.runtime.settings import load_settings
 
 if TYPE_CHECKING:
@@ -41,6 +50,8 @@ def station_show(
             "--recording", metavar="FILE", help="Say what can be told apart by its signals and duty points."
         ),
     ] = None,
+    as_station: AsStationOption = False,
+    time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Print the duty points of a station, for each pump alone and for all together; or what can be told apart."""
@@ -54,7 +65,7 @@ def station_show(
     from wetwell.services.reports.isolability_table import isolability_table
 
     given = None if signals is None else signals_named(signals, "--signals")
-    told = isolability_of(station, given, recording)
+    told = isolability_of(station, given, recording, Reading.said(time_zone, as_station=as_station))
     return print_result(isolability_table(station, told, as_json=as_json), as_json=as_json)
 
 

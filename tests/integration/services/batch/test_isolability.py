@@ -1,12 +1,13 @@
 """What can be told apart, from the command line; and the table of the documentation."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wetwell.protocols.recordings.recording import Recording, write_recording
+from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.reports.isolability_table import signals_markdown
 from wetwell.simulator.scenario import Scenario
@@ -54,6 +55,14 @@ def test_signals_and_points_of_a_recording_and_what_more_signals_would_tell(reco
     assert "pump_wear" not in more["friction_bias"]["same_as"]
 
 
+def test_a_recording_of_another_station_is_refused(recording, tmp_path, run_wetwell, capsys):
+    south = tmp_path / "south.parquet"
+    write_recording(replace(read_recording(recording), station="south"), south)
+    assert run_wetwell("station", "show", "alpha", "--recording", south) == 2
+    assert f"{south}: is of station 'south', not of 'alpha'" in capsys.readouterr().err
+    assert run_wetwell("station", "show", "alpha", "--recording", south, "--as-station") == 0
+
+
 def test_without_options_it_shows_the_duty_points(run_wetwell, capsys):
     assert run_wetwell("station", "show", "alpha") == 0
     assert "each_pump_alone" in capsys.readouterr().out
@@ -67,7 +76,7 @@ def test_what_cannot_be_used_is_told_in_one_line(recording, tmp_path, run_wetwel
     one = tmp_path / "one.toml"
     one.write_text('name = "one"\n[sump]\narea_m2 = 8.0\n[[pump]]\ncurve = [36.0, -0.02, -1e-4]\n')
     assert run_wetwell("station", "show", one, "--recording", recording) == 2
-    assert "the recording has 3 pumps, station 'one' 1" in capsys.readouterr().err
+    assert capsys.readouterr().err.strip() == f"wetwell: {recording}: has 3 pumps, station 'one' has 1"
     short = tmp_path / "short.csv"
     second = np.arange(9)
     write_recording(Recording(time_ns=NS_PER_S * second, columns={"pump3_flow_m3h": second.astype(float)}), short)
