@@ -111,7 +111,7 @@ class EventResiduals:
             error_m[is_past & (self.since_s <= plant.control_delay_s + WAITING_S)] = 0.0
         if self.pattern is not None:
             held_m = min(plant.sensors[LEVEL].deadband, self.pattern.deadband)
-            rounded_m = QUANTUM_SHARE * min(plant.sensors[LEVEL].quantum, self.pattern.quantum)
+            rounded_m = QUANTUM_SHARE * self.pattern.rounding(plant.sensors[LEVEL].quantum)
             error_m = np.sign(error_m) * np.maximum(np.abs(error_m) - held_m - rounded_m, 0.0)
         return np.asarray(error_m / self.bins.deviation, dtype=np.float64)
 

@@ -76,7 +76,7 @@ class SignalResiduals:
         sensor = prediction.plant.sensors[_channel(prediction.plant, self.name, self.pump)]
         if self.pattern is not None:
             held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
-            allowed = held + QUANTUM_SHARE * min(sensor.quantum, self.pattern.quantum)
+            allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum)
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
 

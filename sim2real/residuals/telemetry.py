@@ -38,6 +38,8 @@ BY_TIME = (0.6, np.inf)
 """Shares of the largest move of a value whose time was up between which its deadband may be."""
 LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
+USUAL_STEP_M = 0.0101
+"""Historians store a level to the millimetre or the centimetre: nobody's fault. [m]"""
 STRENGTH = 12.0
 """Residual of a pattern, in each cycle, that an effect leaves unexplained."""
 
@@ -54,6 +56,15 @@ class Pattern:
     quantum: float = 0.0
     within: tuple[float, float] = (1.0, 1.0)
 
+    @property
+    def is_usual(self) -> bool:
+        """Whether values are just stored in steps that are usual: that is no gap of the model."""
+        return self.deadband == 0.0 and self.quantum <= USUAL_STEP_M
+
+    def rounding(self, acting: float) -> float:
+        """Step of the values that is excused: a usual one in any case, else as much of it as acts."""
+        return self.quantum if self.is_usual else min(acting, self.quantum)
+
     def missed(self, acting: float) -> float:
         """Share by which what acts is beyond the ends of where the pattern may be."""
         low, high = (share * max(self.deadband, self.quantum) for share in self.within)
@@ -62,18 +73,18 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TelemetryResiduals:
-    """One residual a cycle for each pattern that was found."""
+    """One residual a cycle for each pattern that is no usual rounding; `patterns` holds those too."""
 
     bins: Bins
     patterns: tuple[Pattern, ...]
     cycles: int
 
     def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
-        """(patterns * cycles,) nothing where the plant holds or rounds the channel so, else `STRENGTH`."""
+        """(patterns that count * cycles,) nothing where the plant holds or rounds so, else `STRENGTH`."""
         sensors = prediction.plant.sensors
         pumps = len(prediction.plant.pumps)
         left = []
-        for pattern in self.patterns:
+        for pattern in _told(self.patterns):
             sensor = sensors[channels_of(pattern.quantity, pumps)[0]]
             acting = sensor.deadband if pattern.deadband > 0.0 else sensor.quantum
             left.append(STRENGTH * min(pattern.missed(acting) / 0.3, 1.0))
@@ -84,7 +95,7 @@ def telemetry_residuals(traces: Traces, station: Station, regimes: Regimes) -> T
     """Patterns of all channels that carry noise; a recording without noise shows none."""
     cycle, first = np.unique(regimes.cycle, return_index=True)
     patterns = tuple(_patterns(traces, station.sensors, regimes))
-    count = len(patterns)
+    count = len(_told(patterns))
     return TelemetryResiduals(
         bins=Bins(
             signal=np.full(cycle.size * count, TELEMETRY),
@@ -99,6 +110,10 @@ def telemetry_residuals(traces: Traces, station: Station, regimes: Regimes) -> T
         patterns=patterns,
         cycles=cycle.size,
     )
+
+
+def _told(patterns: tuple[Pattern, ...]) -> list[Pattern]:
+    return [pattern for pattern in patterns if not pattern.is_usual]
 
 
 def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Pattern]:

@@ -61,9 +61,8 @@ class Storage:
 
     @property
     def inherent(self) -> tuple[str, ...]:
-        """Effects of the library that such storage is, to some degree."""
-        held = ("report_by_exception",) if self.value == "held" else ()
-        return ("level_quantisation", *held) if self.step.get("level_m") else held
+        """Effects of the library that such storage is, to some degree; steps of a centimetre are none."""
+        return ("report_by_exception",) if self.value == "held" else ()
 
 
 EVERY_SECOND = Storage()

@@ -235,7 +235,7 @@ def test_a_slow_trial_is_sealed_published_and_told_by_rate(tmp_path, monkeypatch
         assert ("inflow_m3h" in recording.columns) == ("inflow_m3h" not in case.absent)
         sealed = json.loads((tmp_path / "sealed" / f"{case.name}.json").read_text())
         assert sealed["storage"]["every_s"] == case.every_s
-        assert ("level_quantisation" in sealed["inherent"]) == bool(sealed["storage"]["step"])
+        assert "level_quantisation" not in sealed["inherent"], "steps of a centimetre are no effect"
     with pytest.raises(ConfigError, match="holds a trial with another rates s"):
         run_fake("perfect", tmp_path, monkeypatch, seconds=7200, storage=StoragePlan(absent=("head_m",)))
 

@@ -58,3 +58,15 @@ def test_a_deadband_that_noise_passes_is_known_to_a_few_percent(recorded):
     (found,) = patterns(station, recording, **{name: held(recording.columns[name], 0.25, 10**6) for name in NAMES})
     assert found.deadband == pytest.approx(0.25, rel=0.05)
     assert found.missed(0.3) > 0.0
+
+
+@pytest.mark.parametrize(("step_m", "is_told"), [(0.005, False), (0.01, False), (0.02, True)])
+def test_a_level_that_is_stored_to_a_centimetre_is_no_gap(recorded, step_m, is_told):
+    station, recording = recorded
+    columns = recording.columns | {"level_m": np.round(recording.columns["level_m"] / step_m) * step_m}
+    traces = traces_of(type(recording)(time_ns=recording.time_ns, columns=columns), station)
+    telemetry = telemetry_residuals(traces, station, regimes_of(traces, station))
+    (pattern,) = telemetry.patterns
+    assert pattern.quantum == pytest.approx(step_m, rel=0.05)
+    assert pattern.rounding(0.0) == (0.0 if is_told else pattern.quantum), "a usual step is excused in any case"
+    assert bool(telemetry.bins.size) == is_told
