@@ -39,7 +39,7 @@ def station_check(file: Annotated[str, typer.Argument(help="Station file.")]) ->
 
 @station_app.command("show")
 def station_show(
-    file: Annotated[str, typer.Argument(help="Station file.")] = "alpha",
+    file: Annotated[str, typer.Argument(help="Station file, or the name of a built-in station.")],
     signals: Annotated[
         str | None,
         typer.Option("--signals", help="Say what can be told apart by them: level, inflow, flow, head, power."),
