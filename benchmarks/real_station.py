@@ -4,7 +4,7 @@
 
 FOLDER holds the workbook that the owners published (`Hackathon_HSY_data.xlsx`); without it nothing is measured.
 Mapping and station file stand in `benchmarks/real_station/`. The first eight days are for calibration, the second
-eight are only looked at. `--diagnose` adds the diagnosis of the gap, which takes minutes.
+eight are only looked at. `--diagnose` adds the diagnosis of the gap, which takes some minutes.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,25 +24,30 @@ import numpy as np
 
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.quantities import AnalogueQuantity
-from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
-from wetwell.protocols.station.station_file import Station, load_station
+from wetwell.protocols.recordings.recording import Recording, read_recording
+from wetwell.protocols.station.station_file import EffectTable, Station, load_station
 from wetwell.protocols.timestamps import from_iso, to_iso
 from wetwell.services.batch.conversion import convert_files
-from wetwell.services.batch.gap import diagnose_file
+from wetwell.services.batch.gap import THREADS
 from wetwell.services.batch.recordings import detect
 from wetwell.services.reports.charts import Series, bar_chart, line_chart
 from wetwell.sim2real.calibration.calibration import calibrate
 from wetwell.sim2real.calibration.comparison import Comparison, compare
 from wetwell.sim2real.calibration.estimates import Estimate
 from wetwell.sim2real.calibration.fitted_station import with_estimates
+from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.simulator.effects.effect import Effect
 
 HERE = Path(__file__).parent / "real_station"
 WORKBOOK = "Hackathon_HSY_data.xlsx"
 SECOND_BEGINS = "2024-11-23T00:00:00+02:00"
 LOW_RUNS = ("2024-11-29T05:30:00+02:00", "2024-11-29T13:30:00+02:00")
+JUDGED = ("2024-11-28T12:00:00+02:00", "2024-11-30T00:00:00+02:00")
+"""Verdicts from before the low runs to the end of their day."""
+JUDGED_PUMPS = ("1.1", "1.2", "2.2", "2.3", "2.4")
 QUANTITIES: tuple[AnalogueQuantity, ...] = ("flow_m3h", "power_kw")
-TRIED = ("friction_bias", "static_head_bias", "pump_wear")
-"""Effects that the diagnosis may try: what steady running shows of pumps and mains. The whole library takes hours."""
+TRIED = ("friction_bias", "static_head_bias", "pump_wear", "flow_meter_gain")
+"""Effects that the diagnosis may try: what steady running shows of pumps, mains and meters."""
 LONG_RUN_ROWS = 8
 """Steady rows from which on a run is long enough to see whether it loses flow: two hours."""
 PARTS = {"curves": ("head_scale", "flow_scale"), "mains": ("_level_m", "friction_h2_m5"), "power": ("power_",)}
@@ -129,33 +135,88 @@ def judged(station: Station, recording: Recording, room: Path) -> dict[str, Any]
         result = detect(station, recording, out)
     except WetwellError as error:
         return {"refused": str(error)}
-    counts: Counter[str] = Counter()
-    for line in out.read_text(encoding="utf-8").splitlines():
-        verdict = json.loads(line)
-        if from_iso(verdict["time"]) >= from_iso(SECOND_BEGINS):
-            counts[f"pump {station.pump_names[verdict['pump'] - 1]}: {verdict['state']}"] += 1
-    return {"counts": result.get("counts"), "second_week": dict(sorted(counts.items()))}
-
-
-def diagnosed(station: Station, weeks: dict[str, Recording], room: Path) -> dict[str, Any]:
-    """Diagnosis of the first week under a station, and what it closes of the second."""
-    source = room / "first.parquet"
-    write_recording(weeks["first"], source)
-    begin_s = time.process_time()
-    try:
-        report = diagnose_file(station, source, room / "gap", only=TRIED)
-        closed = load_station(room / "gap" / "station.toml")
-    except WetwellError as error:
-        return {"refused": str(error)}
-    seen = {}
-    for quantity in QUANTITIES:
-        errors = [np.sum(compare(weeks["second"], one).steady_errors(quantity) ** 2) for one in (station, closed)]
-        seen[quantity] = rounded(1.0 - np.sqrt(errors[1] / errors[0]))
+    verdicts = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
+    counts = Counter(
+        f"pump {station.pump_names[verdict['pump'] - 1]}: {verdict['state']}"
+        for verdict in verdicts
+        if from_iso(verdict["time"]) >= from_iso(SECOND_BEGINS)
+    )
     return {
-        "seconds": round(time.process_time() - begin_s),
-        "report": json.loads(report.model_dump_json(by_alias=True)),
-        "seen_in_second_week": seen,
+        "counts": result.get("counts"),
+        "second_week": dict(sorted(counts.items())),
+        "about_29_november": judged_on_29_november(station, verdicts),
     }
+
+
+def judged_on_29_november(station: Station, verdicts: list[dict[str, Any]]) -> dict[str, Any]:
+    """What was said of pumps about 29 November: states, times of faults, least and largest shifts of head."""
+    found: dict[str, Any] = {}
+    for name in JUDGED_PUMPS:
+        own = [
+            verdict
+            for verdict in verdicts
+            if station.pump_names[verdict["pump"] - 1] == name
+            and from_iso(JUDGED[0]) <= from_iso(verdict["time"]) < from_iso(JUDGED[1])
+        ]
+        shifts_m = [one["evidence"]["shift_m"]["pump"] for one in own if "shift_m" in one["evidence"]]
+        found[f"pump {name}"] = {
+            "states": dict(Counter(one["state"] for one in own)),
+            "pump_faults": [one["time"] for one in own if one["state"] == "pump_fault"],
+            "shift_m": [rounded(min(shifts_m), 1), rounded(max(shifts_m), 1)] if shifts_m else None,
+        }
+    return found
+
+
+def diagnosed(station: Station, weeks: dict[str, Recording]) -> dict[str, Any]:
+    """Diagnosis of the first week under a station, and what each effect alone closes of the second."""
+    begin_s, cpu_s = time.monotonic(), time.process_time()
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = diagnose(weeks["first"], station, only=TRIED, each=pool.map)
+    seconds = time.monotonic() - begin_s, time.process_time() - cpu_s
+    report = found.report()
+
+    def seen(effects: Iterable[Effect]) -> dict[str, Any]:
+        tables = tuple(EffectTable.model_validate(effect.model_dump()) for effect in effects)
+        closed = station.model_copy(update={"effect": (*station.effect, *tables)})
+        before, after = (compare(weeks["second"], one) for one in (station, closed))
+        return {
+            quantity: {
+                "median": rounded(np.median(np.abs(after.steady_errors(quantity)))),
+                "shrinkage_of_median": rounded(1.0 - _median(after, quantity) / _median(before, quantity), 3),
+                "shrinkage_of_rms": rounded(1.0 - _rms(after, quantity) / _rms(before, quantity), 3),
+            }
+            for quantity in QUANTITIES
+        }
+
+    told = {one.name: one for one in report.candidates}
+    return {
+        "seconds": round(seconds[0]),
+        "processor_seconds": round(seconds[1]),
+        "verdict": report.verdict,
+        "next_experiment": report.next_experiment,
+        "notes": list(report.notes),
+        "gap": json.loads(report.gap.model_dump_json()),
+        "not_tested": [json.loads(one.model_dump_json()) for one in report.not_tested],
+        "effects": [json.loads(one.model_dump_json()) for one in report.effects],
+        "report_seen_in_second_week": seen(found.station.effect[len(station.effect) :]),
+        "singles": [
+            {
+                "effect": json.loads(one.fit.effects[0].model_dump_json()),
+                "told": told[one.fit.names[0]].shrinkage,
+                "seen_in_second_week": seen(one.fit.effects),
+            }
+            for one in found.attribution.singles
+            if one.fit.names[0] in told
+        ],
+    }
+
+
+def _median(comparison: Comparison, quantity: AnalogueQuantity) -> float:
+    return float(np.median(np.abs(comparison.steady_errors(quantity))))
+
+
+def _rms(comparison: Comparison, quantity: AnalogueQuantity) -> float:
+    return float(np.sqrt(np.mean(comparison.steady_errors(quantity) ** 2)))
 
 
 def pictures(
@@ -263,8 +324,8 @@ def measured(workbook: Path, room: Path, plots: Path | None, *, with_diagnosis: 
     }
     if with_diagnosis:
         result["diagnosis"] = {
-            "datasheets": diagnosed(station, weeks, room),
-            "calibrated": diagnosed(fitted, weeks, room),
+            "datasheets": diagnosed(station, weeks),
+            "calibrated": diagnosed(fitted, weeks),
         }
     return result
 

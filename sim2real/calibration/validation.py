@@ -10,6 +10,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.sim2real.recording.inflow import infer_inflow_m3h
+from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -51,10 +52,10 @@ class Validation:
 
 
 def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[Validation, Recording]:
-    """Comparison, and the simulated recording on the seconds of the measured one.
+    """Comparison, and the simulated recording on the rows of the measured one: means where it holds means.
 
     The inflow is the measured one where at least half of it is there, else inferred from level and flow. Values
-    between known ones are held.
+    between known ones are held; a mean holds in the interval that ends at its stamp.
 
     Parameters
     ----------
@@ -84,7 +85,10 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
     if known.size == 0:
         raise ValueError("the inflow is neither measured nor can it be inferred")
     time_s = (recording.time_ns - recording.time_ns[0]) / NS_PER_S
-    seconds = int(time_s[-1]) + 1
+    span_s = (
+        max(round(float(np.median(np.diff(time_s)))), 1) if recording.value == "mean" and len(recording) > 1 else 1
+    )
+    seconds = int(time_s[-1]) + span_s
     scenario = Scenario(
         name="validation",
         initial_level_m=max(float(level_m[np.isfinite(level_m)][0]), 0.0),
@@ -93,12 +97,14 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
             flow_m3h=np.maximum(inflow_m3h[np.concatenate([known[:1], known[time_s[known] > 0.0]])], 0.0),
         ),
     )
-    free = Simulation(station, scenario, seed, int(recording.time_ns[0])).advance(seconds, truth=False)
-    rows = np.minimum(time_s.astype(np.int64), seconds - 1)
+    begin_ns = int(recording.time_ns[0]) - (span_s - 1) * NS_PER_S
+    free = Simulation(station, scenario, seed, begin_ns).advance(seconds, truth=False)
+    rows = np.minimum(time_s.astype(np.int64) + span_s - 1, seconds - 1)
     simulated = Recording(
         time_ns=recording.time_ns,
-        columns={name: values[rows] for name, values in free.columns.items()},
+        columns={name: trailing_means(values, span_s)[rows] for name, values in free.columns.items()},
         station=station.name,
+        value=recording.value,
     )
     known_level = np.isfinite(level_m)
     spread_m = float(np.ptp(level_m[known_level]))

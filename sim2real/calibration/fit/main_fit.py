@@ -56,7 +56,8 @@ def fit_main(model: MainModel, witnesses: Sequence[Witness], prior: Prior) -> Po
     $$e = y_\text{model}(\theta; N, L) / y - 1 \qquad \text{for } y = Q_i \text{ and, where measured, } H_i$$
 
     Flow and head are both held against speed and lift, which carry hardly any noise: a curve through measured flows
-    and heads would take the noise of the flow for a slope. See `regularised_fit` for the rest.
+    and heads would take the noise of the flow for a slope. Flow can be lost, to rags, and not gained. See
+    `regularised_fit` for the rest.
     """
 
     def errors(parameters: Floats) -> list[tuple[Floats, Floats]]:
@@ -70,4 +71,5 @@ def fit_main(model: MainModel, witnesses: Sequence[Witness], prior: Prior) -> Po
             result.append((duty[place] / witness.value - 1.0, slope[place] / witness.value[:, None]))
         return result
 
-    return regularised_fit(errors, [witness.run for witness in witnesses], prior)
+    are_flows = [witness.quantity == "flow" for witness in witnesses]
+    return regularised_fit(errors, [witness.run for witness in witnesses], are_flows, prior)

@@ -72,4 +72,4 @@ def fit_power(
     def errors(parameters: Floats) -> list[tuple[Floats, Floats]]:
         return [(relative @ parameters - 1.0, relative)]
 
-    return regularised_fit(errors, [run], prior)
+    return regularised_fit(errors, [run], [False], prior)

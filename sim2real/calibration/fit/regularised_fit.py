@@ -48,7 +48,7 @@ class Posterior:
         return deviation
 
 
-def regularised_fit(errors: Errors, runs: Sequence[Integers], prior: Prior) -> Posterior:
+def regularised_fit(errors: Errors, runs: Sequence[Integers], is_lossy: Sequence[bool], prior: Prior) -> Posterior:
     r"""Most probable parameters, by Gauss and Newton.
 
     $$\min_\theta \sum_c \sum_j \frac{w_{cj}}{\sigma_c^2}\, e_{cj}(\theta)^2
@@ -63,17 +63,21 @@ def regularised_fit(errors: Errors, runs: Sequence[Integers], prior: Prior) -> P
     errors : function
     runs : sequence of (n,) int arrays
         Runs of the values of each kind, from 0 without a gap; no kind, and the prior comes back.
+    is_lossy : sequence of bool
+        Whether values of each kind can be lost but not gained, see `RunNoise.of_errors`.
     prior : Prior
     """
     everything = np.ones(prior.mean.size, dtype=bool)
-    value, covariance = _settled(errors, runs, prior, everything)
+    value, covariance = _settled(errors, runs, is_lossy, prior, everything)
     is_told = np.sqrt(np.diag(covariance)) < TOLD * prior.sd
     if is_told.any() and not is_told.all():
-        value, _ = _settled(errors, runs, prior, is_told)
+        value, _ = _settled(errors, runs, is_lossy, prior, is_told)
     return Posterior(value=np.where(is_told, value, prior.mean), covariance=covariance, prior=prior, is_told=is_told)
 
 
-def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags) -> tuple[Floats, Floats]:
+def _settled(
+    errors: Errors, runs: Sequence[Integers], is_lossy: Sequence[bool], prior: Prior, free: Flags
+) -> tuple[Floats, Floats]:
     """Parameters of which the free ones have moved, and the covariance of all; steps are in units of the prior."""
     unit = prior.sd
     correlation = prior.covariance / np.outer(unit, unit)
@@ -85,8 +89,8 @@ def _settled(errors: Errors, runs: Sequence[Integers], prior: Prior, free: Flags
     for _ in range(MOST_STEPS if values else 0):
         told: Floats = np.zeros_like(precision)
         pull: Floats = precision @ ((prior.mean - value) / unit)
-        for run, (error, slope) in zip(runs, errors(value), strict=True):
-            noise = RunNoise.of_errors(error, run, fitted * run.size / values)
+        for run, lossy, (error, slope) in zip(runs, is_lossy, errors(value), strict=True):
+            noise = RunNoise.of_errors(error, run, fitted * run.size / values, is_lossy=lossy)
             jacobian = noise.whitened(slope * unit)
             told += jacobian.T @ jacobian
             pull -= jacobian.T @ noise.whitened(error)

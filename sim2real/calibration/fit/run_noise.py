@@ -5,12 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.calibration.fit.student_t import split_sd, student_weight
 
-DEGREES = 4.0
-"""Degrees of freedom of Student's t, by which the weight of a value falls with its distance. [1]
-
-After K. L. Lange, R. J. A. Little and J. M. G. Taylor (1989), Robust statistical modeling using the t distribution,
-Journal of the American Statistical Association 84, who found 4 to serve data with a few per cent of outliers."""
 SD_OF_MAD = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 SMALLEST_SD = 1e-4
@@ -19,7 +15,7 @@ SMALLEST_SD = 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunNoise:
-    r"""Errors with one standard deviation, correlated within a run.
+    r"""Errors with a standard deviation, correlated within a run.
 
     Runs are the groups in which a pump rags, air gathers and meters drift: the values of a run say less than as many
     of different runs.
@@ -27,7 +23,7 @@ class RunNoise:
     Attributes
     ----------
     sd : float
-        [1]
+        Of what was told too low, or of all. [1]
     correlation : float
         Between two values of a run, 0 to 1.
     weight : (n,) array
@@ -39,7 +35,9 @@ class RunNoise:
     weight: Floats
 
     @classmethod
-    def of_errors(cls, error: Floats, run: Integers, parameters: float = 0.0) -> "RunNoise":
+    def of_errors(
+        cls, error: Floats, run: Integers, parameters: float = 0.0, *, is_lossy: bool = False
+    ) -> "RunNoise":
         r"""Noise of errors, by medians.
 
         A value in a run of n counts for $1 / (1 + (n - 1) \rho)$ of one that is alone, the design effect of samples
@@ -53,6 +51,9 @@ class RunNoise:
             From 0, without a gap.
         parameters : float
             Number of parameters that were fitted to the errors; each takes freedom away.
+        is_lossy : bool
+            Whether what is measured can be lost but not gained, as flow to rags: values that were told too high may
+            then scatter more than others, see `split_sd`.
 
         References
         ----------
@@ -67,27 +68,20 @@ class RunNoise:
             lost = several.sum() / max(several.sum() - np.sum(count > 1), 1)
             correlation = 1.0 - lost * min(SD_OF_MAD * float(np.median(rest)) / sd, 1.0) ** 2
         correlation = max(correlation, 0.0)
-        share = 1.0 / (1.0 + (count - 1.0) * correlation)
+        share: Floats = np.asarray(1.0 / (1.0 + (count - 1.0) * correlation), dtype=np.float64)
         told = float(np.sum(share * count))
-        sd *= np.sqrt(told / max(told - parameters, 1.0))
-        return cls(sd=float(sd), correlation=correlation, weight=student_weight(error / sd) * share[run])
+        below, above = split_sd(error, share[run], sd) if is_lossy else (sd, sd)
+        freedom = np.sqrt(told / max(told - parameters, 1.0))
+        sd = max(below, SMALLEST_SD) * float(freedom)
+        wider = np.where(error > 0.0, max(above / below, 1.0), 1.0)
+        weight: Floats = student_weight(error / (sd * wider)) * share[run] / wider**2
+        return cls(sd=sd, correlation=correlation, weight=weight)
 
     def whitened(self, values: Floats) -> Floats:
         """Values (n, ...) in units of their noise."""
         scale = np.sqrt(self.weight) / self.sd
         white: Floats = values * scale.reshape(-1, *[1] * (values.ndim - 1))
         return white
-
-
-def student_weight(distance: Floats) -> Floats:
-    r"""Weight of a value at a distance in standard deviations, $(\nu + 1) / (\nu + z^2)$, at most 1.
-
-    Examples
-    --------
-    >>> student_weight(np.array([0.0, 1.0, 6.0]))
-    array([1.   , 1.   , 0.125])
-    """
-    return np.asarray(np.minimum((DEGREES + 1.0) / (DEGREES + distance**2), 1.0))
 
 
 def medians(values: Floats, group: Integers) -> Floats:

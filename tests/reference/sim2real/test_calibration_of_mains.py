@@ -1,6 +1,7 @@
 """Calibration of two mains with two sizes of pumps, without head: truth inside the intervals, and a second solver."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from wetwell.sim2real.calibration.comparison import compare
 from wetwell.sim2real.calibration.fit.main_fit import fit_main, witness_of
 from wetwell.sim2real.calibration.fit.main_model import MainModel
 from wetwell.sim2real.calibration.fit.prior import main_prior
+from wetwell.sim2real.calibration.fit.student_t import split_sd
 from wetwell.sim2real.calibration.fitted_station import with_estimates
 
 SEEDS = range(100, 106)
@@ -68,6 +70,36 @@ def test_the_fitted_station_tells_flow_and_power_of_steady_rows(inlet, cases, fi
         for quantity in ("flow_m3h", "power_kw"):
             assert np.median(np.abs(before.steady_errors(quantity))) > 0.04
             assert np.median(np.abs(after.steady_errors(quantity))) < 0.012
+
+
+def test_widths_of_a_split_student_noise_are_found_where_flow_is_lost():
+    """Of 4,000 values, drawn with the share of each side that its density gives; turned round, nothing is lost."""
+    rng, below, above = np.random.default_rng(100), 0.01, 0.03
+    side = np.where(rng.random(4000) < above / (above + below), above, -below)
+    error = side * np.abs(rng.standard_t(4.0, 4000))
+    np.testing.assert_allclose(split_sd(error, np.ones(4000), 0.02), (below, above), rtol=0.1)
+    assert split_sd(-error, np.ones(4000), 0.02) == (0.02, 0.02)
+
+
+def test_rags_that_gather_in_runs_are_not_taken_for_the_pump(inlet, cases):
+    """Rags take on from 0 with each hour of 6 of 10 runs: less than half of it is put on pumps and main."""
+    for (_, clean), seed in zip(cases[::2], SEEDS, strict=False):
+        rng = np.random.default_rng([seed, 1])
+        columns, taken = dict(clean.columns), []
+        for pump in range(1, 7):
+            speed = columns[f"pump{pump}_frequency_hz"]
+            begins = np.flatnonzero(np.diff(speed, prepend=0.0) != 0.0)
+            hour = (
+                np.arange(speed.size) - begins[np.searchsorted(begins, np.arange(speed.size), side="right") - 1]
+            ) / 4
+            per_hour = rng.exponential(0.02, begins.size) * (rng.random(begins.size) < 0.6)
+            own = per_hour[np.searchsorted(begins, np.arange(speed.size), side="right") - 1]
+            share = np.minimum(own * hour, 0.5)
+            taken.append(share[speed > 0.0])
+            columns[f"pump{pump}_flow_m3h"] = columns[f"pump{pump}_flow_m3h"] * (1.0 - share)
+        fitted = with_estimates(inlet, calibrate(replace(clean, columns=columns), inlet))
+        missed = np.median(compare(clean, fitted).steady_errors("flow_m3h"))
+        assert abs(missed) < 0.5 * np.mean(np.concatenate(taken))
 
 
 def test_two_weeks_of_quarters_of_an_hour_take_less_than_ten_seconds(inlet, cases):

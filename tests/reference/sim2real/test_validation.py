@@ -1,5 +1,6 @@
 """Free-running comparison of a simulator with a recording."""
 
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -30,6 +31,24 @@ def test_the_right_station_under_the_measured_inflow_agrees_in_starts_and_run_ti
     assert result.level_nmae < 0.1
     assert len(simulated) == len(recording)
     assert result.starts[0].sum() > 60
+
+
+def test_means_are_held_against_means_of_the_free_run(alpha, recording):
+    """A day of means of 15 minutes of a well that is emptied within minutes: instants say next to nothing of them."""
+    step_s = 900
+    means = {name: values.reshape(-1, step_s).mean(axis=1) for name, values in recording.columns.items()}
+    slow = Recording(time_ns=recording.time_ns[step_s - 1 :: step_s], columns=means, station="alpha", value="mean")
+    result, simulated = validate(slow, alpha)
+    _, instants = validate(replace(slow, value="instant"), alpha)
+    assert simulated.value == "mean"
+    np.testing.assert_array_equal(simulated.time_ns, slow.time_ns)
+
+    def error_m3h(told):
+        flows = [f"pump{pump}_flow_m3h" for pump in (1, 2, 3)]
+        return np.sqrt(np.mean((sum(told.column(name) for name in flows) - sum(means[name] for name in flows)) ** 2))
+
+    assert error_m3h(simulated) < 0.4 * error_m3h(instants)
+    assert result.run_h[0].sum() == pytest.approx(result.run_h[1].sum(), abs=0.1)
 
 
 def test_errors_of_days_are_sums_of_differences_over_the_measured_sum():
