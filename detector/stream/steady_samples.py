@@ -35,8 +35,7 @@ STEADY_SAMPLE = np.dtype(
 )
 """Time since the start of the part of the run; `duty_m3h` as Q/N and `duty_total_m3h` are by the datasheet."""
 SEGMENT_MEANS = ("flow_m3h", "total_m3h", "duty_m3h", "duty_total_m3h", "level_m", "speed_ratio")
-"""What the mean of a segment is known of, beside both residuals; named as in `Segments`."""
-SEGMENT_SUM = np.dtype([("residual_m", np.float64, (2,)), *((name, np.float64) for name in SEGMENT_MEANS)])
+"""What the mean of a segment is known of, after both residuals; named as in `Segments`."""
 
 
 def new_steady_samples(room: int = LEAST_ROOM) -> Records:
@@ -45,10 +44,10 @@ def new_steady_samples(room: int = LEAST_ROOM) -> Records:
 
 
 @compiled
-def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Any) -> None:
-    """Add the samples of each segment to its sums, which begin at 0; `own` is the pump in the table."""
-    for segment in range(sums.shape[0]):
-        total = sums[segment]
+def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Floats) -> None:
+    """Add the samples of each segment to its sums, one a row; `own` is the pump in the table."""
+    pump_sum_m, system_sum_m, flow_m3h, total_m3h, duty_m3h, duty_total_m3h, level_m, speed_ratio = sums
+    for segment in range(sums.shape[1]):
         for at in range(segment * samples, (segment + 1) * samples):
             steady = steady_samples[at]
             pump_m, system_m = distances(
@@ -56,18 +55,19 @@ def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Any) -> Non
                 *(own["c0"], own["c1"], own["c2"], static_head_at_m(own, steady["level_m"]), own["friction_h2_m5"]),
             )
             is_closed = steady["total_m3h"] < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
-            total["residual_m"][0] += pump_m
-            total["residual_m"][1] += 0.0 if is_closed else system_m
-            total["flow_m3h"] += steady["flow_m3h"] / steady["speed_ratio"]
-            total["total_m3h"] += steady["total_m3h"]
-            total["duty_m3h"] += steady["duty_m3h"]
-            total["duty_total_m3h"] += steady["duty_total_m3h"]
-            total["level_m"] += steady["level_m"]
-            total["speed_ratio"] += steady["speed_ratio"]
+            pump_sum_m[segment] += pump_m
+            system_sum_m[segment] += 0.0 if is_closed else system_m
+            flow_m3h[segment] += steady["flow_m3h"] / steady["speed_ratio"]
+            total_m3h[segment] += steady["total_m3h"]
+            duty_m3h[segment] += steady["duty_m3h"]
+            duty_total_m3h[segment] += steady["duty_total_m3h"]
+            level_m[segment] += steady["level_m"]
+            speed_ratio[segment] += steady["speed_ratio"]
 
 
 def segment_averages(own: Any, steady_samples: Any, samples: int) -> tuple[Floats, dict[str, Floats]]:
     """(m, 2) mean residuals of the segments of so many samples, and their other means by name; a rest is left out."""
-    sums = np.zeros(len(steady_samples) // samples, dtype=SEGMENT_SUM)
+    sums = np.zeros((2 + len(SEGMENT_MEANS), len(steady_samples) // samples))
     _sum_segments(own, steady_samples, samples, sums)
-    return sums["residual_m"] / samples, {name: sums[name] / samples for name in SEGMENT_MEANS}
+    sums /= samples
+    return np.ascontiguousarray(sums[:2].T), dict(zip(SEGMENT_MEANS, sums[2:], strict=True))
