@@ -144,7 +144,10 @@ class Detector:
     def _judge(self, run: Run, time_ns: int) -> Verdict:
         judge = self._judges[run.pump]
         judgement = judge.judge(run, time_ns, self._system(run.pump), [each.memory for each in self._judges])
-        self._runs.set_lacking_head(run.pump, lacks_head=judge.does_without_head(run))
+        lacks_head = judge.does_without_head(run)
+        if run.lacks_head and not lacks_head:
+            judge.begin_learning()
+        self._runs.set_lacking_head(run.pump, lacks_head=lacks_head)
         self._runs.set_learning(run.pump, is_learning=judge.memory.reference is None)
         return self._verdict(run.pump, time_ns, judgement)
 

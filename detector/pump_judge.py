@@ -130,14 +130,16 @@ class PumpJudge:
         """Whether what comes after a run is judged without a head sensor.
 
         So it is where flow and frequency are measured, and no run of the pump has had a head so far; to the end of
-        the baseline that is learnt then. A head that comes while it is being learnt begins the learning anew.
+        the baseline that is learnt then.
         """
-        memory, has_head = self.memory, "head_m" not in run.missing
-        if run.lacks_head and has_head and memory.learning is not None:
-            memory.learning = Learning()
-            return False
-        is_new = memory.reference is None and memory.offset_m is None
-        return run.lacks_head or (is_new and self.lacking(run) == {"head_m"})
+        if run.lacks_head:
+            return self.memory.learning is None or "head_m" in run.missing
+        is_new = self.memory.reference is None and self.memory.offset_m is None
+        return is_new and self.lacking(run) == {"head_m"}
+
+    def begin_learning(self) -> None:
+        """Begin the learning anew, as where a head comes that was missing so far."""
+        self.memory.learning = Learning()
 
     def segments_since_change(self, last: Segments) -> int:
         """Segments of the open run since a change that is worth a look, by the last of them; 0 without one."""
@@ -196,6 +198,8 @@ class PumpJudge:
             return self._sensor_fault(run, evidence | {"lost": lacking})
         few = f"fewer than {run.segments.samples} steady samples"
         evidence["reason"] = _missing_reason(lacking) if lacking else few
+        if lacking == ["head_m"] and self.does_without_head(run):
+            evidence["reason"] = "without head_m the next runs are judged by flow, speed and the main's datasheet"
         if lacking or is_learnt:
             memory.tell("unknown", run.window_ns, None)
         if lacking:
@@ -316,6 +320,4 @@ def _generator(run: Run) -> np.random.Generator:
 
 
 def _missing_reason(lacking: list[str]) -> str:
-    if lacking == ["head_m"]:
-        return "without head_m the next runs are judged by flow, speed and the datasheet of the main"
     return f"without {', '.join(lacking)} pump and system cannot be told apart"

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from wetwell.detector.curves.datasheet import datasheet_of
@@ -95,3 +96,15 @@ def test_a_head_that_comes_while_learning_begins_the_learning_anew(alpha):
     last = [verdict for verdict in verdicts if verdict.pump == 1][-1]
     assert last.state == "normal"
     assert last.evidence["signals"][:3] == ["flow", "head", "frequency"]
+
+
+def test_a_head_that_is_lost_while_learning_is_waited_for(alpha):
+    recording = recorded(alpha, hours=5, has_head=True)
+    lost = recording.time_ns >= recording.time_ns[0] + 3 * HOUR_S * NS_PER_S
+    columns = {
+        name: np.where(lost, np.nan, values) if name.endswith("head_m") else values
+        for name, values in recording.columns.items()
+    }
+    told = [verdict for verdict in verdicts_on(alpha, replace(recording, columns=columns)) if verdict.pump == 1]
+    assert told[-1].state == "unknown"
+    assert told[-1].evidence["reason"] == "without head_m pump and system cannot be told apart"
