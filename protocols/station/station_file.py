@@ -162,6 +162,10 @@ class Station(Table):
         places = {main.name: place for place, main in enumerate(self.mains)}
         return tuple(places.get(pump.main, 0) for pump in self.pump)
 
+    def pumps_of_main(self, main: int) -> list[int]:
+        """Pumps of a main, all from 0."""
+        return [pump for pump, its_main in enumerate(self.main_of_pump) if its_main == main]
+
     @property
     def pump_names(self) -> tuple[str, ...]:
         """What people call the pumps; a number where the file has no name."""

@@ -11,6 +11,7 @@ from wetwell.sim2real.calibration.main_estimates import main_estimates
 from wetwell.sim2real.calibration.power_estimates import power_estimates
 from wetwell.sim2real.calibration.steady import running_of, steady_duties
 from wetwell.sim2real.calibration.switches import area_estimate, level_estimates, ramp_estimate
+from wetwell.sim2real.recording.checks import check_rising
 
 
 def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[Estimate, ...]:
@@ -35,8 +36,7 @@ def calibrate(recording: Recording, station: Station, *, seed: int = 0) -> tuple
     ValueError
         If times do not rise, or the numbers of pumps differ.
     """
-    if np.any(np.diff(recording.time_ns) <= 0):
-        raise ValueError("times must rise: prepare the recording first")
+    check_rising(recording)
     if recording.pumps > len(station.pump):
         raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {len(station.pump)}")
     rng = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.calibration.fit.main_model import FRICTION, MainModel
 from wetwell.sim2real.calibration.fit.power_fit import PowerLines
 from wetwell.sim2real.calibration.steady import RAMP_STEP, Running, running_of
+from wetwell.sim2real.recording.checks import check_pumps, check_rising
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.power import INRUSH_LIMIT
@@ -110,10 +111,8 @@ def compare(recording: Recording, station: Station) -> Comparison:
     ValueError
         If the numbers of pumps differ, times do not rise, or an effect does not fit the station.
     """
-    if recording.pumps != len(station.pump):
-        raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {len(station.pump)}")
-    if np.any(np.diff(recording.time_ns) <= 0):
-        raise ValueError("times must rise: prepare the recording first")
+    check_pumps(recording, station)
+    check_rising(recording)
     parameters = effective_parameters(station)
     running = running_of(recording, station)
     main_of_pump = np.array(station.main_of_pump)

@@ -27,7 +27,7 @@ def main_estimates(duties: SteadyDuties, station: Station, main: int) -> list[Es
     main : int
         From 0.
     """
-    members = [i for i, its_main in enumerate(station.main_of_pump) if its_main == main]
+    members = station.pumps_of_main(main)
     table, parameters = station.mains[main], plant_parameters(station)
     lift_m = table.lift_at_zero_m - table.level_slope * (duties.level_m if table.level_slope else 0.0)
     lift_m = np.maximum(np.broadcast_to(lift_m, len(duties)), 0.0)

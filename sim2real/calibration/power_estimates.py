@@ -27,7 +27,7 @@ def power_estimates(duties: SteadyDuties, station: Station, main: int) -> list[E
     main : int
         From 0.
     """
-    members = [i for i, its_main in enumerate(station.main_of_pump) if its_main == main]
+    members = station.pumps_of_main(main)
     lines = power_lines(station, members)
     prior = power_prior(np.array([lines.rated_flow_m3h, lines.rated_shaft_kw, lines.shutoff_share]).T)
     parameters = [

@@ -9,6 +9,7 @@ from wetwell.protocols.recordings.kpi import kpis
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
+from wetwell.sim2real.recording.checks import check_pumps
 from wetwell.sim2real.recording.inflow import infer_inflow_m3h
 from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.simulator.inflow.recorded import RecordedInflow
@@ -73,8 +74,7 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
     """
     if station.control.is_external:
         raise ValueError(f"station '{station.name}': control.mode 'external': no levels start pumps")
-    if recording.pumps != len(station.pump):
-        raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {len(station.pump)}")
+    check_pumps(recording, station)
     level_m = recording.column("level_m")
     if not np.isfinite(level_m).any():
         raise ValueError("column 'level_m' has no values: nothing to hold the simulator against")

@@ -11,6 +11,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.isolability.duty_points import VALUES, DutyPoint
+from wetwell.sim2real.recording.checks import check_pumps
 from wetwell.simulator.parameters import PlantParameters
 
 STATE_HZ = 1.0
@@ -58,9 +59,7 @@ def recorded_points(recording: Recording, station: Station, plant: PlantParamete
     ValueError
         If the numbers of pumps differ, or there is no frequency and no running flag, or no steady state.
     """
-    pumps = len(station.pump)
-    if recording.pumps != pumps:
-        raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {pumps}")
+    check_pumps(recording, station)
     frequency_hz = _frequencies_hz(recording, station)
     if not np.isfinite(frequency_hz).any():
         raise ValueError("neither frequencies nor running flags have values: no duty point can be told")

@@ -6,6 +6,7 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.recording.checks import check_rising
 from wetwell.simulator.duty import duty_flows_m3h
 from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.wet_well import volume_at_level_m3
@@ -44,8 +45,7 @@ def infer_inflow_m3h(recording: Recording, station: Station, *, window_s: float 
     ValueError
         If times do not rise or there is no level.
     """
-    if np.any(np.diff(recording.time_ns) <= 0):
-        raise ValueError("times must rise: prepare the recording first")
+    check_rising(recording)
     if "level_m" not in recording.columns:
         raise ValueError("column 'level_m' is missing: without a level the inflow cannot be inferred")
     parameters = plant_parameters(station)

@@ -8,6 +8,7 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.recording.checks import check_rising
 from wetwell.sim2real.recording.seconds import filled, repeated
 
 MIN_LENGTH_S = 1800
@@ -124,8 +125,7 @@ def rows_of(recording: Recording) -> Rows:
     """
     if len(recording) == 0:
         raise ValueError("the recording has no rows")
-    if np.any(np.diff(recording.time_ns) <= 0):
-        raise ValueError("times must rise: prepare the recording first")
+    check_rising(recording)
     second = (recording.time_ns - recording.time_ns[0] + NS_PER_S // 2) // NS_PER_S
     seconds = int(second[-1]) + 1
     if seconds < MIN_LENGTH_S:

@@ -10,6 +10,7 @@ from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.recording.checks import check_pumps
 from wetwell.sim2real.recording.drives import Drives, drives_between
 from wetwell.sim2real.recording.duty import Intervals, drives_of_means
 from wetwell.sim2real.recording.rows import EACH_SECOND_S, Rows, rows_of
@@ -94,8 +95,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         nothing to be held against, or fewer than six starts.
     """
     pumps = len(station.pump)
-    if recording.pumps != pumps:
-        raise ValueError(f"the recording has {recording.pumps} pumps, station '{station.name}' {pumps}")
+    check_pumps(recording, station)
     rows = rows_of(recording)
     signals: dict[AnalogueQuantity, Floats] = {name: rows.of_pumps(name, pumps) for name in PUMP_METERS}
     signals = {name: rows.news(values) for name, values in signals.items() if _moves(values)}
