@@ -39,7 +39,7 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
     if x.size == 0:
         return np.zeros((0, 2))
     rows = fitter.rows
-    slopes, residuals = fitter.slopes(fit), fit.residuals[rows]
+    slopes, residuals = fitter.slopes(fit)[rows], fit.residuals[rows]
     cycles = np.unique(bins.cycle[rows], return_inverse=True)[1]
     count = int(cycles.max(initial=0)) + 1
     block = cycles * min(MOST_BLOCKS, count) // count

@@ -48,7 +48,10 @@ def ranking(found: Attribution, bins: Bins, rng: np.random.Generator) -> tuple[R
     gaps = [gap_of(found.plain, single.fit.residuals, bins, found.validation, rng) for single in found.singles]
     return tuple(
         RankedCandidate(
-            name=single.fit.names[0], score=single.score, shrinkage=gap.shrinkage, shrinkage_ci=gap.shrinkage_ci
+            name=single.fit.names[0],
+            score=single.log_evidence,
+            shrinkage=gap.shrinkage,
+            shrinkage_ci=gap.shrinkage_ci,
         )
         for single, gap in zip(found.singles, gaps, strict=True)
     )
