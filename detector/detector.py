@@ -12,8 +12,8 @@ from wetwell.detector.snapshot.codec import decode_snapshot, encode_snapshot
 from wetwell.detector.stream.block import Block, LiveBlock
 from wetwell.detector.stream.gate import gate_counts
 from wetwell.detector.stream.loop import Stop
+from wetwell.detector.verdict.costs import Costs
 from wetwell.detector.verdict.evidence import rolling_evidence
-from wetwell.detector.verdict.maintenance import Costs
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.messages.verdict import Verdict
 

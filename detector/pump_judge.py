@@ -29,8 +29,9 @@ from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, s
 from wetwell.detector.statistics.robust import median
 from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE, SEGMENT_SAMPLES
+from wetwell.detector.verdict.costs import Costs
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
-from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
+from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.detector.verdict.severity import severity
 from wetwell.protocols.messages.verdict import State
 
