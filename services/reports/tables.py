@@ -93,12 +93,10 @@ def kpi_table(figures: Kpis, labels: Sequence[str] = (), *, with_hours: bool) ->
         "energy_kwh": _figure(figures.energy_kwh.sum()),
         "specific_energy_kwh_m3": _figure(figures.station_specific_energy_kwh_m3),
     }
-    unseen = f"starts and stops between two rows, of which there is one in {figures.step_s:g} s"
-    return (
-        {"days": days, "totals": totals, "station": station}
-        | ({"not_seen": unseen} if figures.step_s > ONE_SAMPLE_S else {})
-        | ({"hours": hours} if with_hours else {})
-    )
+    table: dict[str, object] = {"days": days, "totals": totals, "station": station}
+    if figures.step_s > ONE_SAMPLE_S:
+        table["not_seen"] = f"starts and stops between two rows, of which there is one in {figures.step_s:g} s"
+    return table | ({"hours": hours} if with_hours else {})
 
 
 def _named(pump: int, labels: Sequence[str]) -> dict[str, Any]:
