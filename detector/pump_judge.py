@@ -167,7 +167,10 @@ class PumpJudge:
         return 0
 
     def look_early(self, run: Run, system: SystemPrior) -> Judgement | None:
-        """Judge the last segments of an open run, if two looks in a row are sure of a fault not told yet."""
+        """Judge the last segments of an open run, if two looks in a row are sure of a fault not told yet.
+
+        Such a run has no drawdown yet.
+        """
         memory = self.memory
         reference = memory.reference
         if reference is None or run.stuck:
@@ -177,7 +180,7 @@ class PumpJudge:
         if is_dry and math.isfinite(reference.drawdown.mean):
             return None  # the drawdown will tell at the end of the run whether the flow meter is dead
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
-        weighed = self._weigh(replace(run, log_ratio=math.nan), reference, system, evidence)
+        weighed = self._weigh(run, reference, system, evidence)
         posterior = weighed.posterior
         state, remark = decide(posterior, float(median(run.head_m)))
         fault = posterior.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum()

@@ -133,7 +133,7 @@ class PumpMemory:
         self.noises.clear()
 
     def blame_meters(self, errors: Mapping[str, tuple[float, float]], time_ns: int) -> None:
-        """Note which meters are wrong, with relative error and its standard deviation; known ones stay so since then."""
+        """Note which meters are wrong, with relative error and standard deviation; known ones stay so since then."""
         first = dict.fromkeys(errors, (time_ns, 0.0, 0.0)) | self.wrong_meters
         self.wrong_meters = {name: (first[name][0], *error) for name, error in errors.items()}
 
