@@ -23,14 +23,6 @@ from wetwell.sim2real.residuals.station import StationResiduals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SingleEffect:
-    """A single effect, and the logarithm of its evidence over that of none."""
-
-    fit: Fit
-    log_evidence: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Attribution:
     """Outcome: residuals, the accepted fit, and the single effects.
 
@@ -44,8 +36,8 @@ class Attribution:
         Effects that may be in the place of each accepted one.
     ends : (parameters, 2) array
         Of the 95 % intervals of the accepted points, in the order of the candidates.
-    singles : tuple of SingleEffect
-        Single candidates by their evidence.
+    singles : tuple of Fit
+        Single candidates, the one that explains most first.
     training, validation : (bins,) array
         Bins that are fitted, and those on which gaps are measured.
     posterior : tuple of SetProbability
@@ -58,7 +50,7 @@ class Attribution:
     accepted: Fit | None
     equivalent: tuple[tuple[str, ...], ...]
     ends: Floats
-    singles: tuple[SingleEffect, ...]
+    singles: tuple[Fit, ...]
     training: Flags
     validation: Flags
     posterior: tuple[SetProbability, ...]
@@ -99,7 +91,7 @@ def attribute(
     trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
     hypotheses = Hypotheses(fitter, cells_of(residuals.bins, has_inflow=replay.traces.inflow_m3h is not None), each)
-    weighed = hypotheses.add(singles)
+    hypotheses.add(singles)
     search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
     posterior = posterior_of(hypotheses.weights(), len(singles))
     accepted: Fit | None = None
@@ -108,16 +100,12 @@ def attribute(
         accepted = in_order(fitter, hypotheses.of(best_set(posterior)).fit)
         equal = equivalents(posterior, accepted.names)
     progress(1.0)
-    none = hypotheses.of(()).evidence.log
     return Attribution(
         plain=plain,
         accepted=accepted,
         equivalent=() if accepted is None else tuple(equal[name] for name in accepted.names),
         ends=np.zeros((0, 2)) if accepted is None else intervals_of(fitter, accepted, residuals.bins),
-        singles=tuple(
-            SingleEffect(fit=one.fit, log_evidence=one.evidence.log - none)
-            for one in sorted(weighed, key=lambda one: -one.evidence.log)
-        ),
+        singles=tuple(singles),
         training=training,
         validation=validation,
         posterior=posterior,

@@ -17,6 +17,8 @@ from wetwell.sim2real.residuals.asinh_loss import residuals_of, slopes_of
 from wetwell.simulator.effects.effect import Effect
 
 TWO_SIDED = 1.96
+HOPELESS = (0.5, 50.0)
+"""Share of what the best of some fits explains, and sum of squares beyond that, by which a fit may be behind it."""
 FLEXED = 4
 """Sets, the best first, beside which something unknown is weighed: it needs what explains most."""
 
@@ -61,14 +63,16 @@ class Hypotheses:
         found = [one for one in self._best.values() if one.is_possible]
         return sorted(found, key=lambda one: -one.evidence.log)
 
-    def add(self, fits: Sequence[Fit]) -> list[Hypothesis]:
-        """Weigh fits, and keep those that are the best of their names."""
-        weighed = list(self._each(self._weighed, fits))
-        for one in weighed:
+    def add(self, fits: Sequence[Fit]) -> None:
+        """Weigh fits, but for those that explain far less than others, and keep the best of each set of names."""
+        costs = [self._fitter.cost(fit) for fit in fits]
+        least, plain = min(costs, default=0.0), self._fitter.cost(self._fitter.plain)
+        most = min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain)
+        hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
+        for one in self._each(self._weighed, hopeful):
             known = self._best.get(one.effects)
             if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
                 self._best[one.effects] = one
-        return weighed
 
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""

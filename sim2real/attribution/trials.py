@@ -17,6 +17,8 @@ PROBES = (0.02,)
 MOST_FITTED = 8
 """Further effects that are fitted, the most promising first."""
 MOST_REFINED = 4
+LEAST_PROMISED = 10.0
+"""Drop of the sum of squares under which a further effect is not fitted: it could not pay for its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -73,7 +75,8 @@ class Trials:
         fitter = self._fitter
         free = [c for c in library if c.name not in current.names]
         promises = list(self._each(lambda candidate: self._promise(candidate, current), free))
-        likely = [free[k] for k in np.argsort(-np.array(promises), kind="stable")[:MOST_FITTED]]
+        order = np.argsort(-np.array(promises), kind="stable")[:MOST_FITTED]
+        likely = [free[k] for k in order if promises[k] > LEAST_PROMISED]
         tried = self._each(
             lambda candidate: fitter.first(candidate, self._start_grids(candidate), others=current), likely
         )

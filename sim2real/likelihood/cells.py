@@ -63,8 +63,8 @@ class Cells:
         """(groups,) size under which an offset that all cycles share is none."""
         return np.asarray(self.group_sums(self.material) / np.diff(np.r_[self.first, self.group.size]))
 
-    def chosen(self, rows: Flags) -> "Cells":
-        """Some of the cells, whole groups; what the bins are is lost."""
+    def chosen(self, rows: Integers) -> "Cells":
+        """Some of the cells in their order, whole groups; what the bins are is lost."""
         group = np.unique(self.group[rows], return_inverse=True)[1]
         return replace(
             self,

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Cells
 
 CHANGING = 0.5
 """Share of the material size by which a difference may change from cycle to cycle and is still none. [1]"""
-FORM = 0.05
+SHARED_FORM = 0.05
 """Standard deviation of the error of form of a right effect, as a share of what it explains. [1]"""
-FORM_CHANGING = 0.01
+CHANGING_FORM = 0.01
 """The same of the part that changes from cycle to cycle. [1]"""
 SWING = 0.5
 """The same where an effect is known by how much it swings in time, and not by its course. [1]"""
@@ -36,7 +36,7 @@ class Form:
     signature: Floats
     swinging: Floats
 
-    def chosen(self, rows: Floats) -> "Form":
+    def chosen(self, rows: Integers) -> "Form":
         """Of some of the cells."""
         return Form(signature=self.signature[rows], swinging=self.swinging[rows])
 
@@ -54,8 +54,8 @@ def projected(
     $$C = D + \sum_g (m_g^2\, 1_g 1_g^T + s^2\, f_g f_g^T) + \sigma_c^2 \sum_c 1_c 1_c^T, \qquad
     D = \operatorname{diag}(\sigma^2 + (k m)^2 + (s_c f)^2)$$
 
-    with the material size m, the signature f, `CHANGING` k, `FORM` s and
-    `FORM_CHANGING` $s_c$; groups g are common to all cycles, and
+    with the material size m, the signature f, `CHANGING` k, `SHARED_FORM` s and
+    `CHANGING_FORM` $s_c$; groups g are common to all cycles, and
     cycles c to all levels whose inflow nobody measures. One after the other for each of `CYCLE_SCALES` $\sigma_c$, or
     once where no cells share an error.
 
@@ -79,17 +79,17 @@ def projected(
     variance = (
         cells.variance
         + (cycle_scale * CHANGING * cells.material) ** 2
-        + (FORM_CHANGING * f) ** 2
+        + (CHANGING_FORM * f) ** 2
         + (SWING * form.swinging) ** 2
     )
     weight = 1.0 / variance
     offset_variance = (offset_scale * cells.group_material) ** 2
     weighted = columns * weight[:, None]
     sums = cells.group_sums(np.column_stack([weight, weight * f, weight * f**2]))
-    ones, both, forms = sums[:, 0] + 1.0 / offset_variance, sums[:, 1], sums[:, 2] + FORM**-2
+    ones, both, forms = sums[:, 0] + 1.0 / offset_variance, sums[:, 1], sums[:, 2] + SHARED_FORM**-2
     determinant = ones * forms - both**2
     inverse = np.array([[forms, -both], [-both, ones]]) / determinant
-    log_det = float(np.sum(np.log(variance)) + np.sum(np.log(determinant * offset_variance * FORM**2)))
+    log_det = float(np.sum(np.log(variance)) + np.sum(np.log(determinant * offset_variance * SHARED_FORM**2)))
     by_group = np.array([cells.group_sums(weighted), cells.group_sums(weighted * f[:, None])])
     products = columns.T @ weighted - _squared(by_group, inverse, by_group)
     rows = np.flatnonzero(cells.shares_cycle)

@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import FORM, Form, no_form, projected
+from wetwell.sim2real.likelihood.covariance import SHARED_FORM, Form, no_form, projected
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -57,9 +57,11 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     """
     count = slopes.shape[1]
     columns = np.column_stack([residuals, slopes, _by_block(cells, form.signature)])
-    best, logs, steps, curvatures = -np.inf, [], np.zeros(count), np.zeros((count, count))
+    best, logs = -np.inf, []
+    steps: Floats = np.zeros(count)
+    curvatures: Floats = np.zeros((count, count))
     for products, log_volume in projected(cells, columns, form):
-        inner, log_det = _integrated(products, log_volume, count + 1, FORM**2)
+        inner, log_det = _integrated(products, log_volume, count + 1, SHARED_FORM**2)
         curvature, slope = inner[1:, 1:], inner[1:, 0]
         step = -solve(curvature + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
         square = float(inner[0, 0] + 2.0 * step @ slope + step @ curvature @ step)

@@ -7,7 +7,7 @@ from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import FORM, Form, projected
+from wetwell.sim2real.likelihood.covariance import SHARED_FORM, Form, projected
 from wetwell.sim2real.residuals.bins import LEVEL
 
 SCALES = (1.0, 3.0, 10.0, 30.0)
@@ -35,21 +35,21 @@ def flexible_factor(cells: Cells, residuals: Floats, form: Form) -> float:
     if np.any(cells.shares_cycle):  # an error that they share makes one block of them
         others = [rows for rows, (signal, _) in zip(blocks, cells.block_names, strict=True) if signal != LEVEL]
         blocks = [*others, np.sort(np.concatenate(levels))]
-    return sum(_factor(cells.chosen(rows), residuals[rows], form.chosen(rows)) for rows in blocks)
+    return float(sum(_factor(cells.chosen(rows), residuals[rows], form.chosen(rows)) for rows in blocks))
 
 
 def _factor(cells: Cells, residuals: Floats, form: Form) -> float:
     columns = np.column_stack([residuals, form.signature])
-    weights = np.log([1.0 - TOUCHED, *(TOUCHED / (len(SCALES) - 1) for _ in SCALES[1:])])
+    weights = [float(np.log(1.0 - TOUCHED)), *(float(np.log(TOUCHED / (len(SCALES) - 1))) for _ in SCALES[1:])]
     logs: list[float] = []
     for (offset, by_offset), (cycle, by_cycle) in product(zip(SCALES, weights, strict=True), repeat=2):
         each = [_log(products, log_det) for products, log_det in projected(cells, columns, form, offset, cycle)]
         logs.append(float(logsumexp(each)) + by_offset + by_cycle)
-    return float(logsumexp(logs)) - (logs[0] - 2.0 * weights[0])
+    return float(logsumexp(logs) - (logs[0] - 2.0 * weights[0]))
 
 
 def _log(products: Floats, log_det: float) -> float:
     """Logarithm of the probability, the error of form of the block integrated out."""
-    forms = products[1, 1] + FORM**-2
+    forms = products[1, 1] + SHARED_FORM**-2
     square = products[0, 0] - products[0, 1] ** 2 / forms
-    return -0.5 * float(square + log_det + np.log(forms * FORM**2))
+    return -0.5 * float(square + log_det + np.log(forms * SHARED_FORM**2))

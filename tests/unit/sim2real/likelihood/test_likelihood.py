@@ -9,9 +9,9 @@ from scipy.stats import multivariate_normal
 from wetwell.sim2real.likelihood.cells import cells_of
 from wetwell.sim2real.likelihood.covariance import (
     CHANGING,
+    CHANGING_FORM,
     CYCLE_SCALES,
-    FORM,
-    FORM_CHANGING,
+    SHARED_FORM,
     SWING,
     Form,
     no_form,
@@ -52,12 +52,12 @@ def dense(cells, form, cycle_sd, offset=1.0, changing=1.0):
     diagonal = (
         cells.variance
         + (changing * CHANGING * cells.material) ** 2
-        + (FORM_CHANGING * f) ** 2
+        + (CHANGING_FORM * f) ** 2
         + (SWING * form.swinging) ** 2
     )
     together = cells.group[:, None] == cells.group[None, :]
     size = offset * cells.group_material[cells.group]
-    whole = np.diag(diagonal) + together * (np.outer(size, size) + FORM**2 * np.outer(f, f))
+    whole = np.diag(diagonal) + together * (np.outer(size, size) + SHARED_FORM**2 * np.outer(f, f))
     shared = cells.shares_cycle[:, None] & cells.shares_cycle[None, :]
     return whole + cycle_sd**2 * (shared & (cells.cycle[:, None] == cells.cycle[None, :]))
 
