@@ -37,5 +37,5 @@ class PipeClogging(SystemFault):
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Raise friction and static head over a block that begins at `time_s[0]`."""
         share = self.share(time_s)
-        forcing.friction_factor[:] *= 1.0 + self.friction_rise * share
-        forcing.static_rise_m[:] += self.static_rise_m * share
+        self.of_main(forcing.friction_factor)[:] *= 1.0 + self.friction_rise * share
+        self.of_main(forcing.static_rise_m)[:] += self.static_rise_m * share

@@ -4,7 +4,7 @@ from wetwell.sim2real.attribution.candidates import candidates_of
 
 
 def test_a_strength_that_is_neutral_by_the_guess_has_no_grid():
-    (sump,) = candidates_of(1, only=["sump_area_profile"])
+    (sump,) = candidates_of(1, 1, only=["sump_area_profile"])
     names = [free.name for free in sump.free]
     top = names.index("top_factor")
     moved = [grid[-1][top] != grid[0][top] for grid in sump.start_grids({})]
