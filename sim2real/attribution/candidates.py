@@ -122,7 +122,7 @@ def candidates_of(
         choices = {
             parameter["name"]: parameter.get("choices") or _numbers(counts[parameter["name"]])
             for parameter in row["parameters"]
-            if "unit" not in parameter
+            if "unit" not in parameter and (parameter["name"], mains) != ("main", 1)
         }
         free = tuple(_free_parameter(parameter) for parameter in row["parameters"] if "unit" in parameter)
         found += [

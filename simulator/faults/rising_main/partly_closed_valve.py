@@ -19,6 +19,8 @@ class PartlyClosedValve(SystemFault):
 
     Parameters
     ----------
+    main : int
+        0 for all.
     opening : float
         x1, open share of the valve's area at full strength, 0.01..1. [1]
     valve_share : float
