@@ -98,7 +98,7 @@ def slow(seed: int, period_s: int) -> dict[str, Any]:
     span = {"start_s": start_days * DAY_S, "end_s": (start_days + days) * DAY_S}
     if is_main:
         asset, limit, full = "main", limits.friction_rise_percent, float(rng.uniform(25.0, 45.0))
-        fault: Fault = PipeClogging(friction_rise=full / 100.0, **span)
+ = PipeClogging(friction_rise=full / 100.0, **span)
     else:
         asset, limit, full = "pump:1", limits.wear_head_percent, 8.0
         fault = ImpellerWear(pump=1, head_loss=full / 100.0, **span)
@@ -145,9 +145,8 @@ def months(seed: int, period_s: int) -> dict[str, Any]:
             loss = float(rng.uniform(0.05, 0.2))
             fault = Blockage(pump=2, speed_loss=loss, start_s=start_s, end_s=start_s + fast_s, after="clear")
         else:
-            faults.append(
-                ImpellerWear(pump=1, head_loss=0.08, start_s=start_s, end_s=start_s + slow_s, after="clear")
-            )
+            fault = ImpellerWear(pump=1, head_loss=0.08, start_s=start_s, end_s=start_s + slow_s, after="clear")
+        faults.append(fault)
     registry, watch = AlarmRegistry(), StationWatch("alpha", heard_s=0.0, missed_s=0.0, start_s=-1e9)
     raised: dict[str, int] = {}
     is_up: dict[str, bool] = {}
