@@ -98,7 +98,7 @@ def slow(seed: int, period_s: int) -> dict[str, Any]:
     span = {"start_s": start_days * DAY_S, "end_s": (start_days + days) * DAY_S}
     if is_main:
         asset, limit, full = "main", limits.friction_rise_percent, float(rng.uniform(25.0, 45.0))
- = PipeClogging(friction_rise=full / 100.0, **span)
+        fault: Fault = PipeClogging(friction_rise=full / 100.0, **span)
     else:
         asset, limit, full = "pump:1", limits.wear_head_percent, 8.0
         fault = ImpellerWear(pump=1, head_loss=full / 100.0, **span)
