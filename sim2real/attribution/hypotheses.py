@@ -1,7 +1,7 @@
 """Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from wetwell.sim2real.likelihood.posterior import Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of, slopes_of
 from wetwell.simulator.effects.effect import Effect
 
-TWO_SIDED = 1.96
 HOPELESS = (0.5, 50.0)
 """Share of what the best of some fits explains, and sum of squares beyond that, by which a fit may be behind it."""
 FLEXED = 4
@@ -25,7 +24,7 @@ FLEXED = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hypothesis:
-    """A fit with its evidence; `is_possible` tells whether all of its effects are there, and matter."""
+    """A fit with its evidence; `is_possible` tells whether each of its effects matters."""
 
     fit: Fit
     evidence: Evidence
@@ -56,6 +55,7 @@ class Hypotheses:
         none = evidence_of_none(cells, self._plain)
         self._none = Hypothesis(fit=fitter.plain, evidence=none, form=no_form(cells), is_possible=True)
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
+        self._factors: dict[tuple[str, ...], float] = {}
 
     @property
     def possible(self) -> list[Hypothesis]:
@@ -78,13 +78,19 @@ class Hypotheses:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
 
+    def rule_out(self, effects: Sequence[str]) -> None:
+        """Take a set for impossible: one of its effects may as well not be there."""
+        names = tuple(sorted(effects))
+        self._best[names] = replace(self._best[names], is_possible=False)
+
     def weights(self) -> list[Weight]:
         """What the posterior is made of."""
         possible = self.possible
         flexed = [*possible[:FLEXED], *(one for one in possible[FLEXED:] if one is self._none)]
-        factors = dict(zip((one.effects for one in flexed), self._each(self._flexible, flexed), strict=True))
+        flexed = [one for one in flexed if one.effects not in self._factors]
+        self._factors |= zip((one.effects for one in flexed), self._each(self._flexible, flexed), strict=True)
         return [
-            Weight(effects=one.effects, log=one.evidence.log, log_flexible=factors.get(one.effects, -np.inf))
+            Weight(effects=one.effects, log=one.evidence.log, log_flexible=self._factors.get(one.effects, -np.inf))
             for one in possible
         ]
 
@@ -100,7 +106,7 @@ class Hypotheses:
         slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
         form = self._form(fit, signatures)
         found = evidence(cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form)
-        is_possible = all(self._matters(one) for one in signatures) and _all_there(fit, found.spread)
+        is_possible = all(self._matters(one) for one in signatures)
         return Hypothesis(fit=fit, evidence=found, form=form, is_possible=is_possible)
 
     def _signature(self, fit: Fit, member: int, residuals: Floats) -> Floats:
@@ -127,17 +133,3 @@ class Hypotheses:
         cells = self._cells
         squares = cells.group_sums(signature**2) / np.bincount(cells.group)
         return bool(np.any(squares > cells.group_material**2))
-
-
-def _all_there(fit: Fit, spread: Floats) -> bool:
-    """Whether the interval of some strength of each effect is without its neutral value."""
-    places = np.split(np.arange(spread.size), np.cumsum([point.size for point in fit.points])[:-1])
-    for candidate, point, place in zip(fit.candidates, fit.points, places, strict=True):
-        strengths = [
-            (abs(float(one) - free.normalised(free.neutral)), float(wide))
-            for free, one, wide in zip(candidate.free, point, spread[place], strict=True)
-            if free.neutral is not None and np.isfinite(wide)
-        ]
-        if strengths and not any(far > TWO_SIDED * wide for far, wide in strengths):
-            return False
-    return True

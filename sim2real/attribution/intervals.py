@@ -15,6 +15,8 @@ RISE = 10.0
 """Of the sum of squares, at the ends of an interval of a parameter that has no slope, such as a limit."""
 HALF_SCAN_S = 0.5
 """Least half width of a time: a sample may stand for the begin or the end of its second."""
+SPANNED = 0.9
+"""Share of a range from which an interval says nothing."""
 FORM = (0.01, 0.03)
 """Least half width, as a share of the way from neutral, where a name fixes the equation, and where it does not."""
 STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 0.8)
@@ -63,6 +65,27 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
         low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
         ends[k] = min(ends[k, 0], free.normalised(low)), max(ends[k, 1], free.normalised(high))
     return np.asarray(ends, dtype=np.float64)
+
+
+def are_there(fit: Fit, ends: Floats) -> bool:
+    """Whether each effect has a strength whose interval is without its neutral value, and does not span its range.
+
+    Parameters
+    ----------
+    fit : Fit
+    ends : (parameters, 2) array
+        As of `intervals_of`.
+    """
+    intervals = np.split(ends, np.cumsum([point.size for point in fit.points])[:-1])
+    for candidate, own in zip(fit.candidates, intervals, strict=True):
+        strengths = [
+            (low - free.normalised(free.neutral), high - free.normalised(free.neutral))
+            for free, (low, high) in zip(candidate.free, own, strict=True)
+            if free.neutral is not None
+        ]
+        if strengths and not any((low > 0.0 or high < 0.0) and high - low < SPANNED for low, high in strengths):
+            return False
+    return True
 
 
 def _sums(values: Floats, group: Integers) -> Floats:

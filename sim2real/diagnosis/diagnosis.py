@@ -15,6 +15,7 @@ from wetwell.sim2real.diagnosis.findings import found_effects, ranking, where_it
 from wetwell.sim2real.diagnosis.limitations import limitations
 from wetwell.sim2real.diagnosis.localisation import localise
 from wetwell.sim2real.diagnosis.report import (
+    AnswerProbability,
     ClosedLoopComparison,
     DetectorVerdicts,
     FoundEffect,
@@ -74,6 +75,11 @@ class Diagnosis:
             verdict=self.verdict,
             where=self.where,
             effects=self.effects,
+            posterior=tuple(
+                AnswerProbability(effects=one.effects, verdict=one.verdict, probability=one.probability)
+                for one in self.posterior
+            ),
+            component_probability=self.component_probability,
             candidates=self.candidates,
             gap=self.gap,
             closed_loop=closed_loop,

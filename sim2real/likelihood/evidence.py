@@ -24,13 +24,10 @@ class Evidence:
         Logarithm of the probability of the cells, but for a constant that all sets share.
     residuals : (cells,) array
         At the most probable parameters near the fit.
-    spread : (parameters,) array
-        Standard deviations of the parameters, as shares of their ranges; infinite without a slope.
     """
 
     log: float
     residuals: Floats
-    spread: Floats
 
 
 def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evidence:
@@ -59,7 +56,6 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     columns = np.column_stack([residuals, slopes, _by_block(cells, form.signature)])
     best, logs = -np.inf, []
     steps: Floats = np.zeros(count)
-    curvatures: Floats = np.zeros((count, count))
     for products, log_volume in projected(cells, columns, form):
         inner, log_det = _integrated(products, log_volume, count + 1, SHARED_FORM**2)
         curvature, slope = inner[1:, 1:], inner[1:, 0]
@@ -68,12 +64,10 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
         occam = float(np.linalg.slogdet(np.eye(count) + curvature / (2.0 * np.pi))[1])
         logs.append(-0.5 * (square + log_det + occam))
         if logs[-1] > best:
-            best, steps, curvatures = logs[-1], step, curvature
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(curvatures)), 0.0))
+            best, steps = logs[-1], step
     return Evidence(
         log=float(logsumexp(logs) - np.log(len(logs))),
         residuals=residuals + slopes @ steps,
-        spread=np.where(np.any(slopes != 0.0, axis=0), spread, np.inf),
     )
 
 

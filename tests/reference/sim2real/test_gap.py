@@ -118,7 +118,7 @@ def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     assert report.where[0].component == "flow_meter"
 
 
-@pytest.mark.parametrize(("time_s", "verdict"), [(0.1, "effect"), (1.0, "none")])
+@pytest.mark.parametrize(("time_s", "verdict"), [(0.1, "effect"), (3.0, "none")])
 def test_what_matters_is_up_to_the_station(alpha, time_s, verdict):
     """Inertia of half a second is a gap for those who care for a tenth of a second, and none for others."""
     station = alpha.model_copy(update={"materiality": Materiality(time_s=time_s)})
