@@ -27,6 +27,8 @@ from wetwell.services.runtime.settings import AlarmSettings
 
 log = logging.getLogger(__name__)
 
+SOURCES = frozenset({"gateway", "simulator"})
+"""Services whose health figures say why samples do not come."""
 MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
 
@@ -88,9 +90,9 @@ class AlarmService:
         self._counts["verdicts" if is_new else "doubled"] += 1
 
     def handle_status(self, payload: bytes) -> None:
-        """Look at the health figures of a gateway."""
+        """Look at the health figures of a source of samples."""
         status = self._decoded(Status, payload)
-        if status is not None and status.service == "gateway" and (watch := self._named(status.station)) is not None:
+        if status is not None and status.service in SOURCES and (watch := self._named(status.station)) is not None:
             watch.handle_status(status, self._now(), self.registry, self._settings.heartbeat_after_s)
 
     def handle_presence(self, presence: Presence) -> None:

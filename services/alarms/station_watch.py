@@ -84,6 +84,8 @@ class StationWatch:
     seq: int = -1
     older: int = 0
     has_samples: bool = False
+    is_held: bool = False
+    """Whether it is a simulated plant that stands until it is let go: then no samples are missed."""
     verdicts: dict[int, PumpVerdicts] = field(default_factory=dict)
     gone_s: dict[str, float | None] = field(default_factory=dict)
 
@@ -151,7 +153,13 @@ class StationWatch:
         return SITE_SERVICES if self.name == SITE else STATION_SERVICES
 
     def handle_status(self, status: Status, now: Now, registry: AlarmRegistry, heartbeat_after_s: float) -> None:
-        """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs."""
+        """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs.
+
+        Of a simulated plant whether it is held.
+        """
+        if status.service == "simulator":
+            self.is_held = status.figures.get("held", 0.0) > 0.0
+            return
         time_ns, age_s = self.clock_ns(now), status.figures.get("heartbeat_age_s")
         registry.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
         if age_s is not None and status.state == "running":
@@ -167,6 +175,8 @@ class StationWatch:
     def look(self, now: Now, registry: AlarmRegistry, stale_after_s: float, silent_after_s: float) -> None:
         """Look for what does not come any more."""
         time_ns = self.clock_ns(now)
+        if self.is_held:
+            self.missed_s = now.steady_s
         if self.has_samples:
             self.gone_s.setdefault("detector", now.steady_s)
             age_s = now.steady_s - self.missed_s
