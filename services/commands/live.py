@@ -1,22 +1,24 @@
 """Services that run until they are stopped."""
 
-import asyncio
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
+    RUN,
     AsStationOption,
     ConfigOption,
     JsonOption,
     ModbusOption,
     PageOption,
+    RecordingOption,
     ScenarioOption,
     SeedOption,
     SpeedOption,
+    StationNameOption,
     StationOption,
     TimeZoneOption,
     WordOrderOption,
@@ -25,19 +27,21 @@ from wetwell.services.commands.options import (
     parse_duration_s,
     positive,
     print_result,
+    reading_of,
     run,
     settings_of,
+    station_name,
     with_data,
 )
-from wetwell.services.runtime.settings import LogSettings, Settings
 
 if TYPE_CHECKING:
+    from wetwell.services.runtime.settings import Settings
     from wetwell.services.simulator.daemon import PlantStart
 
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RUN)
 def up(
     station: StationOption = "alpha",
     scenario: ScenarioOption = "demo",
@@ -64,10 +68,9 @@ def up(
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
     """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
-    from wetwell.services.reports.terminal import banner
-    from wetwell.services.supervisor.runs import RunRecord, take_folder
-    from wetwell.services.supervisor.screens import JsonScreen, TerminalScreen
-    from wetwell.services.supervisor.serve import Screen, UpPlan, serve_all
+    import tempfile
+
+    from wetwell.services.runtime.settings import LogSettings
 
     settings = settings_of(config, zenoh, modbus, word_order, page=page)
     if settings.log == LogSettings():
@@ -75,6 +78,11 @@ def up(
     limit_s = None if limit is None else parse_duration_s(limit)
     is_shown = speed is None and not steady
     plant, speed = live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
+    from wetwell.services.reports.terminal import banner
+    from wetwell.services.supervisor.runs import RunRecord, take_folder
+    from wetwell.services.supervisor.screens import JsonScreen, TerminalScreen
+    from wetwell.services.supervisor.serve import Screen, UpPlan, serve_all
+
     is_shown = is_shown and speed > 1.0
     begin_s, words = 0, ""
     if data is not None:
@@ -92,7 +100,7 @@ def up(
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
         settings = with_data(settings, data, Path(folder))
         text = banner(settings, plant.station, plant.scenario.name, speed) + (f"\nData in {words}\n" if words else "")
-        screen: Screen = JsonScreen(_say) if as_json else TerminalScreen(_say, text, plant.station.pump_names)
+        screen: Screen = JsonScreen(_say) if as_json else TerminalScreen(_say, text, plant.station.pump_labels)
         story_s = plant.scenario.duration_s
         plan = UpPlan(plant.station.name, commands, is_shown=is_shown, story_s=story_s, limit_s=limit_s)
         run(settings, serve_all(settings, plan, screen))
@@ -103,7 +111,7 @@ def _say(text: str, ends: bool) -> None:
     sys.stdout.flush()
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RUN)
 def simulator(
     station: StationOption = "alpha",
     scenario: ScenarioOption = "nominal",
@@ -139,7 +147,7 @@ def simulator(
     )
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RUN)
 def plc(
     station: StationOption = "alpha",
     scenario: ScenarioOption = "nominal",
@@ -156,7 +164,7 @@ def plc(
 
 
 detector_app = typer.Typer(invoke_without_command=True)
-app.add_typer(detector_app, name="detector")
+app.add_typer(detector_app, name="detector", rich_help_panel=RUN)
 
 
 @detector_app.callback()
@@ -172,11 +180,12 @@ def detector(
     """Judge the samples of stations on Zenoh and publish verdicts."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.services.detector.daemon import serve_detector
     from wetwell.services.stations import find_stations
 
-    settings = settings_of(config, zenoh)
-    run(settings, serve_detector(settings, find_stations(station or ["alpha"])))
+    settings, stations = settings_of(config, zenoh), find_stations(station or ["alpha"])
+    from wetwell.services.detector.daemon import serve_detector
+
+    run(settings, serve_detector(settings, stations))
 
 
 @detector_app.command()
@@ -190,31 +199,33 @@ def rebaseline(
     as_json: JsonOption = False,
 ) -> None:
     """Order a running detector to learn a pump anew, after a repair; what it knew is put aside."""
-    from wetwell.services.detector.client import send_order
+    import asyncio
+
     from wetwell.services.stations import find_station
 
-    name = find_station(station).name
-    settings = settings_of(config, zenoh)
+    settings, name = settings_of(config, zenoh), find_station(station).name
+    from wetwell.services.detector.client import send_order
+
     verdict = asyncio.run(send_order(settings, name, pump, "revert" if revert else "rebaseline", by))
     answer = {"station": name, "pump": pump, "state": verdict.state, "reason": verdict.evidence.get("reason")}
     print_result(answer | {"baseline": verdict.evidence.get("baseline")}, as_json=as_json)
 
 
-@detector_app.command()
+@detector_app.command(cls=about("--station"))
 def release(
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")],
+    station: StationNameOption,
     config: ConfigOption = None,
 ) -> None:
     """Judge a station again, from the next start on, that was left out because the detector had crashed at it."""
+    kept = settings_of(config).detector
     from wetwell.services.detector.quarantine import Quarantine
 
-    kept = settings_of(config).detector
-    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(station)
+    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(station_name(station))
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=RUN)
 def replay(
-    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    recording: RecordingOption,
     station: StationOption,
     speed: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
     as_station: AsStationOption = False,
@@ -223,27 +234,27 @@ def replay(
     config: ConfigOption = None,
 ) -> None:
     """Publish a recording on Zenoh as if it were live, then end."""
-    from wetwell.protocols.recordings.reading import Reading
-    from wetwell.services.replay.daemon import serve_replay
     from wetwell.services.stations import find_station
 
     settings = settings_of(config, zenoh)
     plant = find_station(station)
-    rows = Reading.said(time_zone, as_station=as_station).read_of(recording, plant)
+    rows = reading_of(time_zone, as_station=as_station).read_of(recording, plant)
+    from wetwell.services.replay.daemon import serve_replay
+
     run(settings, serve_replay(settings, rows, plant.name, positive(speed, "--speed")))
 
 
-@app.command()
+@app.command(rich_help_panel=RUN)
 def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
     """Run a Zenoh router, for sites that have none."""
+    settings = settings_of(config, zenoh)
     from wetwell.services.router.daemon import serve_router
 
-    settings = settings_of(config, zenoh)
     run(settings, serve_router(settings))
 
 
 def _serve_plant(
-    settings: Settings,
+    settings: "Settings",
     station: str,
     scenario: str,
     seed: int,
@@ -253,7 +264,7 @@ def _serve_plant(
     modbus: bool,
     start: "PlantStart | None" = None,
 ) -> None:
+    plant, speed = live_plant(station, scenario, seed, speed)
     from wetwell.services.simulator.daemon import PlantStart, serve_simulator
 
-    plant, speed = live_plant(station, scenario, seed, speed)
     run(settings, serve_simulator(settings, plant, speed, start or PlantStart(), zenoh=zenoh, modbus=modbus))

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 PAGE = 3_600
 ANSWER_S = 10.0
-AGAIN_S = 0.5
+ASK_AGAIN_S = 0.5
 PATIENCE_S = 30.0
 """So long a historian that does not answer is asked again: where a machine has started anew, it starts too. [s]"""
 
@@ -71,4 +71,4 @@ async def _answer(bus: Bus, station: str, query: HistoryQuery) -> History | None
         if payloads or clock() > end_s:
             log.info("station '%s': no historian has told; what the bus keeps must do", station)
             return None
-        await asyncio.sleep(AGAIN_S)
+        await asyncio.sleep(ASK_AGAIN_S)

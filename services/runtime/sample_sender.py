@@ -10,7 +10,7 @@ from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
 
 LEAST_KEPT = 600
 """Samples that the bus keeps for late joiners: ten minutes at one a second."""
-KEPT_S = 120.0
+LEAST_KEPT_S = 120.0
 """Time on the wall for which it keeps them at least, however fast the station runs: a process is back by then. [s]"""
 
 
@@ -36,7 +36,7 @@ class SampleSender:
         self._gathered: list[Sample] = []
         self._timer: asyncio.TimerHandle | None = None
         key = sample_block_key(station) if gather_s else sample_key(station)
-        self._publisher = bus.publisher(key, history=max(LEAST_KEPT, math.ceil(KEPT_S * rate_hz)))
+        self._publisher = bus.publisher(key, history=max(LEAST_KEPT, math.ceil(LEAST_KEPT_S * rate_hz)))
 
     def put(self, sample: Sample) -> None:
         """Send a sample, or gather it."""

@@ -10,7 +10,7 @@ from wetwell.services.runtime.client import first_answer
 
 SPEEDS = (1.0, 10.0, 60.0, 600.0)
 """Steps of the keys, as far as they lie under the full speed, which is the last one."""
-ANSWER_S = 2.0
+CLOCK_ANSWER_S = 2.0
 
 
 class PlantControl:
@@ -34,7 +34,7 @@ class PlantControl:
         MessageError
             If the answer is none.
         """
-        answer = await first_answer(self._bus, self._key, order.encode(), timeout_s=ANSWER_S)
+        answer = await first_answer(self._bus, self._key, order.encode(), timeout_s=CLOCK_ANSWER_S)
         clock = PlantClock.decode(answer)
         if clock.error:
             raise MessageError(clock.error)

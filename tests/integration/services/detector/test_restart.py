@@ -137,7 +137,7 @@ def test_a_historian_that_comes_back_later_than_the_detector_is_waited_for(
     alpha, samples, undisturbed, tmp_path, monkeypatch
 ):
     """As after a restart of the machine: what publishers keep no more is taken from it as soon as it answers."""
-    monkeypatch.setattr("wetwell.services.detector.backfill.AGAIN_S", 0.001)
+    monkeypatch.setattr("wetwell.services.detector.backfill.ASK_AGAIN_S", 0.001)
     cut, back = 20_000, 24_000
 
     async def live() -> list[Verdict]:
