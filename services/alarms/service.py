@@ -9,10 +9,10 @@ from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Request
 from wetwell.protocols.bus.keys import SITE, alarm_act_key, alarm_key
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmFigure, AlarmReport, AlarmState
-from wetwell.protocols.messages.decoding import M, SampleMessage, decoded, samples_of
+from wetwell.protocols.messages.decoding import M, decoded
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.sample import Sample
-from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.sample import LevelSample
+from wetwell.protocols.messages.sample_block import LevelBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
@@ -53,6 +53,7 @@ class AlarmService:
         self._lost_s: float | None = None
         self._audit = Audit(settings.state_dir)
         self._file = StateFile(settings.state_dir)
+        self._no_limits = limits_of(settings, None)
         self._limits = {station.name: limits_of(settings, station) for station in stations}
         rules = {name: change.model_dump(exclude_none=True) for name, change in settings.rules.items()}
         self.registry = AlarmRegistry(changed_rules(rules))
@@ -64,18 +65,22 @@ class AlarmService:
 
     def handle_sample(self, payload: bytes) -> None:
         """Look at a sample."""
-        self._handle_samples(self._decoded(Sample, payload))
+        sample = self._decoded(LevelSample, payload)
+        if sample is not None:
+            self._handle_samples(sample.station, [sample])
 
     def handle_sample_block(self, payload: bytes) -> None:
         """Look at many samples of a station."""
-        self._handle_samples(self._decoded(SampleBlock, payload))
+        block = self._decoded(LevelBlock, payload)
+        if block is not None:
+            self._handle_samples(block.station, block.samples())
 
-    def _handle_samples(self, message: SampleMessage | None) -> None:
-        if message is None or (watch := self._named(message.station)) is None:
+    def _handle_samples(self, station: str, samples: Sequence[LevelSample]) -> None:
+        if (watch := self._named(station)) is None:
             return
-        limits = self._limits.get(message.station) or limits_of(self._settings, None)
-        for sample in samples_of(message):
-            is_new = watch.handle_sample(sample, self._now(), self.registry, limits)
+        now, limits = self._now(), self._limits.get(station) or self._no_limits
+        for sample in samples:
+            is_new = watch.handle_sample(sample, now, self.registry, limits)
             self._counts["samples" if is_new else "doubled"] += 1
 
     def handle_verdict(self, payload: bytes) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import RuleName
-from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.sample import LevelSample
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
@@ -95,7 +95,7 @@ class StationWatch:
             return now.wall_ns
         return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
 
-    def handle_sample(self, sample: Sample, now: Now, registry: AlarmRegistry, limits: Limits) -> bool:
+    def handle_sample(self, sample: LevelSample, now: Now, registry: AlarmRegistry, limits: Limits) -> bool:
         """Look at a sample; whether it was new."""
         if self.time_ns is not None and sample.time <= self.time_ns and sample.seq <= self.seq:
             self.older += 1
@@ -122,9 +122,12 @@ class StationWatch:
     ) -> None:
         if limit_m is None or self.time_ns is None:
             return
+        if level_m < limit_m - deadband_m and not registry.is_known(self.name, rule):
+            return  # almost every sample
         least_m = limit_m - deadband_m if registry.is_wanted(self.name, rule) else limit_m
-        text = f"{registry.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m"
-        registry.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
+        is_there = level_m >= least_m
+        text = f"{registry.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m" if is_there else ""
+        registry.observe(self.name, rule, is_there, self.time_ns, now.wall_ns, text=text)
 
     def handle_verdict(self, verdict: Verdict, now: Now, registry: AlarmRegistry) -> bool:
         """Look at a verdict; whether it was new. "unknown" leaves the alarms of the pump as they are."""

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 OF_STATION = frozenset({"detector", "simulator"})
 """Parts that show themselves under the station's name; the others serve the whole site."""
-SHOWN_S = 4.0
+SLOWED_S = 4.0
 """So long on the wall the plant runs slowly after a change of state: one reads the line and looks at the page."""
 
 
@@ -179,7 +179,7 @@ class _Teller:
 
     async def _look(self) -> None:
         try:
-            await self._control.look(SHOWN_S)
+            await self._control.look(SLOWED_S)
         except MessageError as error:
             log.warning("%s", error)
 
