@@ -42,4 +42,4 @@ def test_a_day_with_faults_compiles_nothing_that_was_not_loaded() -> None:
         }
         assert {"normal", "pump_fault", "system_fault"} <= states
     assert compiled() == before
-    assert sum(before.values()) > 20
+    assert sum(before.values()) > 5, "kernels that are called from Python"
