@@ -15,8 +15,6 @@ RISE = 10.0
 """Of the sum of squares, at the ends of an interval of a parameter that has no slope, such as a limit."""
 HALF_SCAN_S = 0.5
 """Least half width of a time: a sample may stand for the begin or the end of its second."""
-SPANNED = 0.9
-"""Share of a range from which an interval says nothing."""
 FORM = (0.01, 0.03)
 """Least half width, as a share of the way from neutral, where a name fixes the equation, and where it does not."""
 STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 0.8)
@@ -68,7 +66,7 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
 
 
 def are_there(fit: Fit, ends: Floats) -> bool:
-    """Whether each effect has a strength whose interval is without its neutral value, and does not span its range.
+    """Whether each effect has a strength whose interval is without its neutral value.
 
     Parameters
     ----------
@@ -83,7 +81,7 @@ def are_there(fit: Fit, ends: Floats) -> bool:
             for free, (low, high) in zip(candidate.free, own, strict=True)
             if free.neutral is not None
         ]
-        if strengths and not any((low > 0.0 or high < 0.0) and high - low < SPANNED for low, high in strengths):
+        if strengths and not any(low > 0.0 or high < 0.0 for low, high in strengths):
             return False
     return True
 

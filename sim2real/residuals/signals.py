@@ -38,6 +38,8 @@ AREA_TOLERANCE = 0.015
 """Share by which a right area of the wet well may be off at some level: nobody draws ladders and benches."""
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
+GAP_S, FORGOTTEN_S = 10, round(2.0 * LEVEL_TIME_S)
+"""Time without rows in which pumps may have been switched unseen; time for which the level shows it then. [s]"""
 MIN_STRETCH_S = 60
 RAMP_ROWS = 4
 """Rows in a ramp from which it is looked at."""
@@ -230,8 +232,7 @@ def level_residuals(
 ) -> SignalResiduals:
     """Of the level."""
     counted = np.isfinite(traces.level_m)
-    if doubt.level_m is not None:
-        counted &= np.isfinite(doubt.level_m)
+    counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
@@ -269,6 +270,15 @@ def level_residuals(
         is_repeated=repeated(traces.level_m)[seconds.second],
         pattern=patterns.get("level_m"),
     )
+
+
+def _after_gaps(is_row: Flags) -> Flags:
+    """(n,) whether rows were missing so lately that the observer of the level has not come back."""
+    place = np.arange(is_row.size)
+    last = np.maximum.accumulate(np.where(is_row, place, 0))
+    ends = np.r_[False, place[1:] - last[:-1] > GAP_S] & is_row
+    since_s = place - np.maximum.accumulate(np.where(ends, place, -FORGOTTEN_S))
+    return np.asarray(since_s < FORGOTTEN_S)
 
 
 def moved_m(traces: Traces) -> Floats:

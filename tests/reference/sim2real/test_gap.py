@@ -118,14 +118,14 @@ def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     assert report.where[0].component == "flow_meter"
 
 
-@pytest.mark.parametrize(("time_s", "verdict"), [(0.1, "effect"), (3.0, "none")])
-def test_what_matters_is_up_to_the_station(alpha, time_s, verdict):
-    """Inertia of half a second is a gap for those who care for a tenth of a second, and none for others."""
-    station = alpha.model_copy(update={"materiality": Materiality(time_s=time_s)})
-    diagnosis = diagnose(record(alpha, [{"name": "water_inertia", "inertia_s2_m2": 400.0}]), station)
+@pytest.mark.parametrize(("head_share", "verdict"), [(0.01, "effect"), (0.1, "none")])
+def test_what_matters_is_up_to_the_station(alpha, head_share, verdict):
+    """A head that is .8 m off is a gap for those who care for a per cent, and none for a tenth of it."""
+    station = alpha.model_copy(update={"materiality": Materiality(head_share=head_share)})
+    diagnosis = diagnose(record(alpha, [{"name": "head_sensor_offset", "offset_m": 0.8}]), station)
     assert diagnosis.verdict == verdict
     assert sum(one.probability for one in diagnosis.posterior) == pytest.approx(1.0)
-    assert diagnosis.component_probability.get("rising_main", 0.0) > 0.5 or verdict == "none"
+    assert (diagnosis.component_probability.get("head_sensor", 0.0) > 0.5) == (verdict == "effect")
 
 
 def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):
