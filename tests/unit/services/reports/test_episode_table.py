@@ -1,7 +1,7 @@
 """Episodes as a page: well-formed, one bar an episode, in the span that was judged."""
 
 import re
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -19,7 +19,7 @@ def episode(asset, since, to, stage="act"):
 
 
 def body(text):
-    return ElementTree.fromstring(text.removeprefix("<!DOCTYPE html>\n"))  # noqa: S314 - our own page
+    return ET.fromstring(text.removeprefix("<!DOCTYPE html>\n"))  # noqa: S314 - our own page
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
