@@ -1,4 +1,4 @@
-"""Acts of maintenance at a detector on a bus: entered, kept over a restart, judged by what a pump shows afterwards."""
+"""Acts of maintenance at a detector on a bus: entered, kept over a restart, judged by the runs that follow."""
 
 import asyncio
 
