@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import Severity
 from wetwell.services.reports.episode_table import episode_page, episode_rows
 
