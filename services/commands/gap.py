@@ -30,7 +30,10 @@ def gap_trial(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")],
     seed: SeedOption = 1,
     cases: Annotated[int, typer.Option(min=1, help="Number of sealed cases.")] = 50,
-    plant: Annotated[Literal["fine", "swmm", "both"], typer.Option(help="What stands for reality.")] = "fine",
+    plant: Annotated[
+        Literal["fine", "swmm", "elastic", "both", "all"],
+        typer.Option(help="What stands for reality; both: fine and swmm."),
+    ] = "fine",
     kinds: Annotated[
         str, typer.Option(help="Of single, pair, none, open, leave_one_out; with commas.")
     ] = "single,pair,none,open,leave_one_out",
@@ -69,6 +72,7 @@ def gap_trial(
     from wetwell.services.trial.result import brief
     from wetwell.services.trial.run import run_trial
     from wetwell.sim2real.trial.cases import StoragePlan
+    from wetwell.sim2real.trial.families import PLANTS
 
     check_scheduler(scheduler)
     rates_s = parse_rates(every)
@@ -78,7 +82,7 @@ def gap_trial(
         seed=seed,
         count=cases,
         kinds=parse_kinds(kinds),
-        plants=("fine", "swmm") if plant == "both" else (plant,),
+        plants=PLANTS if plant == "all" else ("fine", "swmm") if plant == "both" else (plant,),
         seconds=round(positive(days, "--days") * 86_400.0),
         storage=StoragePlan(
             rates_s=rates_s,

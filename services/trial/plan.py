@@ -15,11 +15,11 @@ from wetwell.sim2real.trial.cases import (
     DEFAULT_STORAGE,
     KINDS,
     CaseKind,
-    PlantName,
     StoragePlan,
     TrialCase,
     trial_case,
 )
+from wetwell.sim2real.trial.families import PlantName
 
 TRIAL_SCHEMA = "wetwell.trial/3"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")

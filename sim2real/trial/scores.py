@@ -10,7 +10,8 @@ import numpy as np
 from wetwell.protocols.arrays import Integers
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.sim2real.trial.answer import Answer, ToldEffect
-from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind, PlantName
+from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind
+from wetwell.sim2real.trial.families import PlantName
 
 FAILED = "failed"
 NOT_TESTED = "not tested"
