@@ -159,6 +159,11 @@ def configurations() -> dict[str, Configuration]:
     both = faults(
         paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=148_000, after="clear"), clogging(0.25)
     )
+    cleared = faults(
+        paper,
+        Blockage(pump=1, speed_loss=0.1, start_s=104_400, end_s=126_400, after="clear"),
+        PipeClogging(friction_rise=0.8, start_s=104_400, end_s=148_000, after="clear"),
+    )
     later = faults(paper, blockage(90_000, 0.4), *paper.fault[1:])
     slow = altered(alpha, sump=alpha.sump.model_dump(exclude_none=True) | {"area_m2": LONG_RUNS_AREA_M2})
     week = faults(
@@ -180,6 +185,7 @@ def configurations() -> dict[str, Configuration]:
         "noise AR(1) 0.95": Configuration(correlated, paper),
         "flow meters ±1 % over the day": Configuration(alpha, later, BiasedRecording, DAY_S),
         "both at once, 10 % of speed and friction +25 %": Configuration(alpha, both),
+        "a pump that is cleared while the main clogs": Configuration(alpha, cleared),
         "nominal": Configuration(alpha, nominal),
         "nominal, noise AR(1) 0.95, flow meters ±1 % over the day": Configuration(
             correlated, nominal, BiasedRecording, DAY_S
