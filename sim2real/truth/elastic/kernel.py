@@ -16,17 +16,17 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.sim2real.truth.elastic.machine import flow_against, given_frequency, head_terms, input_w, turned
-from wetwell.sim2real.truth.elastic.pipe import STEP_S, advance, carried, reach_loss
-from wetwell.sim2real.truth.elastic.spec import FILLET, STRAIGHT, ElasticSpec
+from wetwell.sim2real.truth.elastic.pipe import GRID_S, advance, carried, reach_loss
+from wetwell.sim2real.truth.elastic.spec import FILLET, PRISMATIC, ElasticSpec
 
-STEPS = round(1.0 / STEP_S)
+GRID_STEPS = round(1.0 / GRID_S)
 DAY_S = 86_400.0
 LEVEL, READING = range(2)
 COMMAND, FLOW, HEAD, POWER, METER = range(5)
 _SPEED, _FREQUENCY, _RATIO, _RAGS, _OPEN, _BACK_S, _FIRST_FILTER, _ON, _TOLD_FLOW = range(5, 14)
-_PUMP_ROWS = 14
+_MACHINE_ROWS = 14
 _SEEN_FIRST, _SEEN, _AIR, _REGISTER, _RUNNING, _TURN = range(6)
-_NEWTON = 30
+_HEADER_TRIES = 30
 _OLDEST_S = 120
 
 
@@ -48,7 +48,7 @@ class Weather(NamedTuple):
 @inlined
 def area_m2(spec: ElasticSpec, level_m: float) -> float:
     """Cross-section of the wet well at a level: straight, over a rounded floor, over a wedge. [m²]."""
-    if spec.floor == STRAIGHT or level_m >= spec.floor_height_m:
+    if spec.floor == PRISMATIC or level_m >= spec.floor_height_m:
         return spec.area_m2
     height = max(level_m, 0.0) / spec.floor_height_m
     share = math.sqrt(1.0 - (1.0 - height) ** 2) if spec.floor == FILLET else height
@@ -69,7 +69,7 @@ def integrate(spec: ElasticSpec, level_m: float, weather: Weather, station: Floa
     """
     count, nodes = spec.main_of.size, (spec.reaches.size, int(spec.reaches.max()) + 1)
     state = State(
-        pump=np.zeros((_PUMP_ROWS, count)),
+        pump=np.zeros((_MACHINE_ROWS, count)),
         terms=np.zeros((3, count)),
         order=np.zeros(count, dtype=np.int64),
         well=np.array([level_m, level_m, spec.air_limit_m, level_m, 0.0, 0.0]),
@@ -113,8 +113,8 @@ def _integrate(
         for row in range(METER + 1):
             for i in range(pump.shape[1]):
                 pumps[row, i, second] = pump[row, i]
-        for part in range(STEPS):
-            now_s = step * STEP_S
+        for part in range(GRID_STEPS):
+            now_s = step * GRID_S
             if (step - spec.scan_first) % spec.scan_steps == 0:
                 if now_s - polled_s >= spec.poll_s:
                     polled_s = now_s
@@ -125,7 +125,7 @@ def _integrate(
             lift_m = spec.lift_m - spec.lift_slope * (level_m - spec.lift_reference_m) + weather.lift_m[second]
             lift_m = max(lift_m + well[_AIR], 0.0)
             out = _pump(spec, state, lift_m, weather.loss[second], level_m)
-            share = (part + 0.5) * STEP_S
+            share = (part + 0.5) * GRID_S
             arriving = (1.0 - share) * weather.inflow[second] + share * weather.inflow[second + 1]
             arriving += spec.seepage * (1.0 + spec.seepage_swing * math.sin(2.0 * math.pi * now_s / DAY_S))
             level_m = _filled(spec, level_m, arriving - out)
@@ -155,14 +155,14 @@ def _drive(spec: ElasticSpec, pump: Floats, speed_factor: Floats, second: int, n
     """Ramps of the drives, and the shafts that follow them."""
     swing = 1.0 + spec.hunting * math.sin(2.0 * math.pi * now_s / spec.hunting_s)
     for i in range(pump.shape[1]):
-        told = pump[COMMAND, i] + (STEP_S if pump[_ON, i] > 0.0 else -STEP_S) / spec.ramp_s
+        told = pump[COMMAND, i] + (GRID_S if pump[_ON, i] > 0.0 else -GRID_S) / spec.ramp_s
         told = 0.0 if told < 1e-9 else min(told, 1.0)
         pump[COMMAND, i] = told
         pump[_FREQUENCY, i] = given_frequency(spec, told) * swing
         pump[_SPEED, i] = turned(spec, pump[_FREQUENCY, i], pump[_SPEED, i], pump[FLOW, i], spec.rated_flow[i])
         pump[_RATIO, i] = pump[_SPEED, i] / spec.compensation * speed_factor[i, second]
         if told > 0.0:
-            pump[_RAGS, i] = min(pump[_RAGS, i] + STEP_S / spec.rag_s[i], 1.0)
+            pump[_RAGS, i] = min(pump[_RAGS, i] + GRID_S / spec.rag_s[i], 1.0)
         else:
             pump[_RAGS, i] = 0.0
 
@@ -170,7 +170,7 @@ def _drive(spec: ElasticSpec, pump: Floats, speed_factor: Floats, second: int, n
 @inlined
 def _pump(spec: ElasticSpec, state: State, lift_m: float, loss_factor: float, level_m: float) -> float:
     """Move the water by a step; what leaves the wet well, less what comes back. [m³/s]."""
-    inertia, out = spec.branch_inertance / STEP_S, 0.0
+    inertia, out = spec.branch_inertance / GRID_S, 0.0
     branch_loss = spec.branch_loss * loss_factor
     pump, terms, head, flow = state.pump, state.terms, state.head_m, state.flow
     for i in range(pump.shape[1]):
@@ -215,7 +215,7 @@ def _header_m(
 ) -> float:
     """Head of a main at its inlet, where flows in and out are equal: Newton's method in a bracket. [m]."""
     low_m, high_m, now_m = -1e4, 1e4, before_m
-    for _ in range(_NEWTON):
+    for _ in range(_HEADER_TRIES):
         total = carried(now_m - back_m, spec.impedance[m], loss)
         excess, slope = -total, -1.0 / (spec.impedance[m] + 2.0 * loss * abs(total))
         for i in range(pump.shape[1]):
@@ -261,7 +261,7 @@ def _move_valve(spec: ElasticSpec, pump: Floats, terms: Floats, i: int, top_m: f
             pump[_OPEN, i] = 1.0
         pump[_BACK_S, i] = 0.0
         return
-    pump[_BACK_S, i] = pump[_BACK_S, i] + STEP_S if pump[FLOW, i] <= 0.0 else 0.0
+    pump[_BACK_S, i] = pump[_BACK_S, i] + GRID_S if pump[FLOW, i] <= 0.0 else 0.0
     if pump[_BACK_S, i] > spec.valve_s:
         pump[_OPEN, i] = 0.0
         pump[FLOW, i] = 0.0
@@ -271,17 +271,17 @@ def _move_valve(spec: ElasticSpec, pump: Floats, terms: Floats, i: int, top_m: f
 def _filled(spec: ElasticSpec, level_m: float, net: float) -> float:
     """Level after a step by Heun's method; the wet well spills at its crest and is not emptied below 0. [m]."""
     first = net / area_m2(spec, level_m)
-    second = net / area_m2(spec, level_m + first * STEP_S)
-    return min(max(level_m + 0.5 * (first + second) * STEP_S, 0.0), spec.crest_m)
+    second = net / area_m2(spec, level_m + first * GRID_S)
+    return min(max(level_m + 0.5 * (first + second) * GRID_S, 0.0), spec.crest_m)
 
 
 @inlined
 def _sense(spec: ElasticSpec, pump: Floats, well: Floats, level_m: float, out: float) -> None:
     """Filters of level and flow meters; air in the main."""
-    kept = math.exp(-2.0 * STEP_S / spec.level_filter_s) if spec.level_filter_s > 0.0 else 0.0
+    kept = math.exp(-2.0 * GRID_S / spec.level_filter_s) if spec.level_filter_s > 0.0 else 0.0
     well[_SEEN_FIRST] = level_m + kept * (well[_SEEN_FIRST] - level_m)
     well[_SEEN] = well[_SEEN_FIRST] + kept * (well[_SEEN] - well[_SEEN_FIRST])
-    kept = math.exp(-2.0 * STEP_S / spec.flow_filter_s) if spec.flow_filter_s > 0.0 else 0.0
+    kept = math.exp(-2.0 * GRID_S / spec.flow_filter_s) if spec.flow_filter_s > 0.0 else 0.0
     for i in range(pump.shape[1]):
         seen = max(pump[FLOW, i], 0.0)
         if seen < spec.flow_cutoff:
@@ -290,6 +290,6 @@ def _sense(spec: ElasticSpec, pump: Floats, well: Floats, level_m: float, out: f
         pump[METER, i] = pump[_FIRST_FILTER, i] + kept * (pump[METER, i] - pump[_FIRST_FILTER, i])
     if spec.air_limit_m > 0.0:
         if out > 0.0:
-            well[_AIR] *= 1.0 - out * STEP_S / spec.air_clearing_m3
+            well[_AIR] *= 1.0 - out * GRID_S / spec.air_clearing_m3
         else:
-            well[_AIR] = min(well[_AIR] + spec.air_limit_m * STEP_S / spec.air_growth_s, spec.air_limit_m)
+            well[_AIR] = min(well[_AIR] + spec.air_limit_m * GRID_S / spec.air_growth_s, spec.air_limit_m)

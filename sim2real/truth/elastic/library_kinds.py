@@ -202,7 +202,7 @@ def _deadband(d: Sizes) -> Parameters:
     }
 
 
-LIBRARY_KINDS: dict[str, ElasticKind] = {
+LIBRARY_FORMS: dict[str, ElasticKind] = {
     "friction_bias": ElasticKind(
         "rising_main",
         ("flow_m3h", "head_m", "level_m"),

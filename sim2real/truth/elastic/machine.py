@@ -16,10 +16,10 @@ References
 import math
 
 from wetwell.protocols.jit import inlined
-from wetwell.sim2real.truth.elastic.pipe import STEP_S
+from wetwell.sim2real.truth.elastic.pipe import GRID_S
 from wetwell.sim2real.truth.elastic.spec import EARLY, SMOOTH, ElasticSpec
 
-_NEWTON = 12
+_SPEED_TRIES = 12
 EARLY_SHARE = 0.4
 """Share of the time of an early ramp in which it does its first part."""
 
@@ -49,7 +49,7 @@ def turned(spec: ElasticSpec, frequency: float, before: float, flow: float, rate
     if frequency <= 0.0:
         return 0.0
     speed = min(before, frequency)
-    for _ in range(_NEWTON):
+    for _ in range(_SPEED_TRIES):
         slip = frequency - speed
         ratio = slip / spec.breakdown_slip
         pull = 2.0 * spec.breakdown * ratio / (1.0 + ratio * ratio)
@@ -58,8 +58,8 @@ def turned(spec: ElasticSpec, frequency: float, before: float, flow: float, rate
         rising = (2.0 * spec.shutoff_share * speed + (1.0 - spec.shutoff_share) * max(flow, 0.0) / rated_flow) / (
             spec.compensation
         )
-        left = spec.inertia_s * (speed - before) / STEP_S - pull + torque
-        slope = spec.inertia_s / STEP_S + max(stiffness, 0.0) + rising
+        left = spec.inertia_s * (speed - before) / GRID_S - pull + torque
+        slope = spec.inertia_s / GRID_S + max(stiffness, 0.0) + rising
         change = left / slope
         speed = min(max(speed - change, 0.0), frequency)
         if abs(change) < 1e-10:

@@ -94,7 +94,7 @@ def _beating_drive(truth: ElasticTruth, p: Given) -> None:
     truth.change(hunting=p["beat"], hunting_s=p["beat_s"])
 
 
-OPEN_KINDS: dict[str, ElasticKind] = {
+OPEN_FORMS: dict[str, ElasticKind] = {
     "outlet_tide": ElasticKind(
         "rising_main",
         ("flow_m3h", "head_m"),

@@ -7,13 +7,13 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.truth.elastic.pipe import GRAVITY, STEP_S, Pipe, pipe_of
+from wetwell.sim2real.truth.elastic.pipe import GRAVITY, GRID_S, Pipe, pipe_of
 
 HOUR_S = 3600.0
 WEIGHT_N_M3 = 9810.0
 STANDING_SHARE = 0.02
 """Loss without load of a station file's load model, as a share of the rated shaft power. [1]"""
-STRAIGHT, FILLET, WEDGE = 0.0, 1.0, 2.0
+PRISMATIC, FILLET, WEDGE = 0.0, 1.0, 2.0
 EARLY, SMOOTH = 1.0, 2.0
 """Forms of a ramp: fast at first, then slow; a smooth step."""
 
@@ -148,7 +148,7 @@ class ElasticSpec(NamedTuple):
     air_limit_m: float = 0.0
     air_growth_s: float = 1.0
     air_clearing_m3: float = 1.0
-    floor: float = STRAIGHT
+    floor: float = PRISMATIC
     floor_share: float = 1.0
     floor_height_m: float = 1.0
     seepage: float = 0.0
@@ -232,8 +232,8 @@ def spec_of(station: Station, machinery: Machinery) -> ElasticSpec:
         ramp_s=control.ramp_s,
         start_m=np.array(control.start_levels_m),
         stop_m=np.array(control.stop_levels_m),
-        scan_steps=max(round(machinery.scan_s / STEP_S), 1),
-        scan_first=round(machinery.scan_offset_s / STEP_S),
+        scan_steps=max(round(machinery.scan_s / GRID_S), 1),
+        scan_first=round(machinery.scan_offset_s / GRID_S),
         flow_filter_s=machinery.meter_s,
     )
 

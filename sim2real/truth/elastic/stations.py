@@ -19,7 +19,7 @@ ROWS_PER_FILLING = 6.0
 """Rows at the least in the time in which a pump empties the well, where they are far apart. [1]"""
 UNEQUAL_SHARE = 0.4
 """Share of the stations whose pumps differ. [1]"""
-HIGH_WATER_M = 0.9
+FULL_M = 0.9
 """So far over the last start level the wet well may fill. [m]"""
 RELIEF, TRIES = 0.85, 10
 
@@ -155,7 +155,7 @@ def case_of(
         slow_share=slow_share,
         slow_s=digits(rng.uniform(20.0, 90.0)),
     )
-    highest_m = station.control.start_levels_m[-1] + HIGH_WATER_M
+    highest_m = station.control.start_levels_m[-1] + FULL_M
     for _ in range(TRIES):
         if passage_of(case).station_record[LEVEL].max() < highest_m:
             break

@@ -18,7 +18,7 @@ from wetwell.sim2real.truth.elastic import kernel, machine, plant
 from wetwell.sim2real.truth.elastic.deviations import DEVIATIONS, LIBRARY, OPEN
 from wetwell.sim2real.truth.elastic.instruments import Instrument, arrived, sensor_noise
 from wetwell.sim2real.truth.elastic.machine import load_torque, turned
-from wetwell.sim2real.truth.elastic.pipe import STEP_S, advance, friction_factor
+from wetwell.sim2real.truth.elastic.pipe import GRID_S, advance, friction_factor
 from wetwell.sim2real.truth.elastic.plant import machinery_of, passage_of, run_elastic
 from wetwell.sim2real.truth.elastic.spec import Machinery, duty, spec_of
 from wetwell.sim2real.truth.elastic.stations import case_of
@@ -111,7 +111,7 @@ def test_a_long_main_speeds_up_as_a_rigid_column_does(quiet_alpha):
     station = quiet_alpha.model_copy(update={"control": quiet_alpha.control.model_copy(update={"ramp_s": 60.0})})
     passage = passage_of(TruthCase(station=station, deviations=(deviation,), inflow=STEADY, seconds=HOURS_3))
     spec = passage.truth.spec
-    assert spec.impedance[0] * spec.reaches[0] * STEP_S == pytest.approx(column, rel=0.01)
+    assert spec.impedance[0] * spec.reaches[0] * GRID_S == pytest.approx(column, rel=0.01)
     command, flow = passage.pump_record[kernel.COMMAND, 0], passage.pump_record[kernel.FLOW, 0]
     begin = int(np.flatnonzero((command > 0.0) & (flow > 0.2 * spec.rated_flow[0]))[0])
     end = begin + 60
