@@ -83,9 +83,9 @@ FAMILIES: dict[PlantName, Family] = {
         inherent=("water_inertia",),
     ),
     "elastic": Family(
-        library=elastic_deviations.LIBRARY,
-        open=elastic_deviations.OPEN,
-        kinds=elastic_deviations.DEVIATIONS,
+        library=elastic_deviations.ELASTIC_LIBRARY,
+        open=elastic_deviations.ELASTIC_OPEN,
+        kinds=elastic_deviations.ELASTIC_DEVIATIONS,
         case_of=elastic_stations.case_of,
         inherent=("water_inertia",),
     ),

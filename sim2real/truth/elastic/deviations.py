@@ -4,5 +4,5 @@ from wetwell.sim2real.truth.elastic.kind import ElasticKind
 from wetwell.sim2real.truth.elastic.library_kinds import LIBRARY_FORMS
 from wetwell.sim2real.truth.elastic.open_kinds import OPEN_FORMS
 
-DEVIATIONS: dict[str, ElasticKind] = LIBRARY_FORMS | OPEN_FORMS
-LIBRARY, OPEN = tuple(LIBRARY_FORMS), tuple(OPEN_FORMS)
+ELASTIC_DEVIATIONS: dict[str, ElasticKind] = LIBRARY_FORMS | OPEN_FORMS
+ELASTIC_LIBRARY, ELASTIC_OPEN = tuple(LIBRARY_FORMS), tuple(OPEN_FORMS)

@@ -16,10 +16,10 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.sim2real.truth.elastic.machine import flow_against, given_frequency, head_terms, input_w, turned
-from wetwell.sim2real.truth.elastic.pipe import GRID_S, advance, carried, reach_loss
+from wetwell.sim2real.truth.elastic.pipe import TICK_S, advance, carried, reach_loss
 from wetwell.sim2real.truth.elastic.spec import FILLET, PRISMATIC, ElasticSpec
 
-GRID_STEPS = round(1.0 / GRID_S)
+TICKS = round(1.0 / TICK_S)
 DAY_S = 86_400.0
 LEVEL, READING = range(2)
 COMMAND, FLOW, HEAD, POWER, METER = range(5)
@@ -113,8 +113,8 @@ def _integrate(
         for row in range(METER + 1):
             for i in range(pump.shape[1]):
                 pumps[row, i, second] = pump[row, i]
-        for part in range(GRID_STEPS):
-            now_s = step * GRID_S
+        for part in range(TICKS):
+            now_s = step * TICK_S
             if (step - spec.scan_first) % spec.scan_steps == 0:
                 if now_s - polled_s >= spec.poll_s:
                     polled_s = now_s
@@ -125,7 +125,7 @@ def _integrate(
             lift_m = spec.lift_m - spec.lift_slope * (level_m - spec.lift_reference_m) + weather.lift_m[second]
             lift_m = max(lift_m + well[_AIR], 0.0)
             out = _pump(spec, state, lift_m, weather.loss[second], level_m)
-            share = (part + 0.5) * GRID_S
+            share = (part + 0.5) * TICK_S
             arriving = (1.0 - share) * weather.inflow[second] + share * weather.inflow[second + 1]
             arriving += spec.seepage * (1.0 + spec.seepage_swing * math.sin(2.0 * math.pi * now_s / DAY_S))
             level_m = _filled(spec, level_m, arriving - out)
@@ -155,14 +155,14 @@ def _drive(spec: ElasticSpec, pump: Floats, speed_factor: Floats, second: int, n
     """Ramps of the drives, and the shafts that follow them."""
     swing = 1.0 + spec.hunting * math.sin(2.0 * math.pi * now_s / spec.hunting_s)
     for i in range(pump.shape[1]):
-        told = pump[COMMAND, i] + (GRID_S if pump[_ON, i] > 0.0 else -GRID_S) / spec.ramp_s
+        told = pump[COMMAND, i] + (TICK_S if pump[_ON, i] > 0.0 else -TICK_S) / spec.ramp_s
         told = 0.0 if told < 1e-9 else min(told, 1.0)
         pump[COMMAND, i] = told
         pump[_FREQUENCY, i] = given_frequency(spec, told) * swing
         pump[_SPEED, i] = turned(spec, pump[_FREQUENCY, i], pump[_SPEED, i], pump[FLOW, i], spec.rated_flow[i])
         pump[_RATIO, i] = pump[_SPEED, i] / spec.compensation * speed_factor[i, second]
         if told > 0.0:
-            pump[_RAGS, i] = min(pump[_RAGS, i] + GRID_S / spec.rag_s[i], 1.0)
+            pump[_RAGS, i] = min(pump[_RAGS, i] + TICK_S / spec.rag_s[i], 1.0)
         else:
             pump[_RAGS, i] = 0.0
 
@@ -170,7 +170,7 @@ def _drive(spec: ElasticSpec, pump: Floats, speed_factor: Floats, second: int, n
 @inlined
 def _pump(spec: ElasticSpec, state: State, lift_m: float, loss_factor: float, level_m: float) -> float:
     """Move the water by a step; what leaves the wet well, less what comes back. [m³/s]."""
-    inertia, out = spec.branch_inertance / GRID_S, 0.0
+    inertia, out = spec.branch_inertance / TICK_S, 0.0
     branch_loss = spec.branch_loss * loss_factor
     pump, terms, head, flow = state.pump, state.terms, state.head_m, state.flow
     for i in range(pump.shape[1]):
@@ -261,7 +261,7 @@ def _move_valve(spec: ElasticSpec, pump: Floats, terms: Floats, i: int, top_m: f
             pump[_OPEN, i] = 1.0
         pump[_BACK_S, i] = 0.0
         return
-    pump[_BACK_S, i] = pump[_BACK_S, i] + GRID_S if pump[FLOW, i] <= 0.0 else 0.0
+    pump[_BACK_S, i] = pump[_BACK_S, i] + TICK_S if pump[FLOW, i] <= 0.0 else 0.0
     if pump[_BACK_S, i] > spec.valve_s:
         pump[_OPEN, i] = 0.0
         pump[FLOW, i] = 0.0
@@ -271,17 +271,17 @@ def _move_valve(spec: ElasticSpec, pump: Floats, terms: Floats, i: int, top_m: f
 def _filled(spec: ElasticSpec, level_m: float, net: float) -> float:
     """Level after a step by Heun's method; the wet well spills at its crest and is not emptied below 0. [m]."""
     first = net / area_m2(spec, level_m)
-    second = net / area_m2(spec, level_m + first * GRID_S)
-    return min(max(level_m + 0.5 * (first + second) * GRID_S, 0.0), spec.crest_m)
+    second = net / area_m2(spec, level_m + first * TICK_S)
+    return min(max(level_m + 0.5 * (first + second) * TICK_S, 0.0), spec.crest_m)
 
 
 @inlined
 def _sense(spec: ElasticSpec, pump: Floats, well: Floats, level_m: float, out: float) -> None:
     """Filters of level and flow meters; air in the main."""
-    kept = math.exp(-2.0 * GRID_S / spec.level_filter_s) if spec.level_filter_s > 0.0 else 0.0
+    kept = math.exp(-2.0 * TICK_S / spec.level_filter_s) if spec.level_filter_s > 0.0 else 0.0
     well[_SEEN_FIRST] = level_m + kept * (well[_SEEN_FIRST] - level_m)
     well[_SEEN] = well[_SEEN_FIRST] + kept * (well[_SEEN] - well[_SEEN_FIRST])
-    kept = math.exp(-2.0 * GRID_S / spec.flow_filter_s) if spec.flow_filter_s > 0.0 else 0.0
+    kept = math.exp(-2.0 * TICK_S / spec.flow_filter_s) if spec.flow_filter_s > 0.0 else 0.0
     for i in range(pump.shape[1]):
         seen = max(pump[FLOW, i], 0.0)
         if seen < spec.flow_cutoff:
@@ -290,6 +290,6 @@ def _sense(spec: ElasticSpec, pump: Floats, well: Floats, level_m: float, out: f
         pump[METER, i] = pump[_FIRST_FILTER, i] + kept * (pump[METER, i] - pump[_FIRST_FILTER, i])
     if spec.air_limit_m > 0.0:
         if out > 0.0:
-            well[_AIR] *= 1.0 - out * GRID_S / spec.air_clearing_m3
+            well[_AIR] *= 1.0 - out * TICK_S / spec.air_clearing_m3
         else:
-            well[_AIR] = min(well[_AIR] + spec.air_limit_m * GRID_S / spec.air_growth_s, spec.air_limit_m)
+            well[_AIR] = min(well[_AIR] + spec.air_limit_m * TICK_S / spec.air_growth_s, spec.air_limit_m)

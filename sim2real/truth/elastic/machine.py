@@ -16,7 +16,7 @@ References
 import math
 
 from wetwell.protocols.jit import inlined
-from wetwell.sim2real.truth.elastic.pipe import GRID_S
+from wetwell.sim2real.truth.elastic.pipe import TICK_S
 from wetwell.sim2real.truth.elastic.spec import EARLY, SMOOTH, ElasticSpec
 
 _SPEED_TRIES = 12
@@ -58,8 +58,8 @@ def turned(spec: ElasticSpec, frequency: float, before: float, flow: float, rate
         rising = (2.0 * spec.shutoff_share * speed + (1.0 - spec.shutoff_share) * max(flow, 0.0) / rated_flow) / (
             spec.compensation
         )
-        left = spec.inertia_s * (speed - before) / GRID_S - pull + torque
-        slope = spec.inertia_s / GRID_S + max(stiffness, 0.0) + rising
+        left = spec.inertia_s * (speed - before) / TICK_S - pull + torque
+        slope = spec.inertia_s / TICK_S + max(stiffness, 0.0) + rising
         change = left / slope
         speed = min(max(speed - change, 0.0), frequency)
         if abs(change) < 1e-10:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled, inlined
 
-GRID_S = 0.05
+TICK_S = 0.05
 GRAVITY = 9.81
 VISCOSITY_M2_S = 1.2e-6
 LAMINAR = 4000.0
@@ -74,10 +74,10 @@ def pipe_of(
             break
         area_m2 *= 1.1
     length_m = column_s2_m2 * GRAVITY * area_m2
-    reaches = min(max(round(length_m / (wave_m_s * GRID_S)), 1), MOST_REACHES)
+    reaches = min(max(round(length_m / (wave_m_s * TICK_S)), 1), MOST_REACHES)
     return Pipe(
         reaches=reaches,
-        impedance=column_s2_m2 / (reaches * GRID_S),
+        impedance=column_s2_m2 / (reaches * TICK_S),
         darcy_share=wall / loss,
         reynolds=reynolds,
         rough=rough,

@@ -12,7 +12,7 @@ from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.elastic import kernel
-from wetwell.sim2real.truth.elastic.deviations import DEVIATIONS
+from wetwell.sim2real.truth.elastic.deviations import ELASTIC_DEVIATIONS
 from wetwell.sim2real.truth.elastic.instruments import Instrument, Instruments, arrived, read, sensor_noise
 from wetwell.sim2real.truth.elastic.kind import ElasticTruth
 from wetwell.sim2real.truth.elastic.spec import HOUR_S, Machinery, spec_of
@@ -124,9 +124,9 @@ def passage_of(case: TruthCase) -> ElasticPassage:
         rng=deviation_rng,
     )
     for deviation in case.deviations:
-        if deviation.name not in DEVIATIONS:
-            raise ValueError(f"deviation '{deviation.name}' is not one of {', '.join(DEVIATIONS)}")
-        DEVIATIONS[deviation.name].act(truth, deviation.parameters)
+        if deviation.name not in ELASTIC_DEVIATIONS:
+            raise ValueError(f"deviation '{deviation.name}' is not one of {', '.join(ELASTIC_DEVIATIONS)}")
+        ELASTIC_DEVIATIONS[deviation.name].act(truth, deviation.parameters)
     station_record, pump_record = np.empty((2, seconds)), np.empty((5, pumps, seconds))
     kernel.integrate(truth.spec, case.initial_level_m, truth.weather, station_record, pump_record)
     return ElasticPassage(

@@ -7,7 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.truth.elastic.pipe import GRAVITY, GRID_S, Pipe, pipe_of
+from wetwell.sim2real.truth.elastic.pipe import GRAVITY, TICK_S, Pipe, pipe_of
 
 HOUR_S = 3600.0
 WEIGHT_N_M3 = 9810.0
@@ -232,8 +232,8 @@ def spec_of(station: Station, machinery: Machinery) -> ElasticSpec:
         ramp_s=control.ramp_s,
         start_m=np.array(control.start_levels_m),
         stop_m=np.array(control.stop_levels_m),
-        scan_steps=max(round(machinery.scan_s / GRID_S), 1),
-        scan_first=round(machinery.scan_offset_s / GRID_S),
+        scan_steps=max(round(machinery.scan_s / TICK_S), 1),
+        scan_first=round(machinery.scan_offset_s / TICK_S),
         flow_filter_s=machinery.meter_s,
     )
 

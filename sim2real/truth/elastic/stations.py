@@ -7,7 +7,7 @@ import numpy as np
 
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.truth.case import Deviation, TrueInflow, TruthCase
-from wetwell.sim2real.truth.elastic.deviations import DEVIATIONS
+from wetwell.sim2real.truth.elastic.deviations import ELASTIC_DEVIATIONS
 from wetwell.sim2real.truth.elastic.kernel import LEVEL
 from wetwell.sim2real.truth.elastic.kind import Sizes, digits
 from wetwell.sim2real.truth.elastic.plant import passage_of
@@ -126,7 +126,7 @@ def case_of(
     Parameters
     ----------
     names : tuple of str
-        Keys of `DEVIATIONS`; empty for a truth that is as its file says.
+        Keys of `ELASTIC_DEVIATIONS`; empty for a truth that is as its file says.
     station_name : str
     rng : numpy.random.Generator
     seconds : int
@@ -139,12 +139,12 @@ def case_of(
     station = station_of(
         station_name,
         rng,
-        needs_two_pumps=any(DEVIATIONS[name].needs_two_pumps for name in names),
+        needs_two_pumps=any(ELASTIC_DEVIATIONS[name].needs_two_pumps for name in names),
         every_s=every_s,
         by_load="load_dependent_power" not in names,
     )
     sizes = Sizes(rng, station)
-    deviations = tuple(Deviation(name=name, parameters=DEVIATIONS[name].draw(sizes)) for name in names)
+    deviations = tuple(Deviation(name=name, parameters=ELASTIC_DEVIATIONS[name].draw(sizes)) for name in names)
     case = TruthCase(
         station=station,
         deviations=deviations,

@@ -15,10 +15,10 @@ from scipy.optimize import brentq
 from wetwell.protocols.station.station_file import Sensors
 from wetwell.sim2real.truth.case import Deviation, TrueInflow, TruthCase
 from wetwell.sim2real.truth.elastic import kernel, machine, plant
-from wetwell.sim2real.truth.elastic.deviations import DEVIATIONS, LIBRARY, OPEN
+from wetwell.sim2real.truth.elastic.deviations import ELASTIC_DEVIATIONS, ELASTIC_LIBRARY, ELASTIC_OPEN
 from wetwell.sim2real.truth.elastic.instruments import Instrument, arrived, sensor_noise
 from wetwell.sim2real.truth.elastic.machine import load_torque, turned
-from wetwell.sim2real.truth.elastic.pipe import GRID_S, advance, friction_factor
+from wetwell.sim2real.truth.elastic.pipe import TICK_S, advance, friction_factor
 from wetwell.sim2real.truth.elastic.plant import machinery_of, passage_of, run_elastic
 from wetwell.sim2real.truth.elastic.spec import Machinery, duty, spec_of
 from wetwell.sim2real.truth.elastic.stations import case_of
@@ -111,7 +111,7 @@ def test_a_long_main_speeds_up_as_a_rigid_column_does(quiet_alpha):
     station = quiet_alpha.model_copy(update={"control": quiet_alpha.control.model_copy(update={"ramp_s": 60.0})})
     passage = passage_of(TruthCase(station=station, deviations=(deviation,), inflow=STEADY, seconds=HOURS_3))
     spec = passage.truth.spec
-    assert spec.impedance[0] * spec.reaches[0] * GRID_S == pytest.approx(column, rel=0.01)
+    assert spec.impedance[0] * spec.reaches[0] * TICK_S == pytest.approx(column, rel=0.01)
     command, flow = passage.pump_record[kernel.COMMAND, 0], passage.pump_record[kernel.FLOW, 0]
     begin = int(np.flatnonzero((command > 0.0) & (flow > 0.2 * spec.rated_flow[0]))[0])
     end = begin + 60
@@ -150,11 +150,11 @@ def test_friction_is_that_of_colebrook_within_what_the_explicit_form_promises(re
 
 
 def test_the_library_is_whole_and_open_deviations_are_others():
-    assert {name: DEVIATIONS[name].component for name in LIBRARY} == {
+    assert {name: ELASTIC_DEVIATIONS[name].component for name in ELASTIC_LIBRARY} == {
         name: effect.component for name, effect in EFFECTS.items()
     }
-    assert len(OPEN) >= 10
-    assert not set(OPEN) & set(EFFECTS)
+    assert len(ELASTIC_OPEN) >= 10
+    assert not set(ELASTIC_OPEN) & set(EFFECTS)
 
 
 def drawn(name, seed):
@@ -172,12 +172,12 @@ def of_station(columns, quantity):
 
 @pytest.mark.check
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("name", DEVIATIONS)
+@pytest.mark.parametrize("name", ELASTIC_DEVIATIONS)
 def test_a_deviation_shows_where_it_must(name, seed):
     with_it, without = drawn(name, seed)
     columns, plain = run_elastic(with_it).columns, run_elastic(without).columns
     channel = with_it.deviations[0].parameters.get("channel")
-    for signal in (channel,) if channel else DEVIATIONS[name].signals:
+    for signal in (channel,) if channel else ELASTIC_DEVIATIONS[name].signals:
         one, other = of_station(columns, signal), of_station(plain, signal)
         assert np.sqrt(np.mean((one - other) ** 2)) > 2e-3 * (other.max() - other.min()), signal
 
