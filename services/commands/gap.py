@@ -37,8 +37,8 @@ def gap_trial(
         typer.Option(help="What stands for reality; both: fine and swmm."),
     ] = "fine",
     kinds: Annotated[
-        str, typer.Option(help="Of single, pair, none, open, leave_one_out; with commas.")
-    ] = "single,pair,none,open,leave_one_out",
+        str, typer.Option(help="Of single, pair, none, open, leave_one_out, triple; with commas.")
+    ] = "single,pair,none,open,leave_one_out,triple",
     days: Annotated[
         float | None,
         typer.Option(help="Length of each recording; default 1, or 14 with rows further apart than a minute."),
@@ -61,6 +61,9 @@ def gap_trial(
     unseen: Annotated[
         bool, typer.Option("--unseen", help="Measure the shrinkage on recordings that no diagnosis has seen.")
     ] = False,
+    looked_at: Annotated[
+        bool, typer.Option("--looked-at", help="Take a seed whose cases were looked at; no headline figure.")
+    ] = False,
     diagnoser: Annotated[
         str | None, typer.Option("--diagnoser", metavar="COMMAND", help="In place of wetwell gap diagnose.")
     ] = None,
@@ -70,6 +73,7 @@ def gap_trial(
     import shlex
 
     from wetwell.services.batch.executors import check_scheduler
+    from wetwell.services.trial.looked_at import check_seed
     from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds, parse_rates, parse_values
     from wetwell.services.trial.result import brief
     from wetwell.services.trial.run import run_trial
@@ -77,6 +81,7 @@ def gap_trial(
     from wetwell.sim2real.trial.families import PLANTS
 
     check_scheduler(scheduler)
+    check_seed(seed, is_looked_at=looked_at)
     rates_s = parse_rates(every)
     if days is None:
         days = 1.0 if max(rates_s) <= 60 else 14.0
@@ -98,6 +103,21 @@ def gap_trial(
     )
     result = run_trial(plan, out, workers, scheduler)
     print_batch(result if as_json else brief(result, out), as_json=as_json)
+
+
+@app.command("families")
+def gap_families(
+    trials: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of trials that are scored.")],
+    learnt_on: Annotated[
+        str, typer.Option("--learnt-on", help="Families that constants were learnt on; with commas.")
+    ] = "",
+    as_json: JsonOption = False,
+) -> None:
+    """Put trials of several families side by side: what each scores that was left out of the learning."""
+    from wetwell.services.trial.families import families_table
+
+    named = [part.strip() for part in learnt_on.split(",") if part.strip()]
+    print_result(families_table(trials, named), as_json=as_json)
 
 
 @app.command("diagnose", cls=about("--recording"))

@@ -16,7 +16,7 @@ from wetwell.sim2real.trial.families import FAMILIES, Family, PlantName
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.storage import storage_of
 
-CaseKind = Literal["single", "pair", "none", "open", "leave_one_out"]
+CaseKind = Literal["single", "pair", "none", "open", "leave_one_out", "triple"]
 KINDS: tuple[CaseKind, ...] = get_args(CaseKind)
 VERDICT_OF: dict[CaseKind, str] = {
     "single": "effect",
@@ -24,7 +24,12 @@ VERDICT_OF: dict[CaseKind, str] = {
     "none": "none",
     "open": "unknown",
     "leave_one_out": "unknown",
+    "triple": "effect",
 }
+KNOWN_KINDS: tuple[CaseKind, ...] = ("single", "pair", "triple")
+"""Kinds whose truth the library holds."""
+_BESIDE: dict[CaseKind, int] = {"pair": 1, "triple": 2}
+"""How many effects stand beside the first."""
 SLOW_SHARE = 0.2
 """Share of the variance of the sensors' noise that is slow, in every other case."""
 
@@ -124,8 +129,7 @@ class TrialCase:
             rng = _stream(self.seed, self.number, self.attempt)
         else:
             rng = _stream(self.seed, self.number)
-            if self.kind == "pair":
-                _other(self.names[0], self.family, rng)  # this stream has drawn the name, too
+            _others(self.names[:1], _BESIDE.get(self.kind, 0), self.family, rng)  # this stream has drawn them, too
         truth = self.family.case_of(
             self.names,
             f"station-{rng.integers(16**6):06x}",
@@ -199,13 +203,16 @@ def _names(seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int) 
     held = family.open if kind == "open" else family.library
     order = _stream(seed, KINDS.index(kind), len(held), 0)
     first = held[int(order.permutation(len(held))[turn % len(held)])]
-    return (first, _other(first, family, _stream(seed, number))) if kind == "pair" else (first,)
+    return _others((first,), _BESIDE.get(kind, 0), family, _stream(seed, number))
 
 
-def _other(first: str, family: Family, rng: np.random.Generator) -> str:
-    """Second name of a pair, which lies in another component."""
-    others = [name for name in family.library if family.kinds[name].component != family.kinds[first].component]
-    return others[int(rng.integers(len(others)))]
+def _others(names: tuple[str, ...], more: int, family: Family, rng: np.random.Generator) -> tuple[str, ...]:
+    """Names and as many more, each in a component of its own."""
+    for _ in range(more):
+        taken = {family.kinds[name].component for name in names}
+        others = [name for name in family.library if family.kinds[name].component not in taken]
+        names = (*names, others[int(rng.integers(len(others)))])
+    return names
 
 
 _STORAGE, _METERS = (0, 1), (0, 2)
