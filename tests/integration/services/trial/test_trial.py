@@ -169,7 +169,7 @@ def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
     replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
     _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
     unseen = result["unseen"]
-    assert unseen["cases"] == 4
+    assert unseen["cases"] == 6
     assert unseen["after"] == 0.0
     assert unseen["before"] > 2.0
     assert 0.5 < unseen["oracle"] < 1.5
