@@ -9,7 +9,6 @@ from itertools import groupby
 import numpy as np
 import pyarrow as pa
 
-from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.messages.verdict import State, Verdict
@@ -164,7 +163,7 @@ def detect(
     """
     plant = station_of(station)
     rows = rows_of(recording, plant, Reading.said(time_zone, as_station=as_station))
-    detector = Detector(plant.name, datasheet_of(plant))
+    detector = Detector.of(plant)
     verdicts = [verdict for block in blocks(rows, len(plant.pump)) for verdict in detector.update_block(block)]
     verdicts += detector.finish()
     return Detection(station=plant, verdicts=tuple(verdicts), counts=dict(detector.counts))

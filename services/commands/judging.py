@@ -70,7 +70,8 @@ def backtest(
         Path | None, typer.Option("--dataset", metavar="DIR", help="Folder that `wetwell dataset` has made.")
     ] = None,
     detectors: Annotated[
-        str, typer.Option(metavar="NAMES", help="With commas between; `all` for every one.")
+        str,
+        typer.Option(metavar="NAMES", help="With commas between; `all` for every one, FILE.py:CLASS for your own."),
     ] = "wetwell,paper_f_test,paper_tangent,paper_f_shift,paper_tangent_segments",
     learning_h: Annotated[
         float, typer.Option("--learning-h", min=0.0, help="Runs that end in these first hours are not scored.")

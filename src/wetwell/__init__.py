@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     __version__: str
     from wetwell.protocols.station.station_file import Station
+    from wetwell.services.api.backtest import backtest
     from wetwell.services.api.calibration import calibrate
     from wetwell.services.api.detection import detect
     from wetwell.services.api.diagnosis import diagnose
     from wetwell.services.api.frame import read
     from wetwell.services.api.simulation import simulate
 
-__all__ = ["Station", "__version__", "calibrate", "detect", "diagnose", "read", "simulate"]
+__all__ = ["Station", "__version__", "backtest", "calibrate", "detect", "diagnose", "read", "simulate"]
 
 _HOMES = {
     "Station": "wetwell.protocols.station.station_file",
+    "backtest": "wetwell.services.api.backtest",
     "calibrate": "wetwell.services.api.calibration",
     "detect": "wetwell.services.api.detection",
     "diagnose": "wetwell.services.api.diagnosis",

@@ -4,16 +4,19 @@ import subprocess
 import sys
 
 import duckdb
+import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
 
 import wetwell
+from wetwell.detector.detector import Detector
+from wetwell.detector.evaluation.methods.run_detector import RunDetector, state_of
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.messages.verdict import Verdict
 
-NAMES = ["Station", "__version__", "calibrate", "detect", "diagnose", "read", "simulate"]
+NAMES = ["Station", "__version__", "backtest", "calibrate", "detect", "diagnose", "read", "simulate"]
 
 
 @pytest.fixture(scope="module")
@@ -144,3 +147,36 @@ def test_diagnose_names_the_effect_that_the_plant_has(tmp_path):
     assert "svg" in told.plot().svg
     told.write(tmp_path / "north.toml")
     assert 'name = "flow_meter_gain"' in (tmp_path / "north.toml").read_text()
+
+
+class ThreeSigma(RunDetector):
+    """A method of one's own: the mean residual of a run against the spread of the runs that were learnt."""
+
+    def learn(self, pump, runs):
+        means = np.array([run.segments.residual_m.mean(axis=0) for run in runs])
+        self.healthy = {**getattr(self, "healthy", {}), pump: (means.mean(axis=0), 3 * means.std(axis=0))}
+
+    def told(self, run):
+        centre, width = self.healthy[run.pump]
+        pump, system = abs(run.segments.residual_m.mean(axis=0) - centre) > width
+        return state_of(pump=pump, system=system)
+
+
+def test_a_method_of_ones_own_stands_beside_ours(day):
+    methods = {"wetwell": Detector, "mine": ThreeSigma}
+    scores = wetwell.backtest([day], "alpha", methods)
+    by_name = {row["method"]: row for row in scores.to_arrow().to_pylist()}
+    assert by_name["wetwell"]["runs"] == by_name["mine"]["runs"] > 20
+    assert by_name["wetwell"]["macro_f1"] >= by_name["mine"]["macro_f1"] > 0.5
+    assert "mine" in scores._repr_html_()
+    assert "mine" in scores.plot().svg
+    named = wetwell.backtest([day], "alpha", ["wetwell"])
+    assert named.figures["wetwell"]["confusion"] == scores.figures["wetwell"]["confusion"]
+
+
+def test_the_truth_must_be_there(day):
+    bare = day.to_pandas().drop(columns=[name for name in day.columns if name.startswith("truth_")])
+    with pytest.raises(RecordingError, match="recording 1: column 'truth_pump1_state' is missing"):
+        wetwell.backtest([bare], "alpha")
+    with pytest.raises(TypeError, match="recordings: got one, must be a list"):
+        wetwell.backtest(day, "alpha")
