@@ -19,6 +19,7 @@ from wetwell.services.commands import (
     listing,
     live,
     recordings,
+    schema,
     token,
 )
 from wetwell.services.commands.options import ADMINISTER, GAP, GROUPS, RUN
@@ -42,7 +43,7 @@ app.add_typer(alarms.app, name="alarms", rich_help_panel=RUN)
 for group in (historian, dashboard, fleet, recordings, judging):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap", rich_help_panel=GAP)
-for group in (doctor, listing):
+for group in (doctor, listing, schema):
     app.add_typer(group.app)
 app.add_typer(token.app, name="token", rich_help_panel=ADMINISTER)
 
