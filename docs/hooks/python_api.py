@@ -59,8 +59,6 @@ def _results() -> Iterator[str]:
 def _entry(name: str, function: Any) -> Iterator[str]:
     known = r"(?:wetwell|collections|pathlib|typing)\.(?:\w+\.)*(\w+)"
     signature = re.sub(known, r"\1", str(inspect.signature(function)))
-        r"(?:wetwell|collections|pathlib|typing)\.(?:\w+\.)*(\w+)", r"\1", str(inspect.signature(function))
-    )
     signature = signature.replace("str | os.PathLike[str] | ArrowTable", "RecordingSource")
     signature = signature.replace("str | os.PathLike[str] | Station", "StationSource")
     yield f"```python\n{name}{signature}\n```\n"

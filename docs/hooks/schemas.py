@@ -1,4 +1,4 @@
-"""Reference pages of files and messages, made from their JSON Schemas: keys with type, unit, default, rule, example."""
+"""Reference pages of files and messages, made from their JSON Schemas: keys with type, unit, rule and example."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The schemas say what the models check: what a model takes the schema takes, and what one refuses so does the other."""
+"""The schemas say what the models check: what one takes or refuses so does the other."""
 
 import json
 import tomllib
