@@ -29,9 +29,7 @@ def run_notebook(path: Path) -> Any:
     """
     notebook = nbformat.read(path, as_version=4)
     with TemporaryDirectory() as folder:
-        client = NotebookClient(notebook, timeout=PATIENCE_S, resources={"metadata": {"path": folder}})
-        client.create_kernel_manager().transport = "ipc"  # no port, which others could take or read
-        client.execute()
+        NotebookClient(notebook, timeout=PATIENCE_S, resources={"metadata": {"path": folder}}).execute()
     return notebook
 
 

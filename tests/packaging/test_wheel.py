@@ -1,4 +1,4 @@
-"""The wheel, built from the source distribution, works in an environment that holds nothing else of this repository."""
+"""The wheel, built from the source distribution, works in an environment with nothing else of this repository."""
 
 import json
 import os
