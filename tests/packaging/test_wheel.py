@@ -18,7 +18,7 @@ BIN = Path(sys.executable).parent
 VERSIONS = ("3.11", "3.12", "3.13", "3.14")
 IMPORT_ALL = """
 import importlib, json, pkgutil, wetwell
-names = [found.name for found in pkgutil.walk_packages(wetwell.__path__, "wetwell.")]
+names = [found.name for found in pkgutil.walk_packages(wetwell.__path__, "wetwell.") if "__main__" not in found.name]
 missing = {}
 for name in names:
     try:
@@ -85,7 +85,10 @@ def test_the_metadata_are_those_of_the_project(wheel):
 @pytest.mark.parametrize("version", VERSIONS)
 def test_it_installs_and_runs_in_an_empty_environment(version, wheel, tmp_path):
     uv = BIN / "uv"
-    found = subprocess.run([uv, "python", "find", "--no-python-downloads", version], capture_output=True, check=False)
+    others = [str(folder) for folder in sorted(Path.home().glob(".pyenv/versions/*/bin"))]
+    path = {"PATH": os.pathsep.join([*others, os.environ["PATH"]])}
+    find = [uv, "python", "find", "--no-project", "--no-python-downloads", version]
+    found = subprocess.run(find, env=os.environ | path, capture_output=True, check=False)
     if found.returncode != 0:
         pytest.skip(f"no Python {version} on this machine")
     environment = tmp_path / "environment"
