@@ -19,7 +19,6 @@ from wetwell.services.commands import (
     listing,
     live,
     recordings,
-    schema,
     token,
 )
 from wetwell.services.commands.options import ADMINISTER, GAP, GROUPS, RUN
@@ -43,7 +42,7 @@ app.add_typer(alarms.app, name="alarms", rich_help_panel=RUN)
 for group in (historian, dashboard, fleet, recordings, judging):
     app.add_typer(group.app)
 app.add_typer(gap.app, name="gap", rich_help_panel=GAP)
-for group in (doctor, listing, schema):
+for group in (doctor, listing):
     app.add_typer(group.app)
 app.add_typer(token.app, name="token", rich_help_panel=ADMINISTER)
 

@@ -3,6 +3,7 @@
 import inspect
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from importlib import import_module
 from typing import Any
 
@@ -11,7 +12,6 @@ import wetwell
 RESULTS = (
     "frame.Frame",
     "detection.Detection",
-    "detection.Episode",
     "calibration.Calibration",
     "diagnosis.Diagnosis",
     "backtest.Backtest",
@@ -47,11 +47,11 @@ def _results() -> Iterator[str]:
         yield f"### `{name}`\n"
         yield _markdown(inspect.getdoc(thing) or "")
         for key, member in inspect.getmembers(thing):
-            is_own = inspect.isfunction(member) or isinstance(member, property)
+            is_own = inspect.isfunction(member) or isinstance(member, property | cached_property)
             if key.startswith("_") or not is_own:
                 continue
             words = (inspect.getdoc(member) or "").partition("\n\n")[0].replace("\n", " ")
-            call = "" if isinstance(member, property) else "()"
+            call = "" if isinstance(member, property | cached_property) else "()"
             yield f"- `.{key}{call}`: {words}"
         yield ""
 

@@ -1,49 +1,25 @@
 """A recording judged in Python."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from html import escape
-from itertools import groupby
 
-import numpy as np
 import pyarrow as pa
 
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks
-from wetwell.protocols.messages.verdict import State, Verdict
+from wetwell.detector.verdict.episodes import episodes_of
+from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.api.result import Picture, Result, html_table
+from wetwell.services.api.result import Picture, Result
 from wetwell.services.api.sources import RecordingSource, StationSource, rows_of, station_of
-from wetwell.services.reports.charts import Series, Span, line_chart
+from wetwell.services.reports.charts import table
+from wetwell.services.reports.episode_table import episode_chart, episode_rows
 
-QUIET: frozenset[State] = frozenset({"learning", "normal"})
-"""States that are no episode."""
 TIME = pa.timestamp("ns", tz="UTC")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Episode:
-    """Verdicts in a row that say the same of a pump, and that it is not well.
-
-    Attributes
-    ----------
-    pump : int
-        From 1.
-    state : str
-        What they say, such as `pump_fault`.
-    start_ns, end_ns : int
-        Onset, where it is told, or the time of the first of them; time of the last. [ns since 1970]
-    verdicts : int
-        How many there are.
-    """
-
-    pump: int
-    state: State
-    start_ns: int
-    end_ns: int
-    verdicts: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,33 +39,21 @@ class Detection(Result):
     verdicts: tuple[Verdict, ...] = field(repr=False)
     counts: dict[str, int]
 
-    @property
+    @cached_property
     def episodes(self) -> tuple[Episode, ...]:
-        """What was wrong, by pump and time; normal and learning are left out."""
-        return tuple(episode for pump in range(1, len(self.station.pump) + 1) for episode in self._episodes(pump))
-
-    def _episodes(self, pump: int) -> list[Episode]:
-        told = [verdict for verdict in self.verdicts if verdict.pump == pump]
-        return [
-            Episode(
-                pump=pump,
-                state=state,
-                start_ns=first.time if first.onset is None else first.onset,
-                end_ns=run[-1].time,
-                verdicts=len(run),
-            )
-            for state, group in groupby(told, key=lambda verdict: verdict.state)
-            if state not in QUIET and (run := list(group)) and (first := run[0])
-        ]
+        """What was wrong: one fault of one asset from its beginning to its end, the first to begin first."""
+        return tuple(episodes_of(self.verdicts))
 
     def to_arrow(self) -> pa.Table:
-        """A row a verdict: time, pump, state, its probability, onset, window, and the evidence as JSON."""
+        """A row a verdict: time, pump, state, probability, asset, stage, onset, window, and the evidence as JSON."""
         rows = [
             {
                 "time": verdict.time,
                 "pump": verdict.pump,
                 "state": verdict.state,
                 "probability": verdict.probability.get(verdict.state),
+                "asset": verdict.asset,
+                "stage": verdict.stage,
                 "onset": verdict.onset,
                 "begin": verdict.window[0],
                 "end": verdict.window[1],
@@ -102,6 +66,8 @@ class Detection(Result):
             "pump": pa.int16(),
             "state": pa.string(),
             "probability": pa.float64(),
+            "asset": pa.string(),
+            "stage": pa.string(),
             "onset": TIME,
             "begin": TIME,
             "end": TIME,
@@ -110,37 +76,16 @@ class Detection(Result):
         return pa.Table.from_pylist(rows, schema=pa.schema(list(types.items())))
 
     def plot(self) -> Picture:
-        """How far the operating point of each pump has left the learnt pump curve, and the episodes. [m]."""
-        labels = self.station.pump_labels
-        series = [self._shifts(pump) for pump in range(1, len(labels) + 1)]
-        spans = [
-            Span(f"{labels[one.pump - 1]}: {one.state.replace('_', ' ')}", one.start_ns, one.end_ns)
-            for one in self.episodes
-        ]
-        title = f"Station {self.station.label}: shift of the pump curve"
-        return Picture(line_chart(title, series, y_label="shift [m]", is_time=True, spans=spans))
-
-    def _shifts(self, pump: int) -> Series:
-        told = [one for one in self.verdicts if one.pump == pump and "shift_m" in one.evidence]
-        shifts_m = np.array([one.evidence["shift_m"]["pump"] for one in told], dtype=float)
-        return Series(f"pump {self.station.pump_names[pump - 1]}", np.array([one.time for one in told]), shifts_m)
+        """Bar of each episode over time, in the colour of its stage, a row an asset."""
+        first_ns = min((verdict.window[0] for verdict in self.verdicts), default=0)
+        last_ns = max((verdict.window[1] for verdict in self.verdicts), default=1)
+        return Picture(episode_chart(self.episodes, first_ns, last_ns))
 
     def _repr_html_(self) -> str:
-        title = f"Station {self.station.label}: {len(self.verdicts)} verdicts, {len(self.episodes)} episodes"
-        return f"<p>{escape(title)}</p>{html_table(episode_table(self.episodes, self.station.pump_labels), rows=20)}"
-
-
-def episode_table(episodes: Sequence[Episode], labels: Sequence[str]) -> pa.Table:
-    """Arrow table of episodes, with what people call the pumps."""
-    columns = {
-        "pump": pa.array([one.pump for one in episodes], pa.int16()),
-        "name": pa.array([labels[one.pump - 1] for one in episodes], pa.string()),
-        "state": pa.array([one.state for one in episodes], pa.string()),
-        "from": pa.array([one.start_ns for one in episodes], TIME),
-        "to": pa.array([one.end_ns for one in episodes], TIME),
-        "verdicts": pa.array([one.verdicts for one in episodes], pa.int64()),
-    }
-    return pa.table(columns)
+        told = f"{len(self.verdicts)} verdicts, {len(self.episodes)} episodes"
+        rows = episode_rows(self.episodes, self.station.pump_labels)
+        shown = table(list(rows[0]), [list(row.values()) for row in rows]) if rows else ""
+        return f"<p>{escape(f'Station {self.station.label}: {told}')}</p>{shown}"
 
 
 def detect(

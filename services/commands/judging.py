@@ -55,7 +55,9 @@ def detect(
     told = judge(plant, rows, out, html)
     found = told["episodes"]
     shown = (
-        [one.model_dump(mode="json", exclude={"schema_name"}) for one in found] if as_json else episode_rows(found)
+        [one.model_dump(mode="json", exclude={"schema_name"}) for one in found]
+        if as_json
+        else episode_rows(found, plant.pump_labels)
     )
     print_result(told | {"episodes": shown if as_json or shown else "none"}, as_json=as_json)
 

@@ -2,8 +2,8 @@
 
 >>> import wetwell
 >>> day = wetwell.simulate("alpha", "paper", seed=7)
->>> wetwell.detect(day, "alpha").episodes[0].state
-'pump_fault'
+>>> wetwell.detect(day, "alpha").episodes[0].asset
+'pump:1'
 
 Each name is loaded when it is asked for: the import itself is quick.
 """

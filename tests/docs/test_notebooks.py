@@ -8,7 +8,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 SAID = {
-    "detection": ("<td>2</td><td>2</td><td>pump_fault</td>", "<td>system_fault</td>", "<svg", "'state': 'learning'"),
+    "detection": (
+        "<td>pump:2</td><td>pump_fault</td>",
+        "<td>main</td><td>system_fault</td>",
+        "<svg",
+        "'state': 'learning'",
+    ),
     "data_sets": ("truth_fault", "'blockage', ", "(51840, 'alpha')"),
     "gap": ("flow_meter_gain: gap ", "{'factor': 1.1", "<svg", "'none'"),
     "own_method": ("<td>wetwell</td>", "<td>three sigma</td>", "<svg"),

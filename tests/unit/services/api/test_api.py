@@ -13,6 +13,7 @@ import pytest
 import wetwell
 from wetwell.detector.detector import Detector
 from wetwell.detector.evaluation.methods.run_detector import RunDetector, state_of
+from wetwell.detector.verdict.episodes import episodes_of
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.messages.verdict import Verdict
 
@@ -73,20 +74,20 @@ def test_verdicts_are_those_of_the_command_line(day, found, tmp_path, run_wetwel
 
 def test_episodes_say_what_was_wrong_and_when(day, found):
     begin_ns = int(day.time_ns[day["truth_fault"].astype(str) == "blockage"][0])
-    faults = [episode for episode in found.episodes if episode.state == "pump_fault"]
-    assert {episode.pump for episode in faults} == {2}
-    assert abs(faults[0].start_ns - begin_ns) < 3600 * 10**9
-    assert sum(one.verdicts for one in faults) == sum(one.state == "pump_fault" for one in found.verdicts)
-    assert any(episode.state == "system_fault" for episode in found.episodes)
+    first = found.episodes[0]
+    assert (first.asset, first.state) == ("pump:2", "pump_fault")
+    assert abs(first.since - begin_ns) < 3600 * 10**9
+    assert any(episode.asset == "main" for episode in found.episodes)
+    assert list(found.episodes) == episodes_of(found.verdicts)
 
 
 def test_results_show_themselves(day, found, tmp_path):
     table = found.to_arrow()
     assert table.num_rows == len(found.verdicts)
     assert pl.DataFrame(found).columns == table.column_names
-    assert "<td>pump_fault</td>" in found._repr_html_()
+    assert "<td>pump:2</td><td>pump_fault</td>" in found._repr_html_()
     picture = found.plot()
-    assert "2: pump fault" in picture.svg
+    assert "pump:2: " in picture.svg
     picture.save(tmp_path / "shift.svg")
     assert (tmp_path / "shift.svg").read_text() == picture.svg
     assert "pump2_flow_m3h" in day.plot("pump1_flow_m3h", "pump2_flow_m3h").svg
