@@ -10,7 +10,7 @@ import pyarrow as pa
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks
 from wetwell.detector.verdict.episodes import episodes_of
-from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
