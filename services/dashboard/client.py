@@ -63,6 +63,29 @@ async def act_on_alarm(bus: Bus, station: str, body: bytes, by: str | None = Non
     raise RefusalError(504, "the alarm service does not answer")
 
 
+async def set_plant_clock(bus: Bus, station: str, body: bytes) -> dict[str, Any]:
+    """How the clock of a simulated plant stands after an order: a `PlantClockOrder` in JSON.
+
+    Raises
+    ------
+    RefusalError
+        If the body is no order, or nobody answers.
+    """
+    try:
+        order = PlantClockOrder.model_validate_json(body)
+    except ValidationError as error:
+        raise RefusalError(400, first_fault(error)) from error
+    for payload in await bus.ask(plant_clock_key(station), order.encode(), timeout_s=ANSWER_S):
+        try:
+            clock = PlantClock.decode(payload)
+        except MessageError as error:
+            raise RefusalError(502, str(error)) from error
+        if clock.error:
+            raise RefusalError(400, clock.error)
+        return clock.model_dump(mode="json")
+    raise RefusalError(504, f"station '{station}' has no simulated plant")
+
+
 async def enter_act(bus: Bus, station: str, body: bytes, by: str | None = None) -> dict[str, Any]:
     """Record of an act of maintenance: {"asset", "act", "found", "by", "at"} in JSON, by whom it says or who asks.
 
@@ -89,29 +112,6 @@ async def enter_act(bus: Bus, station: str, body: bytes, by: str | None = None) 
     if record.refused:
         raise RefusalError(400, record.refused)
     return record.model_dump(mode="json")
-
-
-async def set_plant_clock(bus: Bus, station: str, body: bytes) -> dict[str, Any]:
-    """How the clock of a simulated plant stands after an order: a `PlantClockOrder` in JSON.
-
-    Raises
-    ------
-    RefusalError
-        If the body is no order, or nobody answers.
-    """
-    try:
-        order = PlantClockOrder.model_validate_json(body)
-    except ValidationError as error:
-        raise RefusalError(400, first_fault(error)) from error
-    for payload in await bus.ask(plant_clock_key(station), order.encode(), timeout_s=ANSWER_S):
-        try:
-            clock = PlantClock.decode(payload)
-        except MessageError as error:
-            raise RefusalError(502, str(error)) from error
-        if clock.error:
-            raise RefusalError(400, clock.error)
-        return clock.model_dump(mode="json")
-    raise RefusalError(504, f"station '{station}' has no simulated plant")
 
 
 async def history(bus: Bus, station: str, query: Mapping[str, str], **more: Any) -> History:
