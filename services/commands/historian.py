@@ -47,7 +47,7 @@ def historian(data: DataOption = None, zenoh: ZenohOption = None, config: Config
 @app.command()
 def history(
     station: NameOption = "alpha",
-    kind: Annotated[Literal["samples", "verdicts", "alarms", "kpi", "stations"], typer.Option()] = "kpi",
+    kind: Annotated[Literal["samples", "verdicts", "changes", "alarms", "kpi", "stations"], typer.Option()] = "kpi",
     last: Annotated[
         str | None, typer.Option(metavar="TIME", help="So long before the newest sample: 90s, 10m, 2h.")
     ] = None,

@@ -8,6 +8,7 @@ from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.history import History, HistoryQuery, Kind
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.historian.changes import changes_of
 from wetwell.services.historian.hours import Hours, joined_hours
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
@@ -35,6 +36,9 @@ def _answer(store: Store, station: str, query: HistoryQuery) -> History:
     if query.kind in ("verdicts", "alarms"):
         payloads = store.events(query.kind, station, query.start, query.end, query.points)
         return History(station=station, kind=query.kind, messages=tuple(map(json.loads, payloads)))
+    if query.kind == "changes":
+        found = changes_of(store, station, query.start, query.end, query.points)
+        return History(station=station, kind=query.kind, messages=found)
     span = spans[station]
     start_ns, end_ns = max(query.start, span.first_ns), min(query.end, span.last_ns + 1)
     if start_ns >= end_ns:

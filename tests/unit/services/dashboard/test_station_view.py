@@ -13,9 +13,9 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.dashboard.sample_row import past_rows, sample_row, thinned
-from wetwell.services.dashboard.site_view import ROWS, SiteView
-from wetwell.services.dashboard.station_view import LATE_SAMPLES, ROWS_A_FRAME
+from wetwell.services.dashboard.view.sample_row import past_rows, sample_row, thinned
+from wetwell.services.dashboard.view.site_view import ROWS, SiteView
+from wetwell.services.dashboard.view.station_view import LATE_SAMPLES, ROWS_A_FRAME
 from wetwell.services.stations import find_station
 
 
