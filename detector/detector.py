@@ -12,8 +12,8 @@ from wetwell.detector.snapshot.codec import decode_snapshot, encode_snapshot
 from wetwell.detector.stream.block import Block, LiveBlock
 from wetwell.detector.stream.gate import gate_counts
 from wetwell.detector.stream.loop import Stop
+from wetwell.detector.verdict.costs import Costs
 from wetwell.detector.verdict.evidence import rolling_evidence
-from wetwell.detector.verdict.maintenance import Costs
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.messages.verdict import Verdict
 
@@ -73,7 +73,7 @@ class Detector:
 
     def update(self, sample: Readings) -> tuple[Verdict, ...]:
         """Verdicts that a sample brings."""
-        return tuple(self.verdicts_on(self._live.fill(sample)))
+        return tuple(self._verdicts_on(self._live.fill(sample)))
 
     def update_block(self, block: Block) -> list[Verdict]:
         """Verdicts that a block of samples brings; the same as if they came one by one."""
@@ -81,6 +81,9 @@ class Detector:
 
     def verdicts_on(self, block: Block) -> Iterator[Verdict]:
         """Yield the verdicts that a block of samples brings, each as soon as it is there; take them all."""
+        return self._verdicts_on(block.in_one_piece())
+
+    def _verdicts_on(self, block: Block) -> Iterator[Verdict]:
         if not self._runs.state.gate["is_begun"][0] and len(block.time_ns):
             begin_ns = int(block.time_ns[0])
             yield from [self._told(pump, begin_ns, "begins") for pump in range(len(self._judges))]

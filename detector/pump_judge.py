@@ -29,8 +29,9 @@ from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, s
 from wetwell.detector.statistics.robust import median
 from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE, SEGMENT_SAMPLES
+from wetwell.detector.verdict.costs import Costs
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
-from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
+from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.detector.verdict.severity import severity
 from wetwell.protocols.messages.verdict import State
 
@@ -155,7 +156,10 @@ class PumpJudge:
         return 0
 
     def look_early(self, run: Run, system: SystemPrior) -> Judgement | None:
-        """Judge the last segments of an open run, if two looks in a row are sure of a fault not told yet."""
+        """Judge the last segments of an open run, if two looks in a row are sure of a fault not told yet.
+
+        Such a run has no drawdown yet.
+        """
         memory = self.memory
         reference = memory.reference
         if reference is None or run.stuck:
@@ -165,7 +169,7 @@ class PumpJudge:
         if is_dry and math.isfinite(reference.drawdown.mean):
             return None  # the drawdown will tell at the end of the run whether the flow meter is dead
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
-        posterior = self._posterior(replace(run, log_ratio=math.nan), reference, system, evidence)
+        posterior = self._posterior(run, reference, system, evidence)
         state, remark = decide(posterior, float(median(run.head_m)))
         fault = posterior.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum()
         previous, memory.early = memory.early, state if state in FAULT_STATES and fault > EARLY_PROBABILITY else None

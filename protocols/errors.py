@@ -1,9 +1,10 @@
 """Errors that reach a user: one line that names value, rule and place."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 
 class WetwellError(Exception):
@@ -22,7 +23,7 @@ class LinkError(WetwellError):
     """A link (Zenoh, Modbus) cannot be opened or used."""
 
 
-def first_fault(error: ValidationError) -> str:
+def first_fault(error: "ValidationError") -> str:
     """One line for a failed validation: path of the key, value, rule; further faults are counted.
 
     An unknown key comes first: it is most often the misspelt one that is missed elsewhere.

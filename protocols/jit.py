@@ -1,7 +1,7 @@
 """Compilation of the kernels, with types that mypy can follow."""
 
 from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import numba
 
@@ -27,6 +27,35 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     What unpacks the arguments takes longest to compile where they are tuples of arrays.
     """
     return cast("Callable[P, R]", numba.njit(**_OPTIONS | {"no_cpython_wrapper": True})(function))
+
+
+class SameTypes(Generic[P, R]):
+    """A compiled function that is called with positional arguments of the same types each time.
+
+    Only the first call has a look at them, which takes longer than a sample or a second of a plant. Later arrays of
+    another type, or not in one piece where the first was, are misread: whoever calls makes sure of it.
+    """
+
+    def __init__(self, function: Callable[P, R]) -> None:
+        self._function = function
+        self._code: Callable[P, R] | None = None
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call the function."""
+        if self._code is None:
+            self._code = _code_for(self._function, args)
+        return self._code(*args, **kwargs)
+
+
+def _code_for(function: Callable[P, R], args: tuple[Any, ...]) -> Callable[P, R]:
+    """Machine code of a compiled function for arguments of these types."""
+    dispatcher = cast("Any", function)
+    if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
+        return function
+    signature = tuple(map(numba.typeof, args))
+    if signature not in dispatcher.overloads:
+        dispatcher.compile(signature)
+    return cast("Callable[P, R]", dispatcher.overloads[signature].entry_point)
 
 
 _OPTIONS: dict[str, Any] = {

@@ -1,9 +1,10 @@
 """The command `wetwell`: its groups, and what it says when a user errs."""
 
 import sys
-from typing import NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from wetwell.protocols.errors import WetwellError
 from wetwell.services.commands import (
@@ -20,20 +21,47 @@ from wetwell.services.commands import (
     recordings,
     token,
 )
+from wetwell.services.commands.options import ADMINISTER, GAP, GROUPS, RUN
 
-app = typer.Typer(
-    name="wetwell",
-    help="Watches wastewater pump stations and says whether a pump or the rising main is at fault.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-)
-for group in (live, dashboard, historian, fleet, recordings, judging, listing, doctor):
+
+class _ByGroup(TyperGroup):
+    """Lists the commands group by group, as a station comes into service."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return sorted(super().list_commands(ctx), key=lambda name: GROUPS.index(self._group(name)))
+
+    def _group(self, name: str) -> str:
+        command: Any = self.commands[name]
+        return str(command.rich_help_panel)
+
+
+app = typer.Typer(name="wetwell", cls=_ByGroup, no_args_is_help=True, pretty_exceptions_enable=False)
+app.add_typer(live.app)
+app.add_typer(gateway.app, name="gateway", rich_help_panel=RUN)
+app.add_typer(alarms.app, name="alarms", rich_help_panel=RUN)
+for group in (historian, dashboard, fleet, recordings, judging):
     app.add_typer(group.app)
-app.add_typer(gap.app, name="gap")
-app.add_typer(alarms.app, name="alarms")
-app.add_typer(token.app, name="token")
-app.add_typer(gateway.app, name="gateway")
+app.add_typer(gap.app, name="gap", rich_help_panel=GAP)
+for group in (doctor, listing):
+    app.add_typer(group.app)
+app.add_typer(token.app, name="token", rich_help_panel=ADMINISTER)
+
+
+def _print_version(is_wanted: bool) -> None:
+    if is_wanted:
+        from importlib.metadata import version  # noqa: PLC0415 - of use to this option only
+
+        typer.echo(f"wetwell {version('wetwell')}")
+        raise typer.Exit
+
+
+@app.callback()
+def wetwell(
+    _version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Watches wastewater pump stations and says whether a pump or the rising main is at fault."""
 
 
 def main() -> NoReturn:

@@ -1,20 +1,20 @@
-"""Stations and scenarios by name or by file."""
+"""Stations and scenarios by name or by file.
+
+A file that is wrong is told at once: the compiled plant, whose import takes longer, is loaded for one that is right.
+"""
 
 from collections.abc import Iterable
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.station.station_file import Station, load_station, load_toml
-from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.simulator.duty import check_operable
-from wetwell.simulator.effects import effective_parameters
-from wetwell.simulator.scenario import Scenario
+
+if TYPE_CHECKING:
+    from wetwell.simulator.scenario import Scenario
 
 _PLANT = files("wetwell.simulator")
 
@@ -30,6 +30,9 @@ def find_station(name_or_path: str) -> Station:
     with as_file(_PLANT / "stations") as folder:
         path = _find(name_or_path, folder, "station")
         station = load_station(path)
+    from wetwell.simulator.duty import check_operable
+    from wetwell.simulator.effects import effective_parameters
+
     try:
         check_operable(station.name, effective_parameters(station))
     except ValueError as error:
@@ -59,7 +62,7 @@ def find_stations(names_or_paths: Iterable[str]) -> list[Station]:
     return list(stations.values())
 
 
-def find_scenario(name_or_path: str) -> Scenario:
+def find_scenario(name_or_path: str) -> "Scenario":
     """Scenario that comes with the package under this name, or in this file.
 
     Raises
@@ -70,6 +73,8 @@ def find_scenario(name_or_path: str) -> Scenario:
     with as_file(_PLANT / "scenarios") as folder:
         path = _find(name_or_path, folder, "scenario")
         table = load_toml(path)
+    from wetwell.simulator.scenario import Scenario
+
     _read_inflow(table, path)
     try:
         return Scenario.model_validate(table)
@@ -93,6 +98,11 @@ def _read_inflow(table: dict[str, Any], path: Path) -> None:
     inflow = table.get("inflow")
     if not isinstance(inflow, dict) or inflow.get("kind") != "recorded" or "file" not in inflow:
         return
+    import numpy as np
+
+    from wetwell.protocols.recordings.recording import read_recording
+    from wetwell.protocols.timestamps import NS_PER_S
+
     source = path.parent / str(inflow.pop("file"))
     recording = read_recording(source)
     flow_m3h = recording.column("inflow_m3h")

@@ -100,6 +100,7 @@ def duty_table(station: Station) -> dict[str, object]:
     together = _duty(station, [True] * count)
     return {
         "station": station.name,
+        "title": station.title,
         "level_m": round(station.middle_level_m, 3),
         "mains": [_main(station, main) for main in station.mains],
         "curves": [_curve(station, pump) for pump in range(count)],
@@ -122,7 +123,7 @@ def _main(station: Station, main: RisingMain) -> dict[str, object]:
 def _named(station: Station, pump: int) -> dict[str, Any]:
     """Number, name and main of a pump."""
     main = station.mains[station.main_of_pump[pump]]
-    return {"pump": pump + 1, "name": station.pump_names[pump], "main": main.name}
+    return {"pump": pump + 1, "name": station.pump_labels[pump], "main": main.name}
 
 
 def _curve(station: Station, number: int) -> dict[str, object]:

@@ -3,12 +3,15 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.jit import SameTypes
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.kernel import simulate_seconds
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.state import Truth, first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels
 from wetwell.simulator.wet_well import level_at_volume_m, volume_at_level_m3
+
+_simulate_seconds = SameTypes(simulate_seconds)
 
 
 class Plant:
@@ -58,5 +61,5 @@ class Plant:
         """Advance by as many seconds as the forcing has: (channels, n) as measured, and as it truly was."""
         pumps, seconds = forcing.speed_factor.shape
         measured, truth = np.zeros((channels(pumps), seconds)), still_truth(pumps, seconds)
-        simulate_seconds(self._records, self._state, forcing, rng, measured, truth)
+        _simulate_seconds(self._records, self._state, forcing, rng, measured, truth)
         return measured, truth

@@ -188,9 +188,10 @@ def check_driven(station: Station) -> None:
 
 def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:
     columns = {"level_m": measured[LEVEL], "inflow_m3h": measured[INFLOW]}
+    channels = {quantity: channels_of(quantity, pumps) for quantity in PUMP_ANALOGUES}
     for i in range(pumps):
-        for quantity in PUMP_ANALOGUES:
-            columns[pump_column(i + 1, quantity)] = measured[channels_of(quantity, pumps, i + 1)[0]]
+        for quantity, of_pumps in channels.items():
+            columns[pump_column(i + 1, quantity)] = measured[of_pumps[i]]
         columns[pump_column(i + 1, "running")] = (columns[pump_column(i + 1, "frequency_hz")] > 0).astype(np.float64)
     return columns
 

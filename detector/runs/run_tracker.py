@@ -27,10 +27,14 @@ from wetwell.detector.stream.steady_samples import (
 )
 from wetwell.detector.stream.stuck_sensors import stuck_names
 from wetwell.protocols.arrays import Records
+from wetwell.protocols.jit import SameTypes
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, FREQUENCY, HEAD, PUMP_VALUES
 from wetwell.protocols.timestamps import NS_PER_S
 
 ROLLING_SAMPLES = 300
+
+_DONE = Stop.SAMPLES_DONE.value  # asked of the enumeration, it takes a tenth of a sample
+_process_samples = SameTypes(process_samples)
 
 
 class RunTracker:
@@ -50,9 +54,9 @@ class RunTracker:
         self.state = new_state(datasheet, self._rolling)
 
     def stops(self, block: Block) -> Iterator[int]:
-        """Yield each `Stop` in a block at which there is something to judge; it goes on from there."""
-        row, stop = self._process(0, Stop.SAMPLES_DONE.value, block)
-        while stop != Stop.SAMPLES_DONE:
+        """Yield each `Stop` at which there is something to judge in a block `in_one_piece`; it goes on from there."""
+        row, stop = self._process(0, _DONE, block)
+        while stop != _DONE:
             if stop == Stop.ROOM_FULL:
                 room = np.concatenate((self.state.steady_samples, new_steady_samples()))
                 self.state = self.state._replace(steady_samples=room)
@@ -148,7 +152,7 @@ class RunTracker:
 
     def _process(self, row: int, stop: int, block: Block) -> tuple[int, int]:
         arrays: tuple[Any, ...] = self.state  # handed over one by one: as one value they take twice as long
-        return process_samples(row, stop, *block, *arrays)
+        return _process_samples(row, stop, *block, *arrays)
 
     @property
     def _segment_samples(self) -> int:

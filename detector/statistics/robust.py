@@ -1,5 +1,6 @@
 """Scatter from medians: what stands out does not count."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,10 +22,13 @@ def median(values: Floats) -> Any:
     >>> float(median(np.array([3.0, 1.0, 2.0, 9.0])))
     2.5
     """
-    ordered = np.sort(values, axis=0)
-    half = len(ordered) // 2
+    ordered = values.copy()
+    ordered.sort(axis=0)
+    half, last = len(ordered) // 2, ordered[-1]
     middle = ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2.0
-    return np.where(np.isnan(ordered[-1]), np.nan, middle)
+    if ordered.ndim > 1:
+        return np.where(np.isnan(last), np.nan, middle)
+    return last if math.isnan(last) else middle
 
 
 def quantiles(values: Floats, shares: Sequence[float]) -> list[float]:

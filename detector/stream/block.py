@@ -38,6 +38,15 @@ class Block(NamedTuple):
     pumps: int
     is_bad: bool
 
+    def in_one_piece(self) -> "Block":
+        """The block, each array of it in one piece of memory, as compiled code takes them."""
+        return self._replace(
+            time_ns=np.ascontiguousarray(self.time_ns, dtype=np.int64),
+            seq=np.ascontiguousarray(self.seq, dtype=np.int64),
+            values=np.ascontiguousarray(self.values, dtype=np.float64),
+            is_switched=np.ascontiguousarray(self.is_switched, dtype=np.bool_),
+        )
+
 
 def blocks(recording: Recording, pumps: int) -> Iterator[Block]:
     """Yield the rows of a recording for a station with so many pumps, `seq` counting from 0."""

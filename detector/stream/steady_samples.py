@@ -7,7 +7,7 @@ import numpy as np
 from wetwell.detector.curves.datasheet import static_head_at_m
 from wetwell.detector.curves.residuals import distances
 from wetwell.protocols.arrays import Floats, Records
-from wetwell.protocols.jit import compiled
+from wetwell.protocols.jit import SameTypes, compiled
 
 SEGMENT_SAMPLES = 25
 SEGMENT_S = 25.0
@@ -43,6 +43,7 @@ def new_steady_samples(room: int = LEAST_ROOM) -> Records:
     return np.zeros(room, dtype=STEADY_SAMPLE)
 
 
+@SameTypes
 @compiled
 def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Floats) -> None:
     """Add the samples of each segment to its sums, one a row; `own` is the pump in the table."""

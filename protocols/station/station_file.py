@@ -12,7 +12,7 @@ from wetwell.protocols.station.control import DEFAULT_START_LEVELS_M, DEFAULT_ST
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.sump import Sump
-from wetwell.protocols.station.table import Fraction, NonNegative, Positive, Table
+from wetwell.protocols.station.table import Fraction, Label, NonNegative, Positive, Table
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 """A station's name is a chunk of a Zenoh key and of a file name."""
@@ -59,9 +59,11 @@ class Station(Table):
     """A pump station. Pumps are in rotation order.
 
     A file has one `[rising_main]` or several `[[main]]`; code asks for `mains`, and for the main of each pump.
+    `name` is its key on the bus and in files; `title` is what people call it.
     """
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]
+    title: Label | None = None
     sump: Sump
     pump: Annotated[tuple[Pump, ...], Field(min_length=1, max_length=32)]
     rising_main: RisingMain | None = None
@@ -170,6 +172,16 @@ class Station(Table):
     def pump_names(self) -> tuple[str, ...]:
         """What people call the pumps; a number where the file has no name."""
         return tuple(pump.name or str(number) for number, pump in enumerate(self.pump, start=1))
+
+    @property
+    def label(self) -> str:
+        """Key of the station, and beside it what people call it: `sued (Pumpwerk Süd)`."""
+        return self.name if self.title is None else f"{self.name} ({self.title})"
+
+    @property
+    def pump_labels(self) -> tuple[str, ...]:
+        """What people call the pumps, with the title of the station where it has one: `Pumpwerk Süd 3`."""
+        return tuple(name if self.title is None else f"{self.title} {name}" for name in self.pump_names)
 
     @property
     def middle_level_m(self) -> float:

@@ -26,8 +26,9 @@ def alarm_lines(alarms: Sequence[Alarm]) -> str:
     ...     state="unacknowledged", text="pump 2: pump fault", advice="pull the pump", raised=0)
     >>> print(alarm_lines([alarm]))
     alarms:
-      priority  station             alarm           state                raised                text         advice
-          high    alpha  pump2.pump_fault  unacknowledged  1970-01-01T00:00:00Z  pump 2: pump fault  pull the pump
+      priority  station             alarm           state                raised  text        advice
+          high    alpha  pump2.pump_fault  unacknowledged  1970-01-01T00:00:00Z  pump 2:     pull the
+                                                                                 pump fault  pump
     """
     rows = [
         {

@@ -1,24 +1,27 @@
 """Alarms: the daemon, and the acts of operators."""
 
-import asyncio
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
+    StationNameOption,
     ZenohOption,
     print_result,
     run,
     settings_of,
+    station_name,
 )
-from wetwell.services.runtime.settings import Settings
+
+if TYPE_CHECKING:
+    from wetwell.services.runtime.settings import Settings
 
 app = typer.Typer(invoke_without_command=True)
 
-StationName = Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")]
-AlarmArgument = Annotated[str, typer.Argument(metavar="ALARM", help="Such as pump2.pump_fault.")]
+AlarmOption = Annotated[str, typer.Option("--alarm", metavar="ALARM", help="Such as pump2.pump_fault.")]
 ByOption = Annotated[str, typer.Option("--by", help="Who does it; kept in the audit.")]
 ReasonOption = Annotated[str, typer.Option("--reason", help="Why; kept in the audit.")]
 
@@ -36,25 +39,30 @@ def alarms(
     """Raise and clear the alarms of a site after ISA-18.2, and answer the acts of operators."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.services.alarms.daemon import serve_alarms
     from wetwell.services.stations import find_station
 
     settings = settings_of(config, zenoh)
+    from wetwell.services.alarms.daemon import serve_alarms
+
     run(settings, serve_alarms(settings, [find_station(name) for name in station or []]))
 
 
-@app.command("list")
+@app.command("list", cls=about("--station"))
 def list_command(
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only of this station.")] = "*",
+    station: Annotated[
+        str, typer.Option("--station", metavar="NAME", help="Only of this station: its name or its file.")
+    ] = "*",
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """List the alarms that are not normal, the most urgent first."""
+    import asyncio
+
     from wetwell.services.alarms.client import ask_alarms, list_alarms
     from wetwell.services.alarms.tables import alarm_lines
 
-    found = asyncio.run(ask_alarms(settings_of(config, zenoh), lambda bus: list_alarms(bus, station)))
+    found = asyncio.run(ask_alarms(settings_of(config, zenoh), lambda bus: list_alarms(bus, station_name(station))))
     if as_json:
         print_result({"alarms": [alarm.model_dump(mode="json") for alarm in found]}, as_json=True)
     else:
@@ -64,6 +72,8 @@ def list_command(
 @app.command()
 def report(zenoh: ZenohOption = None, config: ConfigOption = None, as_json: JsonOption = False) -> None:
     """Print the alarm rates beside the targets of ISA-18.2, and the chattering and stale alarms."""
+    import asyncio
+
     from wetwell.services.alarms.client import ask_alarms
     from wetwell.services.alarms.client import report as ask_report
     from wetwell.services.alarms.tables import report_lines
@@ -78,10 +88,10 @@ def report(zenoh: ZenohOption = None, config: ConfigOption = None, as_json: Json
 def _add_act(act: str, text: str) -> None:
     """Add the command of an act that needs no more than an alarm and a name."""
 
-    @app.command(act.replace("_", "-"), help=text)
+    @app.command(act.replace("_", "-"), help=text, cls=about("--alarm"))
     def command(
-        alarm: AlarmArgument,
-        station: StationName,
+        alarm: AlarmOption,
+        station: StationNameOption,
         by: ByOption,
         reason: ReasonOption = "",
         zenoh: ZenohOption = None,
@@ -94,10 +104,10 @@ def _add_act(act: str, text: str) -> None:
 _add_act("acknowledge", "Say that an alarm was seen.")
 
 
-@app.command()
+@app.command(cls=about("--alarm"))
 def shelve(
-    alarm: AlarmArgument,
-    station: StationName,
+    alarm: AlarmOption,
+    station: StationNameOption,
     by: ByOption,
     minutes: Annotated[float, typer.Option("--minutes", help="For how long on the wall clock, at most a week.")],
     reason: ReasonOption = "",
@@ -115,12 +125,14 @@ _add_act("in_service", "Put an alarm into service again.")
 
 
 def _act(
-    act: str, words: tuple[str, str, str, str], minutes: float | None, settings: Settings, *, as_json: bool
+    act: str, words: tuple[str, str, str, str], minutes: float | None, settings: "Settings", *, as_json: bool
 ) -> None:
+    import asyncio
+
     from wetwell.services.alarms.client import ask_alarms, new_act, send_act
 
     station, alarm, by, reason = words
-    order = new_act(station, alarm, act, by, minutes, reason)
+    order = new_act(station_name(station), alarm, act, by, minutes, reason)
     answer = asyncio.run(ask_alarms(settings, lambda bus: send_act(bus, order)))
     result: dict[str, object] = {"done": answer.is_done}
     if answer.alarm is not None:

@@ -4,12 +4,13 @@ from typing import Annotated
 
 import typer
 
-from wetwell.services.commands.options import ConfigOption, JsonOption, ZenohOption, positive, print_result
+from wetwell.services.commands.inputs import about
+from wetwell.services.commands.options import OPERATE, ConfigOption, JsonOption, ZenohOption, positive, print_result
 
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=OPERATE)
 def doctor(
     station: Annotated[
         list[str] | None,

@@ -6,12 +6,13 @@ from typing import Annotated, Any
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.options import ConfigOption, ZenohOption, run, settings_of
+from wetwell.services.commands.inputs import about
+from wetwell.services.commands.options import RUN, ConfigOption, ZenohOption, run, settings_of
 
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=about("--stations"), rich_help_panel=RUN)
 def fleet(
     stations: Annotated[
         Path, typer.Option("--stations", metavar="PATH", help="Folder of station files, or a CSV table of them.")
@@ -26,11 +27,10 @@ def fleet(
     config: ConfigOption = None,
 ) -> None:
     """Judge any number of stations on the workers of Dask; a station file that comes or goes is followed."""
+    given: dict[str, Any] = {"scheduler": scheduler, "workers": workers, "shards": shards}
+    settings = settings_of(config, zenoh, more={"fleet": {k: v for k, v in given.items() if v is not None}})
     try:
         from wetwell.services.fleet.controller import serve_fleet
     except ImportError as error:
         raise ConfigError(f"fleet: needs the extra 'fleet' (pip install 'wetwell[fleet]'): {error}") from error
-
-    given: dict[str, Any] = {"scheduler": scheduler, "workers": workers, "shards": shards}
-    settings = settings_of(config, zenoh, more={"fleet": {k: v for k, v in given.items() if v is not None}})
     run(settings, serve_fleet(settings, stations))

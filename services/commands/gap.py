@@ -1,13 +1,12 @@
 """The gap between simulation and reality."""
 
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.recordings.reading import Reading
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
     AsStationOption,
     JsonOption,
@@ -16,9 +15,12 @@ from wetwell.services.commands.options import (
     SeedOption,
     StationOption,
     TimeZoneOption,
+    all_there,
+    cores,
     positive,
     print_batch,
     print_result,
+    reading_of,
     signals_named,
 )
 
@@ -94,7 +96,7 @@ def gap_trial(
     print_batch(result if as_json else brief(result, out), as_json=as_json)
 
 
-@app.command("diagnose")
+@app.command("diagnose", cls=about("--recording"))
 def gap_diagnose(
     out: Annotated[
         Path,
@@ -104,7 +106,9 @@ def gap_diagnose(
     ],
     recording: Annotated[
         list[Path] | None,
-        typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet; may be given again."),
+        typer.Option(
+            "--recording", metavar="FILE", help="CSV, CSV.gz or Parquet; may be given again.", callback=all_there
+        ),
     ] = None,
     table: Annotated[
         Path | None,
@@ -130,9 +134,8 @@ def gap_diagnose(
 ) -> None:
     """Say where a recording departs from the simulator, which effect causes it, and how far that closes the gap."""
     from wetwell.services.batch.executors import check_scheduler
-    from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
 
-    given, reading = recording or [], Reading.said(time_zone, as_station=as_station)
+    given, reading = recording or [], reading_of(time_zone, as_station=as_station)
     if not given and table is None:
         raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
     check_scheduler(scheduler)
@@ -140,21 +143,23 @@ def gap_diagnose(
         from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 
         cases = cases_of(station, given, table, reading)
-        processes = min(workers or os.cpu_count() or 1, max(len(cases), 1))
+        processes = min(workers or cores(), max(len(cases), 1))
         result = diagnose_all(cases, out, processes, scheduler, only=only, without=without or ())
         return print_batch(result, as_json=as_json)
-    from wetwell.services.batch.gap import diagnose_file
     from wetwell.services.stations import find_station
 
     if station is None:
         raise ConfigError("gap diagnose: give --station FILE with --recording")
     plant = find_station(station)
+    from wetwell.services.batch.gap import diagnose_file
+    from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
+
     with progress_bar("diagnosis") as progress:
         report = diagnose_file(plant, given[0], out, reading, only=only, without=without or (), progress=progress)
     return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
 
 
-@app.command("replay")
+@app.command("replay", cls=about("--recording"))
 def gap_replay(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
@@ -168,8 +173,9 @@ def gap_replay(
     as_json: JsonOption = False,
 ) -> None:
     """Write what the simulator says for a recording, second by second."""
-    from wetwell.services.batch.gap import replay_file
     from wetwell.services.stations import find_station
 
-    reading, plant = Reading.said(time_zone, as_station=as_station), find_station(station)
+    reading, plant = reading_of(time_zone, as_station=as_station), find_station(station)
+    from wetwell.services.batch.gap import replay_file
+
     print_result(replay_file(plant, recording, out, reading, closed_loop=closed_loop), as_json=as_json)

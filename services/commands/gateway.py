@@ -1,12 +1,12 @@
 """The gateway: PLCs polled for ever, or once, or only their files checked."""
 
-import asyncio
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
@@ -18,7 +18,7 @@ from wetwell.services.commands.options import (
 
 app = typer.Typer(invoke_without_command=True)
 
-FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="TOML file of one PLC, or of several.")]
+PlcOption = Annotated[Path, typer.Option("--plc", metavar="FILE", help="TOML file of one PLC, or of several.")]
 
 
 @app.callback()
@@ -33,20 +33,20 @@ def gateway(
     """Poll PLCs over Modbus TCP and publish their samples on Zenoh."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.protocols.modbus.device_map import check_stations, load_plcs
-    from wetwell.services.gateway.daemon import serve_gateway
-
     settings = settings_of(config, zenoh)
     files = plc or settings.gateway.plcs
     if not files:
         raise ConfigError("gateway: give --plc FILE, or gateway.plcs in the settings")
+    from wetwell.protocols.modbus.device_map import check_stations, load_plcs
+    from wetwell.services.gateway.daemon import serve_gateway
+
     plcs = tuple(each for file in files for each in load_plcs(file))
     check_stations(plcs, ", ".join(map(str, files)))
     run(settings, serve_gateway(settings, plcs))
 
 
-@app.command()
-def check(file: FileArgument, as_json: JsonOption = False) -> None:
+@app.command(cls=about("--plc"))
+def check(file: PlcOption, as_json: JsonOption = False) -> None:
     """Check a file of PLCs, its maps and station files; show what would be read."""
     from wetwell.protocols.modbus.device_map import load_plcs
     from wetwell.services.gateway.survey import described
@@ -54,9 +54,11 @@ def check(file: FileArgument, as_json: JsonOption = False) -> None:
     print_result({plc.station: described(plc) for plc in load_plcs(file)}, as_json=as_json)
 
 
-@app.command()
-def read(file: FileArgument, as_json: JsonOption = False) -> None:
+@app.command(cls=about("--plc"))
+def read(file: PlcOption, as_json: JsonOption = False) -> None:
     """Poll the PLCs of a file once and show values and words; exit code 1 if one does not answer."""
+    import asyncio
+
     from wetwell.protocols.modbus.device_map import load_plcs
     from wetwell.services.gateway.survey import read_all
 

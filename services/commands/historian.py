@@ -1,25 +1,29 @@
 """History: the daemon that keeps it, questions to it, recordings out of it and into it."""
 
-import asyncio
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.messages.history import LONGEST_NS
-from wetwell.protocols.timestamps import from_iso
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
+    OPERATE,
+    RECORD,
+    RUN,
     AsStationOption,
     ConfigOption,
     JsonOption,
     RecordingOption,
+    StationNameOption,
     TimeZoneOption,
     ZenohOption,
     parse_duration_s,
     print_result,
+    reading_of,
     run,
     settings_of,
+    station_name,
     with_history,
 )
 
@@ -28,25 +32,24 @@ app = typer.Typer()
 DataOption = Annotated[
     Path | None, typer.Option("--data", metavar="DIR", help="Folder of the history; default: that of the settings.")
 ]
-NameOption = Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")]
 FromOption = Annotated[
     str | None, typer.Option("--from", metavar="TIME", help="ISO 8601, such as 2026-11-20T06:00:00Z.")
 ]
 ToOption = Annotated[str | None, typer.Option("--to", metavar="TIME", help="Until before this time.")]
 
 
-@app.command()
+@app.command(rich_help_panel=RUN)
 def historian(data: DataOption = None, zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
     """Keep samples, verdicts and alarms of all stations, and answer questions about them."""
+    settings = with_history(settings_of(config, zenoh), data)
     from wetwell.services.historian.daemon import serve_historian
 
-    settings = with_history(settings_of(config, zenoh), data)
     run(settings, serve_historian(settings))
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=OPERATE)
 def history(
-    station: NameOption = "alpha",
+    station: StationNameOption = "alpha",
     kind: Annotated[Literal["samples", "verdicts", "changes", "alarms", "kpi", "stations"], typer.Option()] = "kpi",
     last: Annotated[
         str | None, typer.Option(metavar="TIME", help="So long before the newest sample: 90s, 10m, 2h.")
@@ -60,18 +63,22 @@ def history(
     as_json: JsonOption = False,
 ) -> None:
     """Ask a running historian for samples, verdicts, alarms or figures; `--kind stations` lists what it knows."""
+    import asyncio
+
+    if last is not None and (start is not None or end is not None):
+        raise ConfigError("history: give either --last or --from and --to")
+    last_s, span = None if last is None else parse_duration_s(last, "--last"), _span(start, end)
+    settings = settings_of(config, zenoh)
     from wetwell.protocols.bus.keys import SITE
     from wetwell.services.historian.client import ask_history
     from wetwell.services.historian.tables import history_table
 
-    if last is not None and (start is not None or end is not None):
-        raise ConfigError("history: give either --last or --from and --to")
     asking = ask_history(
-        settings_of(config, zenoh),
-        SITE if kind == "stations" else station,
+        settings,
+        SITE if kind == "stations" else station_name(station),
         kind,
-        last_s=None if last is None else parse_duration_s(last, "--last"),
-        span=_span(start, end),
+        last_s=last_s,
+        span=span,
         points=points,
         raw=raw,
     )
@@ -82,10 +89,10 @@ def history(
         print_result(history_table(answer), as_json=False)
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RECORD)
 def export(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
-    station: NameOption,
+    station: StationNameOption,
     start: FromOption = None,
     end: ToOption = None,
     data: DataOption = None,
@@ -96,17 +103,18 @@ def export(
     from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import export_recording
 
-    settings, span = with_history(settings_of(config), data), _span(start, end)
+    settings, span, name = with_history(settings_of(config), data), _span(start, end), station_name(station)
     with open_store(settings.historian, alone=False, must_exist=True) as store:
-        rows = export_recording(store, station, *span, out)
-    print_result({"recording": str(out), "station": station, "rows": rows}, as_json=as_json)
+        rows = export_recording(store, name, *span, out)
+    print_result({"recording": str(out), "station": name, "rows": rows}, as_json=as_json)
 
 
-@app.command("import")
+@app.command("import", cls=about("--recording"), rich_help_panel=RECORD)
 def import_(
     recording: RecordingOption,
     station: Annotated[
-        str | None, typer.Option("--station", metavar="NAME", help="Name of the station; default: the recording's.")
+        str | None,
+        typer.Option("--station", metavar="NAME", help="Name of the station, or its file; default: the recording's."),
     ] = None,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,
@@ -115,13 +123,12 @@ def import_(
     as_json: JsonOption = False,
 ) -> None:
     """Fill the history from a recording; what is there already stays as it is."""
-    from wetwell.protocols.recordings.reading import Reading
     from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import import_recording
 
-    reading = Reading.said(time_zone, as_station=as_station)
+    reading = reading_of(time_zone, as_station=as_station)
     read = reading.read(recording)
-    name = reading.name_for(read, station, recording)
+    name = reading.name_for(read, None if station is None else station_name(station), recording)
     settings = with_history(settings_of(config), data)
     with open_store(settings.historian, alone=False) as store:
         rows, new = import_recording(store, name, read, recording)
@@ -131,6 +138,8 @@ def import_(
 
 
 def _span(start: str | None, end: str | None) -> tuple[int, int]:
+    from wetwell.protocols.messages.history import LONGEST_NS
+
     start_ns = -LONGEST_NS if start is None else _stamp_ns(start, "--from")
     end_ns = LONGEST_NS if end is None else _stamp_ns(end, "--to")
     if end_ns <= start_ns:
@@ -139,6 +148,9 @@ def _span(start: str | None, end: str | None) -> tuple[int, int]:
 
 
 def _stamp_ns(text: str, flag: str) -> int:
+    from wetwell.protocols.messages.history import LONGEST_NS
+    from wetwell.protocols.timestamps import from_iso
+
     try:
         return min(max(from_iso(text), -LONGEST_NS), LONGEST_NS)
     except ValueError as error:

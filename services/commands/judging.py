@@ -1,30 +1,34 @@
 """Verdicts on recordings, and how good they are."""
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.recordings.reading import Reading
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
+    JUDGE,
     AsStationOption,
     JsonOption,
+    RecordingOption,
     SchedulerOption,
     StationOption,
     TimeZoneOption,
+    all_there,
+    cores,
     positive,
     print_batch,
     print_result,
+    reading_of,
 )
 
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=JUDGE)
 def detect(
-    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Verdicts, one JSON object a line.")],
     station: StationOption,
     as_station: AsStationOption = False,
@@ -32,17 +36,18 @@ def detect(
     as_json: JsonOption = False,
 ) -> None:
     """Judge a recording with the streaming detector."""
-    from wetwell.services.batch.recordings import detect as judge
     from wetwell.services.stations import find_station
 
     plant = find_station(station)
-    rows = Reading.said(time_zone, as_station=as_station).read_of(recording, plant)
+    rows = reading_of(time_zone, as_station=as_station).read_of(recording, plant)
+    from wetwell.services.batch.recordings import detect as judge  # after what can be wrong: it takes a second
+
     for name in rows.ignored:
         typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
     print_result(judge(plant, rows, out), as_json=as_json)
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=JUDGE)
 def backtest(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for backtest.json and backtest.html.")],
     station: Annotated[
@@ -50,7 +55,10 @@ def backtest(
         typer.Option("--station", metavar="FILE", help="Of the recordings and scenarios; a dataset has its own."),
     ] = None,
     recording: Annotated[
-        list[Path] | None, typer.Option("--recording", metavar="FILE", help="With truth columns; may be given again.")
+        list[Path] | None,
+        typer.Option(
+            "--recording", metavar="FILE", help="With truth columns; may be given again.", callback=all_there
+        ),
     ] = None,
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", metavar="NAME", help="To simulate; may be given again.")
@@ -88,7 +96,7 @@ def backtest(
     check_scheduler(scheduler)
     names = detector_names(detectors)
     length_s = None if days is None else max(round(positive(days, "--days") * 86_400.0), 1)
-    reading = Reading.said(time_zone, as_station=as_station)
+    reading = reading_of(time_zone, as_station=as_station)
     sources: list[Source] = []
     if station is not None:
         plans = [find_scenario(name) for name in scenario or []]
@@ -100,6 +108,6 @@ def backtest(
         sources += items_of(dataset)
     if not sources:
         raise ConfigError("backtest: give at least one --recording, --scenario or --dataset")
-    processes = min(workers or os.cpu_count() or 1, len(sources))
+    processes = min(workers or cores(), len(sources))
     result = write_backtest(sources, names, out, processes, learning_h * 3600.0, scheduler)
     print_batch(result if as_json else overview(result), as_json=as_json)

@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.recordings.reading import Reading
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
+    ADMINISTER,
     AsStationOption,
     ConfigOption,
     JsonOption,
     StationOption,
     TimeZoneOption,
     print_result,
+    reading_of,
     signals_named,
 )
-from wetwell.services.runtime.settings import load_settings
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -25,21 +26,26 @@ if TYPE_CHECKING:
 app = typer.Typer()
 station_app = typer.Typer(no_args_is_help=True, help="Station files.")
 config_app = typer.Typer(no_args_is_help=True, help="Settings of the services.")
-app.add_typer(station_app, name="station")
-app.add_typer(config_app, name="config")
+app.add_typer(station_app, name="station", rich_help_panel=ADMINISTER)
+app.add_typer(config_app, name="config", rich_help_panel=ADMINISTER)
 
 
-@station_app.command("check")
-def station_check(file: Annotated[str, typer.Argument(help="Station file.")]) -> None:
+@station_app.command("check", cls=about("--station"))
+def station_check(station: StationOption, as_json: JsonOption = False) -> None:
     """Check a station file; says what is wrong with it, or nothing is."""
     from wetwell.services.stations import find_station
 
-    typer.echo(f"{file}: station '{find_station(file).name}' is valid")
+    found = find_station(station)
+    if as_json:
+        print_result({"file": station, "station": found.name, "title": found.title, "is_valid": True}, as_json=True)
+    else:
+        titled = "" if found.title is None else f", {found.title},"
+        typer.echo(f"{station}: station '{found.name}'{titled} is valid")
 
 
-@station_app.command("show")
+@station_app.command("show", cls=about("--station"))
 def station_show(
-    file: Annotated[str, typer.Argument(help="Station file, or the name of a built-in station.")],
+    station: StationOption,
     signals: Annotated[
         str | None,
         typer.Option("--signals", help="Say what can be told apart by them: level, inflow, flow, head, power."),
@@ -58,36 +64,52 @@ def station_show(
     from wetwell.services.stations import find_station
     from wetwell.simulator.duty import duty_table
 
-    station = find_station(file)
+    plant = find_station(station)
     if signals is None and recording is None:
-        return print_result(duty_table(station), as_json=as_json)
+        return print_result(duty_table(plant), as_json=as_json)
     from wetwell.services.batch.isolability import isolability_of
     from wetwell.services.reports.isolability_table import isolability_table
 
     given = None if signals is None else signals_named(signals, "--signals")
-    told = isolability_of(station, given, recording, Reading.said(time_zone, as_station=as_station))
-    return print_result(isolability_table(station, told, as_json=as_json), as_json=as_json)
+    told = isolability_of(plant, given, recording, reading_of(time_zone, as_station=as_station))
+    return print_result(isolability_table(plant, told, as_json=as_json), as_json=as_json)
 
 
-@config_app.command("check")
-def config_check(file: Annotated[Path, typer.Argument(help="TOML file with settings.")]) -> None:
+@config_app.command("check", cls=about("--config"))
+def config_check(
+    config: Annotated[Path, typer.Option("--config", metavar="FILE", help="TOML file with settings.")],
+    as_json: JsonOption = False,
+) -> None:
     """Check a file with settings."""
-    load_settings(file)
-    typer.echo(f"{file}: settings are valid")
+    from wetwell.services.runtime.settings import load_settings
+
+    load_settings(config)
+    if as_json:
+        print_result({"file": str(config), "is_valid": True}, as_json=True)
+    else:
+        typer.echo(f"{config}: settings are valid")
 
 
-@config_app.command("show")
-def config_show(config: ConfigOption = None) -> None:
+@config_app.command("show", cls=about("--config"))
+def config_show(
+    config: ConfigOption = None,
+    as_json: JsonOption = True,  # noqa: ARG001 - they are printed as JSON whether or not it is asked for
+) -> None:
     """Print the settings that are in force, as JSON."""
+    from wetwell.services.runtime.settings import load_settings
+
     typer.echo(load_settings(config).model_dump_json(indent=2))
 
 
-@app.command("modbus-map")
+@app.command("modbus-map", cls=about("--station"), rich_help_panel=ADMINISTER)
 def modbus_map(
     station: StationOption = "alpha",
-    form: Annotated[Literal["csv"], typer.Option("--format", help="Form of the map.")] = "csv",  # noqa: ARG001
+    form: Annotated[Literal["csv", "json"], typer.Option("--format", help="Form of the map.")] = "csv",
+    as_json: JsonOption = False,
 ) -> None:
     """Print the register map of a station's Modbus server."""
+    from dataclasses import asdict
+
     from wetwell.protocols.modbus.registers import register_csv, register_table
     from wetwell.services.stations import find_station
     from wetwell.simulator.simulation import check_driven
@@ -97,10 +119,14 @@ def modbus_map(
         check_driven(plant)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    typer.echo(register_csv(register_table(len(plant.pump), len(plant.control.start_levels_m))), nl=False)
+    table = register_table(len(plant.pump), len(plant.control.start_levels_m))
+    if as_json or form == "json":
+        print_result({"registers": [asdict(register) for register in table]}, as_json=True)
+    else:
+        typer.echo(register_csv(table), nl=False)
 
 
-@app.command()
+@app.command(rich_help_panel=ADMINISTER)
 def effects(*, as_json: JsonOption = False) -> None:
     """List the effects that a station file may name, with their parameters."""
     from wetwell.services.reports.part_tables import effect_lines
@@ -113,7 +139,7 @@ def effects(*, as_json: JsonOption = False) -> None:
         typer.echo(effect_lines(table))
 
 
-@app.command()
+@app.command(rich_help_panel=ADMINISTER)
 def faults(*, as_json: JsonOption = False) -> None:
     """List the faults that a scenario may name, with their parameters."""
     from wetwell.simulator.faults import FAULTS
@@ -121,7 +147,7 @@ def faults(*, as_json: JsonOption = False) -> None:
     _print_parts("faults", FAULTS, as_json=as_json)
 
 
-@app.command()
+@app.command(rich_help_panel=ADMINISTER)
 def inflows(*, as_json: JsonOption = False) -> None:
     """List the inflow models that a scenario may name, with their parameters."""
     from wetwell.simulator.inflow import INFLOWS

@@ -1,21 +1,23 @@
 """Services that run until they are stopped."""
 
-import asyncio
-import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
+    RUN,
     AsStationOption,
     ConfigOption,
     JsonOption,
     ModbusOption,
     PageOption,
+    RecordingOption,
     ScenarioOption,
     SeedOption,
     SpeedOption,
+    StationNameOption,
     StationOption,
     TimeZoneOption,
     WordOrderOption,
@@ -24,16 +26,20 @@ from wetwell.services.commands.options import (
     parse_duration_s,
     positive,
     print_result,
+    reading_of,
     run,
     settings_of,
+    station_name,
     with_data,
 )
-from wetwell.services.runtime.settings import LogSettings, Settings
+
+if TYPE_CHECKING:
+    from wetwell.services.runtime.settings import Settings
 
 app = typer.Typer()
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RUN)
 def up(
     station: StationOption = "alpha",
     scenario: ScenarioOption = "demo",
@@ -54,14 +60,18 @@ def up(
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
     """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
-    from wetwell.services.reports.terminal import banner, line_printer
-    from wetwell.services.supervisor import serve_all
+    import tempfile
+
+    from wetwell.services.runtime.settings import LogSettings
 
     settings = settings_of(config, zenoh, modbus, word_order, page=page)
     if settings.log == LogSettings():
         settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
     limit_s = None if limit is None else parse_duration_s(limit)
     plant, speed = live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
+    from wetwell.services.reports.terminal import banner, line_printer
+    from wetwell.services.supervisor import serve_all
+
     live = [
         "--station",
         station,
@@ -82,7 +92,7 @@ def up(
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
         settings = with_data(settings, data, Path(folder))
-        show = line_printer(plant.station.pump_names, as_json=as_json)
+        show = line_printer(plant.station.pump_labels, as_json=as_json)
 
         def greet() -> None:
             if not as_json:
@@ -91,7 +101,7 @@ def up(
         run(settings, serve_all(settings, plant.station.name, commands, show, limit_s, greet))
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RUN)
 def simulator(
     station: StationOption = "alpha",
     scenario: ScenarioOption = "nominal",
@@ -117,7 +127,7 @@ def simulator(
     )
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RUN)
 def plc(
     station: StationOption = "alpha",
     scenario: ScenarioOption = "nominal",
@@ -134,7 +144,7 @@ def plc(
 
 
 detector_app = typer.Typer(invoke_without_command=True)
-app.add_typer(detector_app, name="detector")
+app.add_typer(detector_app, name="detector", rich_help_panel=RUN)
 
 
 @detector_app.callback()
@@ -150,11 +160,12 @@ def detector(
     """Judge the samples of stations on Zenoh and publish verdicts."""
     if context.invoked_subcommand is not None:
         return
-    from wetwell.services.detector.daemon import serve_detector
     from wetwell.services.stations import find_stations
 
-    settings = settings_of(config, zenoh)
-    run(settings, serve_detector(settings, find_stations(station or ["alpha"])))
+    settings, stations = settings_of(config, zenoh), find_stations(station or ["alpha"])
+    from wetwell.services.detector.daemon import serve_detector
+
+    run(settings, serve_detector(settings, stations))
 
 
 @detector_app.command()
@@ -168,31 +179,33 @@ def rebaseline(
     as_json: JsonOption = False,
 ) -> None:
     """Order a running detector to learn a pump anew, after a repair; what it knew is put aside."""
-    from wetwell.services.detector.client import send_order
+    import asyncio
+
     from wetwell.services.stations import find_station
 
-    name = find_station(station).name
-    settings = settings_of(config, zenoh)
+    settings, name = settings_of(config, zenoh), find_station(station).name
+    from wetwell.services.detector.client import send_order
+
     verdict = asyncio.run(send_order(settings, name, pump, "revert" if revert else "rebaseline", by))
     answer = {"station": name, "pump": pump, "state": verdict.state, "reason": verdict.evidence.get("reason")}
     print_result(answer | {"baseline": verdict.evidence.get("baseline")}, as_json=as_json)
 
 
-@detector_app.command()
+@detector_app.command(cls=about("--station"))
 def release(
-    station: Annotated[str, typer.Option("--station", metavar="NAME", help="Name of the station.")],
+    station: StationNameOption,
     config: ConfigOption = None,
 ) -> None:
     """Judge a station again, from the next start on, that was left out because the detector had crashed at it."""
+    kept = settings_of(config).detector
     from wetwell.services.detector.quarantine import Quarantine
 
-    kept = settings_of(config).detector
-    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(station)
+    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(station_name(station))
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=RUN)
 def replay(
-    recording: Annotated[Path, typer.Option("--recording", help="CSV, CSV.gz or Parquet.")],
+    recording: RecordingOption,
     station: StationOption,
     speed: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
     as_station: AsStationOption = False,
@@ -201,29 +214,29 @@ def replay(
     config: ConfigOption = None,
 ) -> None:
     """Publish a recording on Zenoh as if it were live, then end."""
-    from wetwell.protocols.recordings.reading import Reading
-    from wetwell.services.replay.daemon import serve_replay
     from wetwell.services.stations import find_station
 
     settings = settings_of(config, zenoh)
     plant = find_station(station)
-    rows = Reading.said(time_zone, as_station=as_station).read_of(recording, plant)
+    rows = reading_of(time_zone, as_station=as_station).read_of(recording, plant)
+    from wetwell.services.replay.daemon import serve_replay
+
     run(settings, serve_replay(settings, rows, plant.name, positive(speed, "--speed")))
 
 
-@app.command()
+@app.command(rich_help_panel=RUN)
 def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
     """Run a Zenoh router, for sites that have none."""
+    settings = settings_of(config, zenoh)
     from wetwell.services.router.daemon import serve_router
 
-    settings = settings_of(config, zenoh)
     run(settings, serve_router(settings))
 
 
 def _serve_plant(
-    settings: Settings, station: str, scenario: str, seed: int, speed: float | None, *, zenoh: bool, modbus: bool
+    settings: "Settings", station: str, scenario: str, seed: int, speed: float | None, *, zenoh: bool, modbus: bool
 ) -> None:
+    plant, speed = live_plant(station, scenario, seed, speed)
     from wetwell.services.simulator.daemon import serve_simulator
 
-    plant, speed = live_plant(station, scenario, seed, speed)
     run(settings, serve_simulator(settings, plant, speed, zenoh=zenoh, modbus=modbus))

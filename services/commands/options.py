@@ -1,29 +1,62 @@
 """What the commands share: options, settings from flags, how a result is printed."""
 
-import asyncio
-import contextlib
+import os
 import re
 import sys
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.station.table import Table
-from wetwell.services.runtime.settings import HistorianSettings, Settings, load_settings
+from wetwell.protocols.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
     from wetwell.protocols.quantities import SensedQuantity
+    from wetwell.protocols.recordings.reading import Reading
+    from wetwell.protocols.station.station_file import Station
+    from wetwell.protocols.station.table import Table
+    from wetwell.services.runtime.settings import Settings
     from wetwell.simulator.scenario import Scenario
     from wetwell.simulator.simulation import Simulation
 
+GROUPS = RUN, RECORD, JUDGE, GAP, OPERATE, ADMINISTER = "Run", "Record", "Judge", "Gap", "Operate", "Administer"
+"""Groups of commands in `wetwell --help`, in this order."""
+
+
+def built_in(kind: Literal["stations", "scenarios"]) -> Callable[[str], list[str]]:
+    """Completion of a name that comes with the package; a shell offers files where none fits."""
+
+    def names(incomplete: str) -> list[str]:
+        from importlib.resources import files
+
+        folder = files("wetwell.simulator") / kind
+        found = sorted(file.name.removesuffix(".toml") for file in folder.iterdir() if file.name.endswith(".toml"))
+        return [name for name in found if name.startswith(incomplete)]
+
+    return names
+
+
 StationOption = Annotated[
-    str, typer.Option("--station", metavar="FILE", help="Station file, or the name of a built-in station.")
+    str,
+    typer.Option(
+        "--station",
+        metavar="FILE",
+        help="Station file, or the name of a built-in station.",
+        autocompletion=built_in("stations"),
+    ),
+]
+StationNameOption = Annotated[
+    str, typer.Option("--station", metavar="NAME", help="Name of the station, or its station file.")
 ]
 ScenarioOption = Annotated[
-    str, typer.Option("--scenario", metavar="NAME", help="Built-in scenario, or a scenario file.")
+    str,
+    typer.Option(
+        "--scenario",
+        metavar="NAME",
+        help="Built-in scenario, or a scenario file.",
+        autocompletion=built_in("scenarios"),
+    ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
 SpeedOption = Annotated[
@@ -40,7 +73,25 @@ PageOption = Annotated[
 WordOrderOption = Annotated[
     Literal["ABCD", "CDAB"] | None, typer.Option("--word-order", help="Word order of 32-bit values on Modbus.")
 ]
-RecordingOption = Annotated[Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.")]
+
+
+def _there(path: Path) -> Path:
+    """Refuse a file that is not there, before what would read it is loaded."""
+    try:
+        path.stat()
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
+    return path
+
+
+def all_there(paths: list[Path] | None) -> list[Path] | None:
+    """Refuse files of which one is not there."""
+    return None if paths is None else [_there(path) for path in paths]
+
+
+RecordingOption = Annotated[
+    Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.", callback=_there)
+]
 TimeZoneOption = Annotated[
     str | None, typer.Option("--time-zone", metavar="ZONE", help="Of stamps that have none, such as Europe/Helsinki.")
 ]
@@ -85,8 +136,10 @@ def settings_of(
     word_order: Literal["ABCD", "CDAB"] | None = None,
     more: dict[str, Any] | None = None,
     page: str | None = None,
-) -> Settings:
+) -> "Settings":
     """Settings from file, environment and flags."""
+    from wetwell.services.runtime.settings import load_settings
+
     flags: dict[str, Any] = dict(more or {})
     if zenoh is not None:
         flags["zenoh"] = {"endpoint": zenoh}
@@ -99,8 +152,10 @@ def settings_of(
     return load_settings(config, flags)
 
 
-def with_data(settings: Settings, data: Path | None, otherwise: Path) -> Settings:
+def with_data(settings: "Settings", data: Path | None, otherwise: Path) -> "Settings":
     """Settings whose daemons keep all they know in `data`, or, where nothing says where, in `otherwise`."""
+    from wetwell.services.runtime.settings import HistorianSettings
+
     folder = data or otherwise
     if data is not None or settings.historian == HistorianSettings():
         settings = with_history(settings, folder)
@@ -112,7 +167,7 @@ def with_data(settings: Settings, data: Path | None, otherwise: Path) -> Setting
     return settings.model_copy(update=changes)
 
 
-def with_history(settings: Settings, folder: Path | None) -> Settings:
+def with_history(settings: "Settings", folder: Path | None) -> "Settings":
     """Settings with another folder of the history, if one is given."""
     if folder is None:
         return settings
@@ -149,6 +204,37 @@ def live_plant(station: str, scenario: str, seed: int, speed: float | None) -> t
     return plant_of(station, plan, seed, this_second_ns() if speed == 1.0 else DEFAULT_START_NS), speed
 
 
+def reading_of(time_zone: str | None, *, as_station: bool) -> "Reading":
+    """How a recording is taken up, as flags say."""
+    from wetwell.protocols.recordings.reading import Reading
+
+    return Reading.said(time_zone, as_station=as_station)
+
+
+def station_if(name: str | None) -> "Station | None":
+    """Station of this name or file, if one is given."""
+    if name is None:
+        return None
+    from wetwell.services.stations import find_station
+
+    return find_station(name)
+
+
+def station_name(name_or_file: str) -> str:
+    """Name of a station, which may be given by its station file.
+
+    Examples
+    --------
+    >>> station_name("north")
+    'north'
+    """
+    if not name_or_file.endswith(".toml"):
+        return name_or_file
+    from wetwell.protocols.station.station_file import load_station
+
+    return load_station(Path(name_or_file)).name
+
+
 def signals_named(text: str, flag: str) -> tuple["SensedQuantity", ...]:
     """Quantities of signals in a list with commas, which may be empty.
 
@@ -170,6 +256,11 @@ def signals_named(text: str, flag: str) -> tuple["SensedQuantity", ...]:
     return tuple(quantity for name, quantity in SIGNALS.items() if name in named)
 
 
+def cores() -> int:
+    """Processes at once where no flag says how many."""
+    return os.cpu_count() or 1
+
+
 def positive(value: float, flag: str) -> float:
     """The value of a flag that must be positive."""
     if not 0.0 < value < float("inf"):
@@ -177,8 +268,11 @@ def positive(value: float, flag: str) -> float:
     return value
 
 
-def run(settings: Settings, daemon: Coroutine[Any, Any, None]) -> None:
+def run(settings: "Settings", daemon: Coroutine[Any, Any, None]) -> None:
     """Run a service until it ends, with its logs on standard error and its health page if the settings ask for it."""
+    import asyncio
+    import contextlib
+
     from wetwell.services.runtime.health.board import BOARD
     from wetwell.services.runtime.health.page import health_page
     from wetwell.services.runtime.logs import start_logging

@@ -1,14 +1,15 @@
 """Recordings: made, prepared, converted, summed up."""
 
-import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import Annotated, Literal, cast
 
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.recordings.reading import Reading
+from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
+    GAP,
+    RECORD,
     AsStationOption,
     JsonOption,
     PreparationOption,
@@ -18,14 +19,15 @@ from wetwell.services.commands.options import (
     SeedOption,
     StationOption,
     TimeZoneOption,
+    all_there,
+    cores,
     plant_of,
     positive,
     print_batch,
     print_result,
+    reading_of,
+    station_if,
 )
-
-if TYPE_CHECKING:
-    from wetwell.protocols.station.station_file import Station
 
 app = typer.Typer()
 
@@ -34,7 +36,7 @@ StationCheckOption = Annotated[
 ]
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RECORD)
 def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
     station: StationOption,
@@ -44,18 +46,20 @@ def simulate(
     as_json: JsonOption = False,
 ) -> None:
     """Write a simulated recording, with truth columns."""
-    from wetwell.services.batch.recordings import simulate as write
     from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 
+    given_s = None if days is None else positive(days, "--days") * 86_400.0
     plant = plant_of(station, find_scenario(scenario), seed, DEFAULT_START_NS)
-    length_s = plant.scenario.duration_s if days is None else positive(days, "--days") * 86_400.0
+    length_s = plant.scenario.duration_s if given_s is None else given_s
+    from wetwell.services.batch.recordings import simulate as write
+
     rows = write(plant, max(round(length_s), 1), out)
     summary = {"recording": str(out), "rows": rows, "station": plant.station.name, "seed": seed}
     print_result(summary, as_json=as_json)
 
 
-@app.command()
+@app.command(cls=about("--station"), rich_help_panel=RECORD)
 def dataset(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")
@@ -77,26 +81,32 @@ def dataset(
     as_json: JsonOption = False,
 ) -> None:
     """Make a balanced, labelled set of recordings over sampled stations and faults; run again to resume."""
-    from wetwell.services.batch.dataset import check_dataset, make_dataset, plan_of
     from wetwell.services.batch.executors import check_scheduler
     from wetwell.services.stations import find_station
 
     if (out is None) == (check is None):
         raise ConfigError("dataset: give either --out DIR or --check DIR")
     if check is not None:
+        from wetwell.services.batch.dataset import check_dataset
+
         return print_result(check_dataset(check), as_json=as_json)
     check_scheduler(scheduler)
     if not station:
         raise ConfigError("dataset: give at least one --station FILE")
     bases = [find_station(name) for name in station]
+    from wetwell.services.batch.dataset import make_dataset, plan_of
+
     plan = plan_of(bases, seed, count, positive(days, "--days"), form)
-    processes = min(workers or os.cpu_count() or 1, count)
+    processes = min(workers or cores(), count)
     return print_batch(make_dataset(plan, cast("Path", out), processes, scheduler), as_json=as_json)
 
 
-@app.command()
+@app.command(cls=about("--source"), rich_help_panel=RECORD)
 def convert(
-    sources: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Export, of one file or of several.")],
+    sources: Annotated[
+        list[Path],
+        typer.Option("--source", metavar="FILE", help="File of the export; may be given again.", callback=all_there),
+    ],
     mapping: Annotated[
         Path | None, typer.Option("--mapping", metavar="FILE", help="TOML file: which tag is which signal.")
     ] = None,
@@ -123,7 +133,7 @@ def convert(
         return print_result(draft_mapping(sources, draft), as_json=as_json)
     out = cast("Path", out)
     if mapping is not None:
-        return print_result(convert_files(sources, mapping, out, _station(station)), as_json=as_json)
+        return print_result(convert_files(sources, mapping, out, station_if(station)), as_json=as_json)
     if len(sources) > 1:
         raise ConfigError(f"convert: got {len(sources)} files, without --mapping it takes one")
     recording = IMPORTERS[form](sources[0])
@@ -133,7 +143,7 @@ def convert(
     )
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=RECORD)
 def prepare(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
@@ -144,13 +154,13 @@ def prepare(
     as_json: JsonOption = False,
 ) -> None:
     """Prepare a recording from the field: units, offsets, order, doubles; list its gaps."""
+    reading, plant = reading_of(time_zone, as_station=as_station), station_if(station)
     from wetwell.services.batch.field_data import prepare_file
 
-    reading = Reading.said(time_zone, as_station=as_station)
-    print_result(prepare_file(recording, preparation, out, _station(station), reading), as_json=as_json)
+    print_result(prepare_file(recording, preparation, out, plant, reading), as_json=as_json)
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=GAP)
 def calibrate(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Station file that is written.")],
@@ -161,14 +171,15 @@ def calibrate(
     as_json: JsonOption = False,
 ) -> None:
     """Fit a station file to a recording, with intervals; says what the recording cannot tell."""
-    from wetwell.services.batch.field_data import calibrate_file
     from wetwell.services.stations import find_station
 
-    reading = Reading.said(time_zone, as_station=as_station)
-    print_result(calibrate_file(find_station(station), recording, preparation, out, reading), as_json=as_json)
+    reading, plant = reading_of(time_zone, as_station=as_station), find_station(station)
+    from wetwell.services.batch.field_data import calibrate_file
+
+    print_result(calibrate_file(plant, recording, preparation, out, reading), as_json=as_json)
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=GAP)
 def validate(
     recording: RecordingOption,
     station: StationOption,
@@ -188,15 +199,16 @@ def validate(
     as_json: JsonOption = False,
 ) -> None:
     """Compare a station file with a recording: row by row, and free-running where levels start the pumps."""
-    from wetwell.services.batch.field_data import validate_file
     from wetwell.services.stations import find_station
 
-    reading = Reading.said(time_zone, as_station=as_station)
-    plant, other = find_station(station), None if before is None else find_station(before)
+    reading = reading_of(time_zone, as_station=as_station)
+    plant, other = find_station(station), station_if(before)
+    from wetwell.services.batch.field_data import validate_file
+
     print_result(validate_file(plant, recording, preparation, out, html, reading, before=other), as_json=as_json)
 
 
-@app.command()
+@app.command(cls=about("--recording"), rich_help_panel=RECORD)
 def kpi(
     recording: RecordingOption,
     station: StationCheckOption = None,
@@ -208,14 +220,7 @@ def kpi(
     from wetwell.protocols.recordings.kpi import kpis
     from wetwell.services.reports.tables import kpi_table
 
-    reading, plant = Reading.said(time_zone, as_station=as_station), _station(station)
+    reading, plant = reading_of(time_zone, as_station=as_station), station_if(station)
     rows = reading.read(recording) if plant is None else reading.read_of(recording, plant)
-    print_result(kpi_table(kpis(rows), with_hours=as_json), as_json=as_json)
-
-
-def _station(name: str | None) -> "Station | None":
-    if name is None:
-        return None
-    from wetwell.services.stations import find_station  # brings the compiled simulator, which takes seconds
-
-    return find_station(name)
+    labels = () if plant is None else plant.pump_labels
+    print_result(kpi_table(kpis(rows), labels, with_hours=as_json), as_json=as_json)

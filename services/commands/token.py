@@ -7,8 +7,7 @@ import typer
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.options import ConfigOption, JsonOption, print_result
-from wetwell.services.runtime.settings import load_settings
-from wetwell.services.security.tokens import Role
+from wetwell.services.security.role import Role
 
 app = typer.Typer(no_args_is_help=True, help="Tokens of people and programs that use the dashboard.")
 
@@ -60,6 +59,8 @@ def revoke(name: NameOption, file: FileOption = None, config: ConfigOption = Non
 
 
 def _file(file: Path | None, config: Path | None) -> Path:
+    from wetwell.services.runtime.settings import load_settings
+
     path = file or load_settings(config).security.tokens_file
     if path is None:
         raise ConfigError("no file of tokens: give --file, or set security.tokens_file")

@@ -12,7 +12,7 @@ import numpy as np
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import Block
-from wetwell.detector.verdict.maintenance import Costs
+from wetwell.detector.verdict.costs import Costs
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import verdict_key
 from wetwell.protocols.messages.decoding import SampleMessage, decoded

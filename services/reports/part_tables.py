@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from inspect import cleandoc
+from textwrap import fill
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+
+from wetwell.services.reports.text_table import SCREEN_WIDTH
 
 _LIMITS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 
@@ -46,11 +49,11 @@ def part_lines(rows: Sequence[Mapping[str, Any]]) -> str:
     """
     lines = []
     for row in rows:
-        lines += [row["kind"], f"  {row['summary']}"]
+        lines += [row["kind"], _indented(row["summary"])]
         for parameter in row["parameters"]:
             default = "must be given" if parameter["default"] is None else parameter["default"]
             allowed = f" ({parameter['range']})" if parameter["range"] else ""
-            lines.append(f"  {parameter['name']}: {default}{allowed}")
+            lines.append(_indented(f"{parameter['name']}: {default}{allowed}"))
     return "\n".join(lines)
 
 
@@ -67,15 +70,19 @@ def effect_lines(table: Sequence[Mapping[str, Any]]) -> str:
     """
     lines = []
     for row in table:
-        lines += [f"{row['name']} ({row['component']})", f"  {row['summary']}"]
+        lines += [f"{row['name']} ({row['component']})", _indented(row["summary"])]
         for parameter in row["parameters"]:
             allowed = f"{parameter['low']:g} to {parameter['high']:g}" if "low" in parameter else "any"
             allowed = ", ".join(parameter["choices"]) if "choices" in parameter else allowed
             unit = f" [{parameter['unit']}]" if "unit" in parameter else ""
             value = parameter.get("default")
             default = "" if value is None else f", default {value if isinstance(value, str) else format(value, 'g')}"
-            lines.append(f"  {parameter['name']}: {allowed}{unit}{default}")
+            lines.append(_indented(f"{parameter['name']}: {allowed}{unit}{default}"))
     return "\n".join(lines)
+
+
+def _indented(text: str) -> str:
+    return fill(text, SCREEN_WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
 def _default(field: FieldInfo) -> Any:

@@ -3,9 +3,11 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from wetwell.protocols.recordings.kpi import Kpis
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.reports.text_table import SCREEN_WIDTH, text_table
 
 
 def as_json(value: object) -> str:
@@ -34,25 +36,28 @@ def as_lines(result: Mapping[str, object], indent: str = "") -> str:
         if isinstance(value, Mapping):
             lines += [f"{indent}{key}:", as_lines(value, indent + "  ")]
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            lines += [f"{indent}{key}:", *_rows(value, indent + "  ")]
+            table = text_table(value, SCREEN_WIDTH - len(indent) - 2)
+            lines += [f"{indent}{key}:", *(f"{indent}  {line}" for line in table)]
         else:
             lines.append(f"{indent}{key}: {value}")
     return "\n".join(lines)
 
 
-def _rows(tables: Sequence[Mapping[str, object]], indent: str) -> list[str]:
-    cells = [list(tables[0]), *([str(value) for value in table.values()] for table in tables)]
-    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
-    return [indent + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in cells]
+def kpi_table(figures: Kpis, labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:
+    """Figures of a recording by day and in total, and by hour where asked for; what is not known is None.
 
-
-def kpi_table(figures: Kpis, *, with_hours: bool) -> dict[str, object]:
-    """Figures of a recording by day and in total, and by hour where asked for; what is not known is None."""
+    Parameters
+    ----------
+    figures : Kpis
+    labels : sequence of str
+        What people call the pumps, where their station is known.
+    with_hours : bool
+    """
     pumps = range(len(figures.starts))
     days = [
         {
             "day": to_iso(day_ns)[:10],
-            "pump": pump + 1,
+            **_named(pump, labels),
             "starts": int(figures.daily_starts[pump, day]),
             "run_h": _figure(figures.daily_run_h[pump, day]),
             "volume_m3": _figure(figures.daily_volume_m3[pump, day]),
@@ -64,7 +69,7 @@ def kpi_table(figures: Kpis, *, with_hours: bool) -> dict[str, object]:
     ]
     totals = [
         {
-            "pump": pump + 1,
+            **_named(pump, labels),
             "starts": int(figures.starts[pump]),
             "run_h": _figure(figures.run_h[pump]),
             "volume_m3": _figure(figures.volume_m3[pump]),
@@ -88,12 +93,14 @@ def kpi_table(figures: Kpis, *, with_hours: bool) -> dict[str, object]:
         "energy_kwh": _figure(figures.energy_kwh.sum()),
         "specific_energy_kwh_m3": _figure(figures.station_specific_energy_kwh_m3),
     }
-    unseen = f"starts and stops between two rows, of which there is one in {figures.step_s:g} s"
-    return (
-        {"days": days, "totals": totals, "station": station}
-        | ({"not_seen": unseen} if figures.step_s > ONE_SAMPLE_S else {})
-        | ({"hours": hours} if with_hours else {})
-    )
+    table: dict[str, object] = {"days": days, "totals": totals, "station": station}
+    if figures.step_s > ONE_SAMPLE_S:
+        table["not_seen"] = f"starts and stops between two rows, of which there is one in {figures.step_s:g} s"
+    return table | ({"hours": hours} if with_hours else {})
+
+
+def _named(pump: int, labels: Sequence[str]) -> dict[str, Any]:
+    return {"pump": pump + 1} | ({"name": labels[pump]} if pump < len(labels) else {})
 
 
 def _figure(value: float) -> float | None:

@@ -28,7 +28,7 @@ def banner(settings: Settings, station: Station, scenario: str, speed: float) ->
     page = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     order = "-B " if modbus.word_order == "ABCD" else ""
     return f"""\
-wetwell: station '{station.name}', {len(station.pump)} pumps, scenario '{scenario}', {speed:g} times as fast as life
+wetwell: station {station.label}, {len(station.pump)} pumps, scenario '{scenario}', {speed:g} times as fast as life
 
 Page         http://{page}
 

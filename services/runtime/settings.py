@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, IPvAnyNetwork, SecretStr, ValidationError, model_validator
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
-from wetwell.detector.verdict.maintenance import Costs
+from wetwell.detector.verdict.costs import Costs
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.messages.alarm import Priority, RuleName
 from wetwell.protocols.modbus.registers import WordOrder

@@ -9,7 +9,7 @@ import hmac
 import os
 import secrets
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, get_args
 
 import tomli_w
 from pydantic import Field, ValidationError
@@ -18,9 +18,7 @@ from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
 from wetwell.protocols.station.table import Table
-
-Role = Literal["viewer", "operator"]
-"""A viewer may look, an operator may also act. Later ones may all that earlier ones may."""
+from wetwell.services.security.role import Role
 
 PREFIX = "wetwell_"
 """By it, a search for secrets finds a token that was left in a file."""

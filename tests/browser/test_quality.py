@@ -11,7 +11,8 @@ pytestmark = pytest.mark.check
 INK = """nodes => nodes.filter(node => {
   const ink = getComputedStyle(document.body).color;
   const style = getComputedStyle(node);
-  return node.textContent.trim() && node.checkVisibility() && (style.fill === ink || (!(node instanceof SVGElement) && style.color === ink));
+  const shown = node instanceof SVGElement ? style.fill : style.color;
+  return node.textContent.trim() && node.checkVisibility() && shown === ink;
 }).map(node => node.textContent.trim())"""
 """Texts that stand in full ink."""
 

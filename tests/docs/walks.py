@@ -80,6 +80,7 @@ WALKS = (
         services=("wetwell dashboard",),
         left_out={"WETWELL_SECURITY__TOKENS_FILE": "opens a port to the network; test_dashboard.py"},
     ),
+    Walk(("docs/command-line.md",)),
     Walk(("docs/convert.md",)),
     Walk(("docs/tutorial-your-own-export.md",)),
     Walk(("docs/gateway.md",), before=("wetwell plc",), patient=("wetwell gateway read",)),

@@ -43,7 +43,7 @@ class RunDetector(ABC):
         if self._begin_ns is None and len(block.time_ns):
             self._begin_ns = int(block.time_ns[0])
         verdicts = list[Verdict]()
-        for stop in self._runs.stops(block):
+        for stop in self._runs.stops(block.in_one_piece()):
             if stop == Stop.RUNS_ENDED:
                 verdicts += [self._judge(run, self._runs.now_ns) for run in self._runs.ended_runs()]
         return verdicts

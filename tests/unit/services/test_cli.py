@@ -175,7 +175,7 @@ BAD_STATIONS = {
         ["simulator", "--station", "{station}"],
         ["plc", "--station", "{station}"],
         ["detector", "--station", "{station}"],
-        ["validate", "--recording", "{tmp}/none.csv", "--station", "{station}"],
+        ["validate", "--recording", "{station}", "--station", "{station}"],
     ],
     ids=" ".join,
 )
@@ -336,3 +336,25 @@ def test_the_duty_points_tell_pumps_and_mains_by_name(run_wetwell, capsys) -> No
     assert [row["name"] for row in table["each_pump_alone"]] == ["1.1", "2.1", "1.2", "2.2"]
     alone, together = table["each_pump_alone"], table["all_pumps_together"]
     assert all(one["flow_m3h"] > both["flow_m3h"] for one, both in zip(alone, together, strict=True))
+
+
+def test_names_for_people_stand_beside_the_keys(
+    run_wetwell: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "sued.toml"
+    pump = "{curve = [36.0, -0.02, -1.0e-4]}"
+    file.write_text(f'name = "sued"\ntitle = "Pumpwerk Süd"\nsump.area_m2 = 8.0\npump = [{pump}, {pump}, {pump}]\n')
+    assert run_wetwell("station", "check", file) == 0
+    assert capsys.readouterr().out == f"{file}: station 'sued', Pumpwerk Süd, is valid\n"
+    assert run_wetwell("station", "show", file, "--json") == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert (shown["station"], shown["title"]) == ("sued", "Pumpwerk Süd")
+    assert [pump["name"] for pump in shown["each_pump_alone"]] == [f"Pumpwerk Süd {number}" for number in (1, 2, 3)]
+    recording = tmp_path / "day.csv"
+    assert run_wetwell("simulate", file, "--days", 0.02, "--out", recording) == 0
+    capsys.readouterr()
+    assert run_wetwell("kpi", recording, "--station", file, "--json") == 0
+    totals = json.loads(capsys.readouterr().out)["totals"]
+    assert [(row["pump"], row["name"]) for row in totals] == [
+        (number, f"Pumpwerk Süd {number}") for number in (1, 2, 3)
+    ]

@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
+from wetwell.detector.curves.datasheet import datasheet_of
+from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks, switched_rows
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.stations import find_scenario
+from wetwell.simulator.simulation import Simulation
 
 STEP_NS = 900 * NS_PER_S
 
@@ -54,3 +58,16 @@ def test_only_means_have_such_rows(value):
 def test_blocks_hand_them_on():
     (block,) = blocks(stored(pump1_frequency_hz=[0, 50, 50, 50, 0]), 1)
     assert block.is_switched[:, 0].astype(int).tolist() == [0, 1, 0, 1, 0]
+
+
+def test_a_block_cut_out_of_a_larger_table_is_judged_as_one_that_stands_alone(alpha):
+    recording = Simulation(alpha, find_scenario("demo"), 3).advance(4 * 3600)
+    datasheet = datasheet_of(alpha)
+    alone, cut_out = Detector("alpha", datasheet), Detector("alpha", datasheet)
+    for block in blocks(recording, datasheet.pumps):
+        wide = np.zeros((len(block.seq), 2 * block.values.shape[1]))
+        wide[:, ::2] = block.values
+        other = block._replace(values=wide[:, ::2], time_ns=np.repeat(block.time_ns, 2)[::2])
+        assert cut_out.update_block(other) == alone.update_block(block)
+    assert cut_out.counts == alone.counts
+    assert cut_out.snapshot() == alone.snapshot()

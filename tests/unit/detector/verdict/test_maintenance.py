@@ -5,7 +5,8 @@ from typing import get_args
 
 import pytest
 
-from wetwell.detector.verdict.maintenance import Costs, advice, expected_costs
+from wetwell.detector.verdict.costs import Costs
+from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.protocols.messages.verdict import State
 
 COSTS = Costs(

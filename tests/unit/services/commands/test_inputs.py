@@ -1,0 +1,143 @@
+"""Inputs of commands: by an option of their name, and the first also without it; both say the same."""
+
+import json
+import os
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+import typer
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wetwell.services.cli import app
+from wetwell.services.commands.inputs import named_words
+
+RECORDING = """time,level_m,pump1_frequency_hz,pump1_flow_m3h,pump1_head_m,pump1_running
+2025-01-01T00:00:00Z,1.0,50,100,20,1
+2025-01-01T00:00:01Z,1.0,50,100,20,1
+"""
+
+
+def commands(command=None, name="wetwell"):
+    """(name, command) of all that can be run, as the command line has them."""
+    command = command or typer.main.get_command(app)
+    children = getattr(command, "commands", {})
+    if not children or command.invoke_without_command:
+        yield name, command
+    for child, inner in children.items():
+        yield from commands(inner, f"{name} {child}")
+
+
+WORDS = st.text(alphabet="abc.=/1", min_size=1, max_size=5)
+
+
+@given(words=st.lists(st.tuples(st.sampled_from(["bare", "valued", "flag"]), WORDS), max_size=8))
+def test_only_words_that_stand_alone_are_named(words):
+    given_words, named = [], []
+    for kind, word in words:
+        line = {"bare": [word], "valued": ["--seed", word], "flag": ["--json"]}[kind]
+        given_words += line
+        named += ["--recording", *line] if kind == "bare" else line
+    assert list(named_words(given_words, "--recording", {"--seed", "--recording"})) == named
+    assert list(named_words(named, "--recording", {"--seed", "--recording"})) == named
+
+
+def test_the_input_may_stand_first_last_or_by_name(run_wetwell, tmp_path: Path, capsys):
+    path = tmp_path / "field.csv"
+    path.write_text(RECORDING)
+    said = []
+    for words in (["--recording", path], [path], [f"--recording={path}"]):
+        for line in ([*words, "--json"], ["--json", *words]):
+            assert run_wetwell("kpi", *line) == 0
+            said.append(capsys.readouterr().out)
+    assert len(set(said)) == 1
+    assert json.loads(said[0])["totals"][0]["pump"] == 1
+
+
+def test_an_input_that_is_given_twice_is_refused(run_wetwell, capsys):
+    assert run_wetwell("station", "check", "alpha", "--station", "twin") == 2
+    assert "'--station' is given 2 times" in " ".join(capsys.readouterr().err.split())
+
+
+def test_several_of_an_input_that_may_be_given_again_stand_without_name(run_wetwell, tmp_path, capsys):
+    assert run_wetwell("convert", tmp_path / "a.csv", "--draft", tmp_path / "m.toml", tmp_path / "b.csv") == 2
+    assert capsys.readouterr().err == f"wetwell: {tmp_path}/a.csv: cannot be read: No such file or directory\n"
+
+
+def test_a_station_on_the_bus_may_be_named_by_its_file(run_wetwell, tmp_path, capsys):
+    file = tmp_path / "x.toml"
+    file.write_text('name = "north"\nsump.area_m2 = 8.0\npump = [{curve = [36.0, -0.02, -1.0e-4]}]\n')
+    recording = tmp_path / "field.csv"
+    recording.write_text(RECORDING)
+    data = tmp_path / "history"
+    assert run_wetwell("import", recording, "--station", file, "--data", data, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["station"] == "north"
+    assert run_wetwell("export", file, "--data", data, "--out", tmp_path / "out.csv", "--json") == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "recording": str(tmp_path / "out.csv"),
+        "station": "north",
+        "rows": 2,
+    }
+
+
+SILENT = {
+    "wetwell simulator", "wetwell plc", "wetwell replay", "wetwell router", "wetwell detector", "wetwell gateway",
+    "wetwell alarms", "wetwell historian", "wetwell dashboard", "wetwell fleet",
+    "wetwell detector release", "wetwell token revoke",
+}  # fmt: skip
+"""Daemons, whose logs are on standard error, and two commands that print nothing."""
+
+
+def test_whatever_prints_a_result_prints_it_as_json():
+    plain = {name for name, command in commands() if not any("--json" in option.opts for option in command.params)}
+    assert plain == SILENT
+
+
+def test_an_input_has_one_name_everywhere():
+    meanings = {"--station", "--recording", "--scenario", "--config", "--plc", "--alarm", "--source", "--stations"}
+    arguments = [(name, p.name) for name, c in commands() for p in c.params if p.param_type_name == "argument"]
+    assert arguments == []
+    subjects = {command.option for _, command in commands() if hasattr(command, "option")}
+    assert subjects <= meanings
+
+
+def test_help_shows_the_groups_in_order(run_wetwell, capsys):
+    assert run_wetwell("--help") == 0
+    lines = capsys.readouterr().out.splitlines()
+    titles = [line.strip("╭─╮ ") for line in lines if line.startswith("╭")]
+    assert titles == ["Options", "Run", "Record", "Judge", "Gap", "Operate", "Administer"]
+
+
+def test_the_version_is_that_of_the_package(run_wetwell, capsys):
+    assert run_wetwell("--version") == 0
+    assert capsys.readouterr().out == f"wetwell {version('wetwell')}\n"
+
+
+def test_the_command_line_loads_nothing_that_help_does_not_need():
+    heavy = ("asyncio", "numba", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "zenoh")
+    code = f"import sys, wetwell.services.cli; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"_WETWELL_COMPLETE": "complete_bash", "COMP_WORDS": "wetwell detect --station ", "COMP_CWORD": "3"},
+        {"_WETWELL_COMPLETE": "complete_zsh", "_TYPER_COMPLETE_ARGS": "wetwell detect --station "},
+        {
+            "_WETWELL_COMPLETE": "complete_fish",
+            "_TYPER_COMPLETE_ARGS": "wetwell detect --station ",
+            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        },
+    ],
+    ids=["bash", "zsh", "fish"],
+)
+def test_shells_complete_names_of_stations(environment):
+    program = Path(sys.executable).with_name("wetwell")
+    done = subprocess.run([program], env=os.environ | environment, capture_output=True, text=True, check=False)
+    assert "alpha" in done.stdout
+    assert "twin" in done.stdout
