@@ -23,7 +23,7 @@ def test_when_the_plc_dies_nothing_goes_on_in_black_and_absent_services_are_said
     expect(page.locator(".pump.runs").first).to_be_visible()
     expect(page.locator(".well .water")).to_have_attribute("data-quality", "good")
     # A fault of the main is the main's: its pumps stay calm.
-    expect(page.locator(".well .main.fault")).to_have_count(1, timeout=60_000)
+    expect(page.locator(".well .main.fault")).to_have_count(1, timeout=150_000)
     expect(page.locator("#station-state")).to_have_text("system fault")
     expect(page.locator(".cause")).to_have_text([re.compile("^rising main: ")])
     expect(page.locator(".pump.fault")).to_have_count(0)
@@ -78,4 +78,5 @@ def test_a_station_that_is_not_there_is_not_found(site, open_page) -> None:
     expect(page.locator(".panel").first).to_be_hidden()
     page.get_by_role("link", name="All stations").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("Stations")
+    expect(page.get_by_role("link", name="alpha")).to_be_visible()
     assert httpx.get(f"{site.url}/station/alpha").status_code == 200

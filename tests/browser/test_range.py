@@ -29,7 +29,7 @@ def faulty(site, browser):
     """The site, once pump 2 is told as blocked."""
     page = browser.new_page()
     page.goto(f"{site.url}/station/alpha?pump=2")
-    expect(page.locator('.pump[data-state="pump_fault"]')).to_be_visible(timeout=60_000)
+    expect(page.locator('.pump[data-state="pump_fault"]')).to_be_visible(timeout=150_000)
     page.close()
     return site
 
