@@ -159,6 +159,9 @@ def configurations() -> dict[str, Configuration]:
     both = faults(
         paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=148_000, after="clear"), clogging(0.25)
     )
+    cleared = faults(
+        paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=137_200, after="clear"), clogging(0.25)
+    )
     later = faults(paper, blockage(90_000, 0.4), *paper.fault[1:])
     slow = altered(alpha, sump=alpha.sump.model_dump(exclude_none=True) | {"area_m2": LONG_RUNS_AREA_M2})
     week = faults(
@@ -180,6 +183,7 @@ def configurations() -> dict[str, Configuration]:
         "noise AR(1) 0.95": Configuration(correlated, paper),
         "flow meters ±1 % over the day": Configuration(alpha, later, BiasedRecording, DAY_S),
         "both at once, 10 % of speed and friction +25 %": Configuration(alpha, both),
+        "a pump that is cleared while the main clogs": Configuration(alpha, cleared),
         "nominal": Configuration(alpha, nominal),
         "nominal, noise AR(1) 0.95, flow meters ±1 % over the day": Configuration(
             correlated, nominal, BiasedRecording, DAY_S

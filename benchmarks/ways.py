@@ -26,7 +26,6 @@ from wetwell.simulator.simulation import Simulation
 
 config.DISABLE_JIT = True  # for what is imported from here on
 
-from wetwell.detector.curves.datasheet import datasheet_of  # noqa: E402
 from wetwell.detector.detector import Detector  # noqa: E402
 from wetwell.sim2real.diagnosis.diagnosis import diagnose  # noqa: E402
 
@@ -86,7 +85,7 @@ def ways_of_samples(detector: Detector, simulation: Simulation) -> dict[str, dic
 def main() -> None:
     warnings.simplefilter("ignore", RuntimeWarning)  # of plain Python where compiled code divides by zero in silence
     station = find_station("alpha")
-    detector = Detector(station.name, datasheet_of(station))
+    detector = Detector.of(station)
     main_of = station.rising_main
     rough = main_of.model_copy(update={"friction_h2_m5": 1.2 * main_of.friction_h2_m5})
     recording = Simulation(station, Scenario(name="healthy"), SEED).advance(DIAGNOSED_S, truth=False)

@@ -1,9 +1,10 @@
 """The detector of one station: samples in, verdicts out; the same for a live stream and for a recording."""
 
 from collections.abc import Iterator
+from typing import Self
 
 from wetwell.detector.baseline.model import Baseline
-from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.curves.datasheet import Datasheet, datasheet_of
 from wetwell.detector.inference.prior import SystemPrior
 from wetwell.detector.pump_judge import Judgement, PumpJudge
 from wetwell.detector.runs.run import Run
@@ -12,10 +13,12 @@ from wetwell.detector.snapshot.codec import decode_snapshot, encode_snapshot
 from wetwell.detector.stream.block import Block, LiveBlock
 from wetwell.detector.stream.gate import gate_counts
 from wetwell.detector.stream.loop import Stop
-from wetwell.detector.verdict.costs import Costs
+from wetwell.detector.verdict.asset_faults import StageRules
 from wetwell.detector.verdict.evidence import rolling_evidence
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.station.costs import Costs
+from wetwell.protocols.station.station_file import Station
 
 
 class Detector:
@@ -38,16 +41,27 @@ class Detector:
     datasheet : Datasheet
         Datasheet curves.
     costs : Costs, optional
-        For the expected cost of each act.
+        For the expected cost of each act, where the station has none of its own.
+    rules : StageRules, optional
+        Limits and costs of the station.
     """
 
-    def __init__(self, station: str, datasheet: Datasheet, costs: Costs | None = None) -> None:
+    def __init__(
+        self, station: str, datasheet: Datasheet, costs: Costs | None = None, rules: StageRules | None = None
+    ) -> None:
+        rules = rules or StageRules()
         self._station = station
         self._datasheet = datasheet
         self._runs = RunTracker(datasheet)
         self._live = LiveBlock(datasheet.pumps)
         self._systems = [SystemPrior() for _ in datasheet.mains]
-        self._judges = [PumpJudge(pump, datasheet, costs or Costs()) for pump in range(datasheet.pumps)]
+        costs = rules.costs or costs or Costs()
+        self._judges = [PumpJudge(pump, datasheet, costs, rules) for pump in range(datasheet.pumps)]
+
+    @classmethod
+    def of(cls, station: Station, costs: Costs | None = None) -> Self:
+        """The detector of a station, by its file; `costs` where the file has none."""
+        return cls(station.name, datasheet_of(station), costs, StageRules(station.limits, station.costs))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -185,6 +199,10 @@ class Detector:
         tests = self._runs.rolling_tests(pump)
         if tests is not None:
             judgement.evidence["rolling_f_test"] = rolling_evidence(tests, self._runs.strongest_log_p(pump))
+        faults = judgement.faults
+        if faults is None:
+            faults = self._judges[pump].faults(self._system(pump))
+        worst = faults[0] if faults else None
         return Verdict(
             time=time_ns,
             station=self._station,
@@ -194,4 +212,9 @@ class Detector:
             evidence=judgement.evidence,
             onset=judgement.onset_ns,
             window=judgement.window_ns,
+            asset=None if worst is None else worst.asset,
+            stage=None if worst is None else worst.stage,
+            severity=None if worst is None else worst.severity,
+            trend=None if worst is None else worst.trend,
+            faults=faults,
         )

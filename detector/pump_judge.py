@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,20 +21,21 @@ from wetwell.detector.inference.posterior import (
     SYSTEM_FAULT,
     Posterior,
     fault_scales,
-    posterior_of,
 )
-from wetwell.detector.inference.prior import SystemPrior, joint_prior, update_prior
+from wetwell.detector.inference.prior import SystemPrior, update_prior
+from wetwell.detector.inference.weighing import OperatingPoint, Weighed, believe, weigh
 from wetwell.detector.pump_memory import PumpMemory
 from wetwell.detector.runs.run import Run, Segments
-from wetwell.detector.sensors.sensor_faults import doubtful_sensors, in_words, silencing_sensors
+from wetwell.detector.sensors.sensor_faults import WAYS, doubtful_sensors, in_words, silencing_sensors
 from wetwell.detector.statistics.robust import median
 from wetwell.detector.stream.run_state import NEEDED
 from wetwell.detector.stream.steady_samples import NO_FLOW_SHARE, SEGMENT_SAMPLES
-from wetwell.detector.verdict.costs import Costs
+from wetwell.detector.verdict.asset_faults import AssetFaults, StageRules
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.detector.verdict.severity import severity
-from wetwell.protocols.messages.verdict import State
+from wetwell.protocols.messages.verdict import AssetFault, State
+from wetwell.protocols.station.costs import Costs
 
 EARLY_PROBABILITY = 0.999
 EARLY_SEGMENTS = 2
@@ -55,6 +57,8 @@ class Judgement:
     window_ns: tuple[int, int]
     probability: Mapping[State, float]
     evidence: dict[str, Any]
+    faults: tuple[AssetFault, ...] | None = None
+    """Those that stand, where they are not those that are remembered."""
 
 
 class PumpJudge:
@@ -68,9 +72,11 @@ class PumpJudge:
         Of the station.
     costs : Costs
         For the expected cost of each act.
+    rules : StageRules
+        By which faults are staged.
     """
 
-    def __init__(self, pump: int, datasheet: Datasheet, costs: Costs) -> None:
+    def __init__(self, pump: int, datasheet: Datasheet, costs: Costs, rules: StageRules) -> None:
         self.memory = PumpMemory()
         self._pump = pump
         self._datasheet = datasheet
@@ -78,6 +84,11 @@ class PumpJudge:
         self._friction_h2_m5 = datasheet.main_of(pump).friction_h2_m5
         self._needed = NEEDED | {"level_m"} if datasheet.main_of(pump).level_slope else NEEDED
         self._costs = costs
+        self._faults = AssetFaults(pump, datasheet, rules)
+
+    def faults(self, system: SystemPrior) -> tuple[AssetFault, ...]:
+        """Faults of the pump, its main and its meters that stand, the worst first."""
+        return self._faults.told(self.memory.prior.asset, system.asset, self.memory.wrong_meters)
 
     def tell(self, time_ns: int, reason: str) -> Judgement:
         """What was told last, with the reason why it is told again."""
@@ -169,7 +180,8 @@ class PumpJudge:
         if is_dry and math.isfinite(reference.drawdown.mean):
             return None  # the drawdown will tell at the end of the run whether the flow meter is dead
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
-        posterior = self._posterior(run, reference, system, evidence)
+        weighed = self._weigh(run, reference, system, evidence)
+        posterior = weighed.posterior
         state, remark = decide(posterior, float(median(run.head_m)))
         fault = posterior.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum()
         previous, memory.early = memory.early, state if state in FAULT_STATES and fault > EARLY_PROBABILITY else None
@@ -182,7 +194,12 @@ class PumpJudge:
         evidence |= run_evidence(run, self._datasheet, rng)
         evidence |= self._index(run, reference, rng)
         evidence |= self._consequences(run, reference, posterior, posterior.by_state(), state, remark)
-        return self._judgement(run.window_ns, posterior.by_state(), evidence)
+        pump, main = deepcopy(memory.prior.asset), deepcopy(system.asset)  # the whole run will be taken in at its end
+        believe(pump, main, weighed, state, memory.onset_ns or run.window_ns[0])
+        for asset, copy in ((memory.prior.asset, pump), (system.asset, main)):
+            asset.since_ns, asset.told_size = copy.since_ns, copy.told_size
+        judgement = self._judgement(run.window_ns, posterior.by_state(), evidence)
+        return replace(judgement, faults=self._faults.told(pump, main, memory.wrong_meters))
 
     def watch_missing(self, gathered: Any, lacking: list[str], time_ns: int) -> Judgement | None:
         """Judge a pump that lacks signals by a full segment of `new_missing_signals`, where what is off changes."""
@@ -226,6 +243,7 @@ class PumpJudge:
     def _sensor_fault(self, run: Run, evidence: dict[str, Any]) -> Judgement:
         """Judge a run of which a sensor is wrong without doubt."""
         self.memory.tell("sensor_fault", run.window_ns, None)
+        self.memory.blame_meters(_errors_of(evidence), run.window_ns[0])
         evidence["advice"] = advice("sensor_fault", in_words(evidence))
         return self._judgement(run.window_ns, {"sensor_fault": 1.0}, evidence)
 
@@ -249,7 +267,8 @@ class PumpJudge:
     ) -> Judgement:
         """Judge a run by what was learnt."""
         memory = self.memory
-        posterior = self._posterior(run, reference, system, evidence)
+        weighed = self._weigh(run, reference, system, evidence)
+        posterior = weighed.posterior
         update_prior(posterior.probability, memory.prior, system, lacks_head=run.lacks_head)
         state, remark = decide(posterior, float(median(run.head_m)))
         memory.recent.append((sum(run.window_ns) // 2, posterior.shift_m))
@@ -258,6 +277,8 @@ class PumpJudge:
         if wrong and state not in FAULT_STATES:
             state, remark = "sensor_fault", in_words(wrong)
         memory.tell(state, run.window_ns, onset_component(state))
+        memory.blame_meters(self._meter_errors(wrong, weighed, state), run.window_ns[0])
+        believe(memory.prior.asset, system.asset, weighed, state, memory.onset_ns or run.window_ns[0])
         evidence |= self._index(run, reference, rng)
         if state == "normal":
             baseline = reference.baseline.with_noise_of(run.segments, NOISE_WEIGHT, self._curve[0])
@@ -267,7 +288,18 @@ class PumpJudge:
         if state == "sensor_fault" and wrong:
             probability |= {"normal": 0.0, "sensor_fault": probability["normal"] + probability["sensor_fault"]}
         evidence |= self._consequences(run, reference, posterior, probability, state, remark)
+        for asset in (memory.prior.asset, system.asset):
+            if asset.since_ns is not None:
+                asset.wasted_kwh[self._pump] = evidence["wasted_kwh_per_day"]
         return self._judgement(run.window_ns, probability, evidence)
+
+    def _meter_errors(
+        self, wrong: Mapping[str, Any], weighed: Weighed, state: State
+    ) -> dict[str, tuple[float, float]]:
+        """Relative error, and its standard deviation, of each meter that a verdict blames."""
+        if state != "sensor_fault":
+            return {}
+        return _errors_of(wrong) or weighed.meter_error(self._pump)
 
     def _index(self, run: Run, reference: HealthyReference, rng: np.random.Generator) -> dict[str, Any]:
         """The paper's index of a run against its limits; nothing without a head sensor."""
@@ -275,15 +307,24 @@ class PumpJudge:
             return {}
         return {"index": self.memory.limits.figures(run.segments, reference.baseline, rng)}
 
-    def _posterior(
-        self, run: Run, reference: HealthyReference, system: SystemPrior, evidence: dict[str, Any]
-    ) -> Posterior:
+    def _weigh(self, run: Run, reference: HealthyReference, system: SystemPrior, evidence: dict[str, Any]) -> Weighed:
         """Probability of each cause; what it rests on becomes part of the evidence."""
         observation = observe(run, reference, self._curve, self._friction_h2_m5)
         evidence |= shift_evidence(observation)
         evidence["baseline"] = reference.version
-        scales = fault_scales(self._datasheet, self._pump, reference.baseline)
-        return posterior_of(observation, scales, joint_prior(self.memory.prior, system))
+        return weigh(
+            observation,
+            fault_scales(self._datasheet, self._pump, reference.baseline),
+            self.memory.prior,
+            system,
+            OperatingPoint(
+                time_ns=run.window_ns[1],
+                flow_m3h=float(median(run.segments.flow_m3h)),
+                head_m=float(median(run.head_m)),
+                friction_m=self._friction_h2_m5 * float(median(run.segments.total_m3h)) ** 2,
+                run_covariance=reference.baseline.run_covariance,
+            ),
+        )
 
     def _consequences(
         self,
@@ -307,6 +348,7 @@ class PumpJudge:
         return {
             "severity": figures,
             "advice": advice(state, remark),
+            "wasted_kwh_per_day": round(wasted_kwh, 2),
             "cost": expected_costs(probability, wasted_kwh, self._costs),
         }
 
@@ -321,6 +363,11 @@ class PumpJudge:
 def _generator(run: Run) -> np.random.Generator:
     """What resamples of a run are drawn with: the same whenever it is judged."""
     return np.random.default_rng(abs(run.window_ns[0]) + run.pump)
+
+
+def _errors_of(wrong: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """The same form as of meters that are off, for those that tell nothing."""
+    return {name: (math.nan, math.nan) for how in WAYS for name in wrong.get(how, ())}
 
 
 def _missing_reason(lacking: list[str]) -> str:

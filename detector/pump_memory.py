@@ -1,6 +1,7 @@
 """What is remembered of one pump from run to run."""
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from wetwell.detector.baseline.healthy_reference import HealthyReference, learn_check, log_power
@@ -13,6 +14,7 @@ from wetwell.detector.runs.run import Run
 from wetwell.detector.sensors.missing_signals import MissingSignals
 from wetwell.detector.sensors.sensor_noise import healthy_noise, reading_noise
 from wetwell.detector.statistics.cusum import Cusum
+from wetwell.detector.verdict.asset_faults import Meter
 from wetwell.detector.verdict.control_limits import ControlLimits
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.verdict import State
@@ -41,6 +43,8 @@ class PumpMemory:
         What is watched while head or frequency is not measured.
     early : State
         Fault that the last look at an open run was sure of.
+    wrong_meters : dict
+        Those that the last run has shown to be wrong, by name.
     """
 
     learning: Learning | None = field(default_factory=Learning)
@@ -59,6 +63,7 @@ class PumpMemory:
     log_powers: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
     noises: deque[Floats] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
     recent: deque[tuple[int, Floats]] = field(default_factory=lambda: deque(maxlen=RECENT_RUNS))
+    wrong_meters: dict[str, Meter] = field(default_factory=dict)
 
     @property
     def offset_m(self) -> float | None:
@@ -117,6 +122,7 @@ class PumpMemory:
         self.onset_ns, self.early = None, None
         self.limits = ControlLimits()
         self.recent.clear()
+        self.wrong_meters = {}
         self.missing_signals = MissingSignals()
         self.cusum.reset()
 
@@ -125,6 +131,11 @@ class PumpMemory:
         self.log_ratios.clear()
         self.log_powers.clear()
         self.noises.clear()
+
+    def blame_meters(self, errors: Mapping[str, tuple[float, float]], time_ns: int) -> None:
+        """Note which meters are wrong, with relative error and standard deviation; known ones stay so since then."""
+        first = dict.fromkeys(errors, (time_ns, 0.0, 0.0)) | self.wrong_meters
+        self.wrong_meters = {name: (first[name][0], *error) for name, error in errors.items()}
 
     def tell(self, state: State, window_ns: tuple[int, int], component: int | None) -> None:
         """Tell a state; of a new fault the onset is estimated from the recent runs and stays."""

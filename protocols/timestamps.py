@@ -10,6 +10,7 @@ import numpy.typing as npt
 from wetwell.protocols.arrays import Integers
 
 NS_PER_S = 1_000_000_000
+NS_PER_DAY = 86_400 * NS_PER_S
 LEARNING_S = 6.0 * 3600.0
 """The first six hours are healthy: a detector learns from them, no fault begins in them, nothing is scored. [s]"""
 MAX_STAMP_NS = 2**63 - 1

@@ -39,12 +39,29 @@ RISING_SHARE = 0.9
 
 
 _FAULTS = [PUMP_FAULT, SYSTEM_FAULT, BOTH]
-_CAUSES = (PUMP_FAULT, SYSTEM_FAULT, BOTH, FLOW_METER, HEAD_SENSOR)
-_HYPOTHESES = np.array([NORMAL, *_CAUSES * len(SCALES)])
-_LOG_SCALE = np.where(_HYPOTHESES == NORMAL, 0.0, -np.log(len(SCALES)))
-_MOVES_POWER = np.where(np.isin(_HYPOTHESES, (FLOW_METER, HEAD_SENSOR)), DISTURBED_SHARE, LOAD_SHARE)
-_FOLLOWED = np.column_stack([1.0 - _MOVES_POWER, _MOVES_POWER])
-"""Share of runs in which the power stays, and in which it moves."""
+_MOVES_PUMP = (PUMP_FAULT, BOTH)
+_MOVES_SYSTEM = (SYSTEM_FAULT, BOTH)
+
+
+def _table_of_ways() -> Floats:
+    """(w, 5) ways to shift: hypothesis, scale of a new fault of pump and of main, whether it is the one carried.
+
+    First those of new faults, of each hypothesis the one at full scale before the others, then those with a fault
+    that was there before.
+    """
+    rows: list[tuple[float, float, float, bool, bool]] = [(NORMAL, 0.0, 0.0, False, False)]
+    for scale in SCALES:
+        rows += [(PUMP_FAULT, scale, 0.0, False, False), (SYSTEM_FAULT, 0.0, scale, False, False)]
+        rows += [(cause, scale, scale, False, False) for cause in (BOTH, FLOW_METER, HEAD_SENSOR)]
+    rows += [(PUMP_FAULT, 0.0, 0.0, True, False), (SYSTEM_FAULT, 0.0, 0.0, False, True)]
+    for scale in SCALES:
+        rows += [(BOTH, 0.0, scale, True, False), (BOTH, scale, 0.0, False, True)]
+    rows.append((BOTH, 0.0, 0.0, True, True))
+    return np.array(rows, dtype=np.float64)
+
+
+_WAYS = _table_of_ways()
+_NEW_WAYS = 1 + 5 * len(SCALES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,35 +107,63 @@ class Posterior:
         return named | {"sensor_fault": float(p[FLOW_METER] + p[HEAD_SENSOR])}
 
 
-def _ways(observation: Observation, scales: Scales, known: Flags) -> tuple[Integers, Floats, Floats]:
-    """(w,) hypothesis, (w,) logarithm of its share in that, (w, 4, 4) covariance of the shift, of each way to shift.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Carried:
+    """Faults as they were before a run, if they are still there: of the pump and of the main.
+
+    Attributes
+    ----------
+    mean_m, variance_m2 : (2,) arrays
+        Shifts of (r_p, r_s) that they are expected to show. [m, m²]
+    share : (2,) array
+        Of the prior probability of a fault: that it is the one that was there before.
+    """
+
+    mean_m: Floats
+    variance_m2: Floats
+    share: Floats
+
+
+def _ways(
+    observation: Observation, scales: Scales, known: Flags, carried: Carried | None
+) -> tuple[Integers, Floats, Floats, Floats]:
+    """Each way to shift: (w,) hypothesis, (w,) logarithm of its share in that, (w, 4) mean, (w, 4, 4) covariance.
 
     The first way of each hypothesis is the one at full scale.
     """
-    tau_p, tau_s = scales.pump_m**2, scales.system_m**2
+    table = _WAYS if carried is not None else _WAYS[:_NEW_WAYS]
+    hypotheses, new_p, new_s = table[:, 0].astype(np.int64), table[:, 1], table[:, 2]
+    moves_p, moves_s = np.isin(hypotheses, _MOVES_PUMP), np.isin(hypotheses, _MOVES_SYSTEM)
     v_p, v_s = observation.slope_variance
-    scale = np.array(SCALES)
-    spread = np.zeros((len(_HYPOTHESES), 4, 4))
-    pump, system, both, flow, head = (spread[1 + cause :: len(_CAUSES)] for cause in range(len(_CAUSES)))
-    pump[:, PUMP, PUMP], pump[:, SYSTEM, SYSTEM] = scale * tau_p, v_s
-    system[:, PUMP, PUMP], system[:, SYSTEM, SYSTEM] = v_p, scale * tau_s
-    both[:, PUMP, PUMP], both[:, SYSTEM, SYSTEM] = scale * tau_p + v_p, scale * tau_s + v_s
-    for fault in (system, both):
-        fault[:, PUMP, PUMP] += scale * tau_s * observation.system_in_pump**2
-    scale = scale[:, np.newaxis, np.newaxis]
-    flow[:] = scale * FLOW_METER_ERROR**2 * np.outer(observation.flow_meter, observation.flow_meter)
-    head[:] = scale * scales.head_m**2 * np.outer(observation.head_sensor, observation.head_sensor)
+    log_share = np.where((new_p > 0.0) | (new_s > 0.0), -np.log(len(SCALES)), 0.0)
+    offset, spread = np.zeros((len(table), 4)), np.zeros((len(table), 4, 4))
+    spread[:, PUMP, PUMP] = moves_p * new_p * scales.pump_m**2 + moves_s * v_p
+    spread[:, SYSTEM, SYSTEM] = moves_s * new_s * scales.system_m**2 + moves_p * v_s
+    spread[:, PUMP, PUMP] += moves_s * new_s * (scales.system_m * observation.system_in_pump) ** 2
+    flow, head = hypotheses == FLOW_METER, hypotheses == HEAD_SENSOR
+    scale = new_p[:, np.newaxis, np.newaxis]
+    spread[flow] = scale[flow] * FLOW_METER_ERROR**2 * np.outer(observation.flow_meter, observation.flow_meter)
+    spread[head] = scale[head] * scales.head_m**2 * np.outer(observation.head_sensor, observation.head_sensor)
+    if carried is not None:
+        is_old = table[:, 3:] > 0.0
+        offset[:, : SYSTEM + 1] = is_old * carried.mean_m
+        spread[:, PUMP, PUMP] += is_old[:, 0] * carried.variance_m2[0]
+        spread[:, SYSTEM, SYSTEM] += is_old[:, 1] * carried.variance_m2[1]
+        log_old, log_new = np.log(np.maximum([carried.share, 1.0 - carried.share], 1e-300))
+        chosen = np.where(is_old, log_old, log_new) * np.column_stack([moves_p, moves_s])
+        log_share = log_share + chosen.sum(axis=1)
     disturbed = (1.0 - DISTURBED_SHARE, DISTURBED_SHARE) if known[DRAWDOWN] else (1.0,)
-    ways = np.repeat(spread, 2 * len(disturbed) if known[POWER] else len(disturbed), axis=0)
-    ways = ways.reshape(len(_HYPOTHESES), len(disturbed), -1, 4, 4)
+    witnesses = 2 * len(disturbed) if known[POWER] else len(disturbed)
+    ways = np.repeat(spread, witnesses, axis=0).reshape(len(table), len(disturbed), -1, 4, 4)
     ways[:, 1:, :, DRAWDOWN, DRAWDOWN] += DISTURBED_DRAWDOWN**2
     ways[:, :, 1:, POWER, POWER] += POWER_SHIFT**2
     share = np.array(disturbed)[:, np.newaxis]
     if known[POWER]:
-        share = share * _FOLLOWED[:, np.newaxis]
-    log_share = _LOG_SCALE[:, np.newaxis, np.newaxis] + np.log(share)
-    hypotheses = np.repeat(_HYPOTHESES, ways.shape[1] * ways.shape[2])
-    return hypotheses, np.broadcast_to(log_share, ways.shape[:3]).ravel(), ways.reshape(-1, 4, 4)
+        moving = np.where(flow | head, DISTURBED_SHARE, LOAD_SHARE)
+        share = share * np.column_stack([1.0 - moving, moving])[:, np.newaxis]
+    log_each = log_share[:, np.newaxis, np.newaxis] + np.log(share)
+    log_each = np.broadcast_to(log_each, ways.shape[:3]).ravel()
+    return np.repeat(hypotheses, witnesses), log_each, np.repeat(offset, witnesses, axis=0), ways.reshape(-1, 4, 4)
 
 
 def _log_sums(log_values: Floats) -> Floats:
@@ -138,7 +183,9 @@ def fault_scales(datasheet: Datasheet, pump: int, baseline: Baseline) -> Scales:
     )
 
 
-def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Posterior:
+def posterior_of(
+    observation: Observation, scales: Scales, prior: Floats, carried: Carried | None = None
+) -> Posterior:
     r"""Probability of each hypothesis after a run.
 
     $$P(h \mid y) \propto P(h)\; N(y;\ 0,\ C + D_h)\; S_h, \qquad
@@ -148,7 +195,9 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
     where a says which of the two curves a fault moves, τ how far, v what the slope of each curve may be wrong by (a
     pump fault moves the flow along the system curve, a system fault along the pump curve), d how a wrong meter moves
     all components, and S how usual the sign of the shift is. Each τ stands for large and for small shifts,
-    weighed alike. The power may follow the load or not, or drift: it tells a wrong meter from a fault, but no fault
+    weighed alike. A fault that was there before has grown or stayed, $N(y;\ \hat s, C + D)$ with the size that is
+    carried along, or is another one now: so one that is gone is told at once. The power may follow the load or not,
+    or drift: it tells a wrong meter from a fault, but no fault
     from health. In a few runs the drawdown is disturbed by something else and says nothing. Components that are not
     known are left out. Without a head sensor a run says that pump or main has moved, and not which: all faults are as
     likely as that of the pump, and the prior, with what the other pumps of the main have met, tells them apart; only
@@ -162,14 +211,17 @@ def posterior_of(observation: Observation, scales: Scales, prior: Floats) -> Pos
         τ.
     prior : (6,) array
         P(h).
+    carried : Carried, optional
+        Faults of which the size is known; without it every fault is a new one.
     """
     known = np.isfinite(observation.mean) & np.isfinite(np.diag(observation.covariance))
     mean = observation.mean[known]
-    hypotheses, log_share, spread = _ways(observation, scales, known)
+    hypotheses, log_share, offset, spread = _ways(observation, scales, known, carried)
     every = spread[:, known][:, :, known] + observation.covariance[np.ix_(known, known)]
     _, log_determinant = np.linalg.slogdet(every)
     inverse = np.linalg.inv(every)
-    log_each = log_share - 0.5 * (log_determinant + np.einsum("i,hij,j->h", mean, inverse, mean))
+    error = mean - offset[:, known]
+    log_each = log_share - 0.5 * (log_determinant + np.einsum("hi,hij,hj->h", error, inverse, error))
     is_of = hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis]
     log_likelihood = _log_sums(np.where(is_of, log_each, -np.inf))
     inverse = inverse[is_of.argmax(axis=1)]

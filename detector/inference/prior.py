@@ -1,9 +1,10 @@
 """Probabilities before the next run: of each pump and its meters, and of the main that they share."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from wetwell.detector.inference.asset_belief import AssetBelief
 from wetwell.detector.inference.posterior import BOTH, FLOW_METER, HEAD_SENSOR, PUMP_FAULT, SYSTEM_FAULT
 from wetwell.protocols.arrays import Floats
 
@@ -21,20 +22,22 @@ class PumpPrior:
 
     `pump_if_system` is that of a pump fault in case that the system has one, and `pump` then in case that it has
     none: without a head sensor a run shows that one of them has a fault, and so each speaks against the other. None
-    where runs tell them apart.
+    where runs tell them apart. `asset` is what is believed of the size of the fault.
     """
 
     pump: float = PUMP_PRIOR
     flow_meter: float = FLOW_METER_PRIOR
     head_sensor: float = HEAD_SENSOR_PRIOR
     pump_if_system: float | None = None
+    asset: AssetBelief = field(default_factory=AssetBelief)
 
 
 @dataclass(slots=True)
 class SystemPrior:
-    """Probability that the system has a fault: what one pump meets, the others will."""
+    """Probability that the system has a fault, and how large it is: what one pump meets, the others will."""
 
     system: float = SYSTEM_PRIOR
+    asset: AssetBelief = field(default_factory=AssetBelief)
 
 
 def joint_prior(pump: PumpPrior, system: SystemPrior) -> Floats:

@@ -16,7 +16,9 @@ from wetwell.detector.baseline.healthy_reference import Check, HealthyReference
 from wetwell.detector.baseline.learning import Learning
 from wetwell.detector.baseline.model import Baseline, Model
 from wetwell.detector.curves.datasheet import Datasheet
+from wetwell.detector.inference.asset_belief import AssetBelief
 from wetwell.detector.inference.prior import PumpPrior, SystemPrior
+from wetwell.detector.inference.size_track import SizeTrack
 from wetwell.detector.pump_memory import PumpMemory
 from wetwell.detector.runs.run import Segments
 from wetwell.detector.sensors.missing_signals import MissingSignals
@@ -30,6 +32,7 @@ _SCHEMA_NAME, FORM = "wetwell.detector-snapshot", 2
 SCHEMA = f"{_SCHEMA_NAME}/{FORM}"
 
 _CLASSES: Mapping[str, type] = {
+    "AssetBelief": AssetBelief,
     "Baseline": Baseline,
     "BlindWatch": MissingSignals,
     "Check": Check,
@@ -41,6 +44,7 @@ _CLASSES: Mapping[str, type] = {
     "PumpBelief": PumpPrior,
     "PumpRecord": PumpMemory,
     "Segments": Segments,
+    "SizeTrack": SizeTrack,
     "SystemBelief": SystemPrior,
 }
 """By the names that they bore when form 2 was made."""
@@ -49,8 +53,12 @@ _FIELDS: Mapping[str, Mapping[str, str]] = {
     "PumpRecord": {"known": "reference", "belief": "prior", "blind": "missing_signals"},
 }
 """Of these classes, by stored name, where the name is another now."""
-_ADDED: Mapping[str, Mapping[str, Any]] = {"PumpBelief": {"pump_if_system": None}}
-"""Fields that snapshots of form 2 may lack, and what stands for them then."""
+_ADDED: Mapping[str, Mapping[str, Callable[[], Any]]] = {
+    "PumpBelief": {"pump_if_system": lambda: None, "asset": AssetBelief},
+    "PumpRecord": {"wrong_meters": dict},
+    "SystemBelief": {"asset": AssetBelief},
+}
+"""Fields that snapshots of form 2 may lack, and what makes what stands for them then."""
 _STORED_FIELDS = {name: {new: old for old, new in fields.items()} for name, fields in _FIELDS.items()}
 _ARRAYS: Mapping[str, str] = {
     "pace": "sampling_period",
@@ -211,8 +219,9 @@ def _object(content: list[Any], datasheet: Datasheet) -> Any:
     lacking = getattr(_CLASSES[name], "__dataclass_fields__", {}).keys() - fields.keys() - _ADDED.get(name, {}).keys()
     if lacking:
         raise ValueError(f"a {name} without {', '.join(sorted(lacking))}")
-    fields = {**_ADDED.get(name, {}), **fields}
     made: Any = object.__new__(_CLASSES[name])
+    for field, make in _ADDED.get(name, {}).items():
+        object.__setattr__(made, field, make())
     for field, value in fields.items():
         object.__setattr__(made, field, _decoded(value, datasheet))
     return made

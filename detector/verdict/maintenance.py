@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from wetwell.detector.inference.posterior import FAULT_STATES
-from wetwell.detector.verdict.costs import Costs
 from wetwell.protocols.messages.verdict import State
+from wetwell.protocols.station.costs import Costs
 
 _CURED: Mapping[str, frozenset[State]] = {
     "wait": frozenset(),

@@ -1,8 +1,8 @@
-"""Verdict: what the detector says of one pump."""
+"""Verdict: what the detector says of one pump, and of what is at fault."""
 
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from wetwell.protocols.messages.message import Message, Stamp
 
@@ -17,12 +17,55 @@ State = Literal[
 ]
 """What a verdict says of one pump."""
 
+Stage = Literal["watch", "plan", "act"]
+"""What to do about a fault: it is there; plan a visit; somebody has to act."""
+
+
+class _Part(BaseModel):
+    """Part of a message: frozen; further keys from newer senders are ignored."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class Severity(_Part):
+    """How bad a fault is: a quantity with its unit, its 95 % interval, and the station's action limit."""
+
+    quantity: str
+    value: float
+    interval: tuple[float, float]
+    limit: float = Field(gt=0.0)
+
+
+class Trend(_Part):
+    """How a severity grows by the day, with a 95 % interval, and when it reaches the limit.
+
+    `reaches_limit` is None where it does not grow, or has passed the limit. `interval_at` are the earliest and the
+    latest time; None for one that may never come.
+    """
+
+    per_day: float
+    interval: tuple[float, float]
+    reaches_limit: Stamp | None = None
+    interval_at: tuple[Stamp | None, Stamp | None] = (None, None)
+
+
+class AssetFault(_Part):
+    """What is wrong with one asset: `pump:2`, `main`, `main:line 1`, `sensor:pump2_flow_m3h`."""
+
+    asset: str = Field(min_length=1, max_length=64)
+    stage: Stage
+    since: Stamp
+    severity: Severity | None = None
+    trend: Trend | None = None
+    advice: str = Field("", max_length=500)
+
 
 class Verdict(Message):
     """What the detector says of one pump after a run, or when its state changes.
 
     `probability` sums to one over the states that were weighed; `evidence` holds the figures that it rests on;
-    `window` is the time that was judged.
+    `window` is the time that was judged. `faults` are those of the pump, its main and its meters that stand, the
+    worst first; `asset`, `stage`, `severity` and `trend` are those of the worst.
     """
 
     schema_name: Literal["wetwell.verdict/1"] = Field("wetwell.verdict/1", alias="schema")
@@ -34,3 +77,8 @@ class Verdict(Message):
     evidence: dict[str, Any]
     onset: Stamp | None = None
     window: tuple[Stamp, Stamp]
+    asset: str | None = None
+    stage: Stage | None = None
+    severity: Severity | None = None
+    trend: Trend | None = None
+    faults: tuple[AssetFault, ...] = ()

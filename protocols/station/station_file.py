@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.station.control import DEFAULT_START_LEVELS_M, DEFAULT_STOP_LEVELS_M, Control
+from wetwell.protocols.station.costs import Costs
+from wetwell.protocols.station.limits import Limits
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.sump import Sump
@@ -71,6 +73,8 @@ class Station(Table):
     control: Control = Control()
     electrical: Electrical = Electrical()
     sensors: Sensors = Sensors()
+    limits: Limits = Limits()
+    costs: Costs | None = None
     effect: tuple[EffectTable, ...] = ()
 
     @model_validator(mode="before")

@@ -8,7 +8,6 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress, track
 
-from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import BLOCK_ROWS, blocks
 from wetwell.protocols.atomic_file import atomic_file
@@ -65,7 +64,7 @@ def detect(station: Station, recording: Recording, out: Path) -> dict[str, objec
     RecordingError
         If the verdicts cannot be written.
     """
-    detector = Detector(station.name, datasheet_of(station))
+    detector = Detector.of(station)
     states: Counter[str] = Counter()
     with atomic_file(out) as file:
         for verdict in _verdicts(detector, recording, len(station.pump)):

@@ -9,10 +9,8 @@ from itertools import islice
 
 import numpy as np
 
-from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import Block
-from wetwell.detector.verdict.costs import Costs
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import verdict_key
 from wetwell.protocols.messages.decoding import SampleMessage, decoded
@@ -21,6 +19,7 @@ from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.model_publisher import ModelPublisher
@@ -60,7 +59,7 @@ class StationDetector:
     ) -> None:
         self.station = station.name
         self._place = f"station '{station.name}': "
-        self.detector = Detector(station.name, datasheet_of(station), costs)
+        self.detector = Detector.of(station, costs)
         self._checkpoint = checkpoint
         self._quarantine = quarantine or Quarantine(None, "", 1, 0.0)
         told = None if checkpoint is None else checkpoint.restore(self.detector)

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, IPvAnyNetwork, SecretStr, ValidationError, model_validator
 from pydantic_settings import BaseSettings, EnvSettingsSource, SettingsConfigDict
 
-from wetwell.detector.verdict.costs import Costs
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.messages.alarm import Priority, RuleName
 from wetwell.protocols.modbus.registers import WordOrder
 from wetwell.protocols.modbus.write_permission import LOOPBACK_WRITES
+from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import load_toml
 from wetwell.protocols.station.table import Finite, NonNegative, Positive, Table
 

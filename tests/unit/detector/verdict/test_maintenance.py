@@ -5,9 +5,9 @@ from typing import get_args
 
 import pytest
 
-from wetwell.detector.verdict.costs import Costs
 from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.protocols.messages.verdict import State
+from wetwell.protocols.station.costs import Costs
 
 COSTS = Costs(
     pull_pump=100.0,

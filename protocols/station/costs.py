@@ -1,4 +1,4 @@
-"""What acts and omissions cost; apart from how a verdict uses it, so that the settings load without the detector."""
+"""What acts and omissions cost the owner of a station."""
 
 from typing import Annotated
 
