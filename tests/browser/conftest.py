@@ -198,7 +198,12 @@ def open_page(browser):
         page = context.new_page()
         if not may_lose_its_server:
             page.on(
-                "console", lambda told: complaints.append(told.text) if told.type in {"error", "warning"} else None
+                "console",
+                lambda told: (
+                    complaints.append(told.text)
+                    if told.type in {"error", "warning"} and "404" not in told.text
+                    else None
+                ),
             )
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.goto(url)

@@ -13,8 +13,9 @@ from wetwell.protocols.timestamps import from_iso
 pytestmark = pytest.mark.check
 
 POINTS = re.compile(r"\d{2,} points")
-DRAWN = "charts[1].data[0].filter((_, place) => charts[1].data[1][place] !== null).length"
-"""Points of the level's chart: the lanes of verdicts and alarms are the first chart."""
+TRENDS = "charts.filter((each) => each.root.isConnected && each.root.closest('.trends'))"
+"""Charts that are seen: first the lanes of verdicts and alarms, then the level."""
+DRAWN = f"{TRENDS}[1].data[1].filter((value) => value !== null).length"
 HAS_RED = """() => {
   const canvas = document.querySelector(".trends canvas");
   const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -69,7 +70,7 @@ def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(faulty, 
     download.value.save_as(tmp_path / "drawn.csv")
     with (tmp_path / "drawn.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == page.evaluate("charts[1].data[0].length")
+    assert len(rows) == page.evaluate(f"{TRENDS}[1].data[0].length")
     assert {"level_m", "pump2_flow_m3h"} <= rows[0].keys()
     page.get_by_role("button", name="Back").click()
     expect(page).not_to_have_url(re.compile("from="))

@@ -1,24 +1,23 @@
 """What is at fault, how far it has gone and what waiting costs: one line of the overview for each station."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, get_args
 
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.verdict import AssetFault, Severity, Stage, Verdict
 
-STAGES = ("watch", "plan", "act")
+STAGES: tuple[Stage, ...] = get_args(Stage)
 FAULTS = ("sensor_fault", "system_fault", "pump_fault", "pump_and_system_fault")
 """States that name a fault, the gravest last."""
-_MAIN_QUANTITY = {
-    "pump_fault": "speed_loss_percent",
-    "pump_and_system_fault": "speed_loss_percent",
-    "system_fault": "friction_rise_percent",
-}
+_STATE_OF = {"pump": "pump_fault", "main": "system_fault", "sensor": "sensor_fault"}
+
+Cause = dict[str, Any]
 
 
-def worst_cause(verdicts: Iterable[Verdict]) -> dict[str, Any] | None:
-    """Cause that asks for attention first among the last verdicts on each pump; None if no verdict names a fault.
+def worst_cause(verdicts: Iterable[Verdict]) -> Cause | None:
+    """Cause that asks for attention first among the last verdicts on each pump; None if none names a fault.
 
-    The stage goes before the state, and the cost of waiting decides between equals.
+    The stage goes before the state, and the cost of waiting decides between equals. A verdict without a stage, of an
+    earlier detector, counts as one to act on.
 
     Examples
     --------
@@ -28,22 +27,39 @@ def worst_cause(verdicts: Iterable[Verdict]) -> dict[str, Any] | None:
     >>> cause["asset"], cause["stage"], cause["waiting_cost"]
     ('pump:2', None, 30.0)
     """
-    causes = [cause_of(verdict) for verdict in verdicts if verdict.state in FAULTS]
-    return max(causes, key=_weight, default=None)
+    return max((cause for verdict in verdicts for cause in causes_of(verdict)), key=_weight, default=None)
 
 
-def cause_of(verdict: Verdict) -> dict[str, Any]:
-    """What a verdict that names a fault says of it, as the page shows it; an earlier detector told less."""
-    fields = verdict.model_dump(mode="json")
-    expected = verdict.evidence.get("cost", {}).get("expected", {})
+def causes_of(verdict: Verdict) -> list[Cause]:
+    """What a verdict says is at fault, the worst first."""
+    waiting_cost = verdict.evidence.get("cost", {}).get("expected", {}).get("wait")
+    if verdict.faults:
+        return [_of_fault(fault) | {"waiting_cost": waiting_cost} for fault in verdict.faults]
+    if verdict.state not in FAULTS:
+        return []
+    return [
+        {
+            "state": verdict.state,
+            "asset": verdict.asset or _asset_of(verdict),
+            "stage": verdict.stage,
+            "waiting_cost": waiting_cost,
+            **_told(verdict.onset if verdict.onset is not None else verdict.time, verdict),
+        }
+    ]
+
+
+def _of_fault(fault: AssetFault) -> Cause:
+    state = _STATE_OF.get(fault.asset.partition(":")[0], "unknown")
+    return {"state": state, "asset": fault.asset, "stage": fault.stage, **_told(fault.since, fault)}
+
+
+def _told(since_ns: int, source: AssetFault | Verdict) -> Cause:
+    """Since when, how far and how fast."""
+    severity: Severity | None = source.severity
     return {
-        "state": verdict.state,
-        "asset": fields.get("asset") or _asset_of(verdict),
-        "stage": fields.get("stage"),
-        "since": fields["onset"] or fields["time"],
-        "severity": fields.get("severity") or _severity_of(verdict),
-        "trend": fields.get("trend"),
-        "waiting_cost": expected.get("wait"),
+        "since_ms": since_ns // 1_000_000,
+        "severity": None if severity is None else severity.model_dump(mode="json"),
+        "trend": None if source.trend is None else source.trend.model_dump(mode="json"),
     }
 
 
@@ -55,13 +71,8 @@ def _asset_of(verdict: Verdict) -> str:
     return f"sensor:pump{verdict.pump}" if verdict.state == "sensor_fault" else f"pump:{verdict.pump}"
 
 
-def _severity_of(verdict: Verdict) -> dict[str, Any] | None:
-    quantity = _MAIN_QUANTITY.get(verdict.state, "")
-    figure = verdict.evidence.get("severity", {}).get(quantity)
-    return None if figure is None else {"quantity": quantity, **figure}
-
-
-def _weight(cause: dict[str, Any]) -> tuple[int, int, float]:
+def _weight(cause: Cause) -> tuple[int, int, float]:
     stage = cause["stage"]
     rank = STAGES.index(stage) if stage in STAGES else len(STAGES) - 1
-    return rank, FAULTS.index(cause["state"]), cause["waiting_cost"] or 0.0
+    state = FAULTS.index(cause["state"]) if cause["state"] in FAULTS else -1
+    return rank, state, cause["waiting_cost"] or 0.0

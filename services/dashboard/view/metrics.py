@@ -5,9 +5,8 @@ from collections.abc import Iterable
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.quantities import PUMP_ANALOGUES
-from wetwell.services.dashboard.view.cause import FAULTS, STAGES, cause_of
+from wetwell.services.dashboard.view.cause import STAGES, Cause, causes_of
 from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.dashboard.view.station_view import RANKS, StationView
 
@@ -79,31 +78,29 @@ def _judged(stations: list[StationView]) -> Iterable[Metric]:
             for state in RANKS:
                 if state != "no_data":
                     states.add_metric((*name, state), float(state == verdict.state))
-            stage.add_metric(name, _stage_number(verdict))
-            if verdict.state in FAULTS:
-                _add_severity(name, verdict, severity, limit, trend)
+            causes = causes_of(verdict)
+            stage.add_metric(name, max(map(_stage_number, causes), default=0.0))
+            for cause in causes:
+                _add_severity(name, cause, severity, limit, trend)
     yield from (states, stage, severity, limit, trend)
 
 
-def _stage_number(verdict: Verdict) -> float:
-    stage = cause_of(verdict)["stage"]
-    return float(STAGES.index(stage) + 1) if stage in STAGES else 0.0
+def _stage_number(cause: Cause) -> float:
+    return float(STAGES.index(cause["stage"]) + 1) if cause["stage"] in STAGES else 0.0
 
 
 def _add_severity(
     name: tuple[str, str],
-    verdict: Verdict,
+    cause: Cause,
     severity: GaugeMetricFamily,
     limit: GaugeMetricFamily,
     trend: GaugeMetricFamily,
 ) -> None:
-    cause = cause_of(verdict)
     told = cause["severity"]
     if told is None:
         return
-    labels = (*name, str(cause["asset"]), str(told["quantity"]))
-    severity.add_metric(labels, float(told["value"]))
-    if told.get("limit") is not None:
-        limit.add_metric(labels, float(told["limit"]))
+    labels = (*name, cause["asset"], told["quantity"])
+    severity.add_metric(labels, told["value"])
+    limit.add_metric(labels, told["limit"])
     if cause["trend"] is not None:
-        trend.add_metric(labels, float(cause["trend"]["per_day"]))
+        trend.add_metric(labels, cause["trend"]["per_day"])

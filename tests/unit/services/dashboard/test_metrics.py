@@ -24,11 +24,20 @@ def sample(second, **fields):
 
 
 def told():
-    severity = {"friction_rise_percent": {"value": 12.0, "interval": [11.0, 13.0]}}
+    severity = {"quantity": "friction_rise_percent", "value": 12.0, "interval": [11.0, 13.0], "limit": 15.0}
+    trend = {"per_day": 2.0, "interval": [1.0, 3.0]}
+    fault = {"asset": "main", "stage": "plan", "since": 0, "severity": severity, "trend": trend}
+    states = {"system_fault": 1.0}
     return Verdict(
-        time=0, station="alpha", pump=1, state="system_fault", probability={"system_fault": 1.0},
-        evidence={"severity": severity}, window=(0, 0),
-    )  # fmt: skip
+        time=0,
+        station="alpha",
+        pump=1,
+        state="system_fault",
+        probability=states,
+        evidence={},
+        window=(0, 0),
+        faults=(fault,),
+    )
 
 
 @pytest.fixture
@@ -60,7 +69,9 @@ def test_level_flow_energy_state_and_severity_are_told_by_station_and_pump(view)
     assert found["wetwell_pump_state", pump, ("state", "system_fault"), station] == 1.0
     assert found["wetwell_pump_state", pump, ("state", "normal"), station] == 0.0
     labels = (("asset", "main"), pump, ("quantity", "friction_rise_percent"), station)
-    assert found["wetwell_severity", *labels] == 12.0
+    names = ("wetwell_severity", "wetwell_severity_limit", "wetwell_severity_trend_per_day")
+    assert [found[name, *labels] for name in names] == [12.0, 15.0, 2.0]
+    assert found["wetwell_pump_stage", pump, station] == 2.0
 
 
 @pytest.mark.parametrize("is_bad", [False, True])

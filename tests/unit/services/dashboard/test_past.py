@@ -79,8 +79,19 @@ def test_the_worst_cause_is_the_gravest_and_among_equals_the_dearest_to_wait_for
     assert worst_cause([verdict(1, "normal"), verdict(2, "learning")]) is None
 
 
-def test_an_earlier_detector_tells_asset_and_severity_by_its_state():
-    severity = {"friction_rise_percent": {"value": 12.0, "interval": [11.0, 13.0]}}
-    cause = worst_cause([verdict(2, "system_fault", evidence={"severity": severity, "main": "line 1"})])
-    assert cause["asset"] == "main:line 1"
-    assert cause["severity"] == {"quantity": "friction_rise_percent", "value": 12.0, "interval": [11.0, 13.0]}
+def test_an_earlier_detector_tells_the_asset_by_its_state():
+    cause = worst_cause([verdict(2, "system_fault", evidence={"main": "line 1"})])
+    assert (cause["asset"], cause["stage"], cause["severity"]) == ("main:line 1", None, None)
+
+
+def fault(asset, stage, value=1.0):
+    severity = {"quantity": "friction_rise_percent", "value": value, "interval": [0.0, 2.0], "limit": 15.0}
+    return {"asset": asset, "stage": stage, "since": 3_000_000, "severity": severity}
+
+
+def test_the_stage_of_an_asset_decides_and_not_the_state_of_the_pump_that_feels_it():
+    watched = verdict(1, "pump_and_system_fault", faults=[fault("pump:1", "watch"), fault("main", "watch")])
+    acted = verdict(2, "normal", faults=[fault("main", "act", 16.0)])
+    cause = worst_cause([watched, acted])
+    assert (cause["asset"], cause["stage"], cause["state"], cause["since_ms"]) == ("main", "act", "system_fault", 3)
+    assert cause["severity"]["value"] == 16.0

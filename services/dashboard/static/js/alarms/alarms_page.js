@@ -41,7 +41,7 @@ export function alarmsPage(main, showLink) {
   search.addEventListener("input", () => choose({ find: (find = search.value) }));
   const failed = html("span", { class: "error", role: "alert" });
   const all = html("button", { type: "button", id: "choose-open", onclick: chooseOpen }, t("choose all to acknowledge"));
-  const together = html("button", { type: "button", id: "acknowledge-chosen", disabled: true, onclick: () => askAct(chosenAlarms(), "acknowledge", (reason) => say(failed, reason)) });
+  const together = html("button", { type: "button", id: "acknowledge-chosen", disabled: true, onclick: () => askAct(chosenAlarms(), "acknowledge", (reason) => say(failed, reason)) }, t("acknowledge {count} chosen", { count: 0 }));
   const list = alarmList({ withStation: true, chosen: who.role === "viewer" ? null : chosen, onChoose: showChosen, onOrder: (name) => choose({ sort: (order = name) === "urgency" ? "" : name }) });
   const journal = alarmJournal();
   const bulk = html("div", { class: "buttons" }, all, together, failed);

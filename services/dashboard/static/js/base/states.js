@@ -23,16 +23,25 @@ export const STAGES = {
 
 export const stageOf = (verdict) => STAGES[verdict?.stage] ?? null;
 
-/** Colour of a verdict: by its stage where it has one, else by its state. */
-export const kindOf = (verdict) => (isFault(verdict?.state) && stageOf(verdict)?.kind) || state(verdict?.state ?? "unknown").kind;
+/** Colour of a verdict or a fault: by its stage where it has one, else by its state. */
+export const kindOf = (verdict) => stageOf(verdict)?.kind ?? state(verdict?.state ?? "unknown").kind;
 
-/** What is at fault: "pump:2", "main", "main:line 1" or "sensor:pump2_flow_m3h". Earlier detectors told the state alone. */
-export function assetOf(verdict) {
-  if (verdict.asset) return verdict.asset;
-  if (verdict.state === "system_fault") return verdict.evidence?.main ? `main:${verdict.evidence.main}` : "main";
-  if (verdict.state === "sensor_fault") return `sensor:pump${verdict.pump}`;
-  return isFault(verdict.state) ? `pump:${verdict.pump}` : null;
+const STATE_OF = { pump: "pump_fault", main: "system_fault", sensor: "sensor_fault" };
+
+/**
+ * What a verdict says is at fault, the worst first: each {asset, state, stage, since, severity, trend, advice}. Earlier detectors told the
+ * state alone.
+ */
+export function faultsOf(verdict) {
+  if (verdict?.faults?.length) return verdict.faults.map((fault) => ({ ...fault, state: STATE_OF[fault.asset.split(":")[0]] ?? "unknown" }));
+  if (!verdict || !isFault(verdict.state)) return [];
+  const fault = { state: verdict.state, stage: verdict.stage ?? null, since: verdict.onset ?? verdict.time, severity: verdict.severity ?? null, trend: verdict.trend ?? null };
+  const main = verdict.evidence?.main ? `main:${verdict.evidence.main}` : "main";
+  if (verdict.state === "pump_and_system_fault") return [{ ...fault, asset: `pump:${verdict.pump}`, state: "pump_fault" }, { ...fault, asset: main, state: "system_fault" }];
+  return [{ ...fault, asset: verdict.asset ?? { system_fault: main, sensor_fault: `sensor:pump${verdict.pump}` }[verdict.state] ?? `pump:${verdict.pump}` }];
 }
+
+export const isOfMain = (fault) => fault.asset.startsWith("main");
 
 const QUANTITIES = { frequency_hz: t("frequency"), flow_m3h: t("flow"), head_m: t("head"), power_kw: t("power"), level_m: t("level"), inflow_m3h: t("inflow") };
 

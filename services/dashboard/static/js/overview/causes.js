@@ -1,7 +1,7 @@
 // What a line of the overview says of a fault, and which stations come first.
 
-import { day, figure, millis } from "../base/format.js";
-import { STAGES, assetWords, isFault, kindOf, state } from "../base/states.js";
+import { day, figure } from "../base/format.js";
+import { STAGES, assetWords, kindOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 import { QUANTITIES } from "../station/severity.js";
 
@@ -19,7 +19,7 @@ export function need(station) {
 
 /** First what asks for most; then what waiting costs; then what began first. */
 export const byNeed = (a, b) =>
-  need(b) - need(a) || (b.cause?.waiting_cost ?? -1) - (a.cause?.waiting_cost ?? -1) || (a.cause?.since ?? "~").localeCompare(b.cause?.since ?? "~");
+  need(b) - need(a) || (b.cause?.waiting_cost ?? -1) - (a.cause?.waiting_cost ?? -1) || (a.cause?.since_ms ?? Infinity) - (b.cause?.since_ms ?? Infinity) || 0;
 
 const called = (station) => (number) => (station.names?.[number - 1] ? `${number} (${station.names[number - 1]})` : String(number));
 
@@ -30,7 +30,7 @@ export function causeWords(station) {
 
 export const stageWord = (station) => (station.cause ? (STAGES[station.cause.stage]?.word ?? "") : "");
 
-export const sinceWords = (station) => (station.cause ? day(millis(station.cause.since)) : "");
+export const sinceWords = (station) => (station.cause ? day(station.cause.since_ms) : "");
 
 export function severityShort({ cause }) {
   if (!cause?.severity) return "";
@@ -50,4 +50,4 @@ export function trendWords({ cause }) {
 export const costWords = ({ cause }) => (cause?.waiting_cost == null ? "" : figure(cause.waiting_cost, 0));
 
 /** Colour of a station's line: that of its cause, unless nobody sees it. */
-export const kindOfStation = (station) => (station.state !== "no_data" && isFault(station.cause?.state) ? kindOf(station.cause) : state(station.state).kind);
+export const kindOfStation = (station) => (station.state !== "no_data" && station.cause ? kindOf(station.cause) : state(station.state).kind);

@@ -22,7 +22,7 @@ const FILTERS = {
 
 const RANKS = {
   state: byNeed,
-  since: (a, b) => (a.cause?.since ?? "~").localeCompare(b.cause?.since ?? "~"),
+  since: (a, b) => (a.cause?.since_ms ?? Infinity) - (b.cause?.since_ms ?? Infinity) || 0,
   trend: (a, b) => (b.cause?.trend?.per_day ?? -Infinity) - (a.cause?.trend?.per_day ?? -Infinity) || 0,
   cost: (a, b) => (b.cause?.waiting_cost ?? -1) - (a.cause?.waiting_cost ?? -1),
   name: () => 0,
@@ -66,7 +66,7 @@ export function overviewPage(main, showLink) {
   function exportShown() {
     const names = ["name", "state", "at_fault", "stage", "since", "quantity", "value", "limit", "trend_per_day", "cost_of_waiting", "alarms"];
     download("stations.csv", csvOf(names, shown.map((station) => ({ ...station, ...station.cause?.severity, state: station.state, at_fault: causeWords(station), stage: stageWord(station),
-      since: station.cause?.since, trend_per_day: station.cause?.trend?.per_day, cost_of_waiting: station.cause?.waiting_cost }))));
+      since: station.cause && new Date(station.cause.since_ms).toISOString(), trend_per_day: station.cause?.trend?.per_day, cost_of_waiting: station.cause?.waiting_cost }))));
   }
 
   function choose(name) {

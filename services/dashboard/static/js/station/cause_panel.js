@@ -4,11 +4,11 @@ import { absence } from "../base/absent.js";
 import { html, panel, say } from "../base/dom.js";
 import { day, figure, millis, moment } from "../base/format.js";
 import { grade } from "../base/quality.js";
-import { STAGES, assetOf, assetWords, icon, isFault, kindOf, stageOf, state } from "../base/states.js";
+import { STAGES, assetWords, faultsOf, icon, kindOf, stageOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 import { moneyOf } from "./money.js";
 import { residualCharts } from "./residual_charts.js";
-import { severityOf, severityPicture, severityWords } from "./severity.js";
+import { severityPicture, severityWords } from "./severity.js";
 import { statisticsOf } from "./statistics.js";
 
 export function causePanel(view) {
@@ -25,6 +25,7 @@ export function causePanel(view) {
   element.classList.add("is-cause");
   fold.addEventListener("toggle", () => residuals.update(new Set(), fold.open));
   let shown = "";
+  let asset = null; // the one that somebody has chosen among several
 
   function update(changed) {
     away.show(station.has("detector") || !range.isLive || !station.begun);
@@ -32,15 +33,16 @@ export function causePanel(view) {
     residuals.update(changed, fold.open);
     if (!["verdicts", "pump", "model", "begin", "then", "range"].some((name) => changed.has(name))) return;
     const verdict = station.verdict(chosen());
-    const key = JSON.stringify([verdict?.time, verdict?.state, chosen(), station.causes.map((each) => [each.time, each.pump]), station.called(chosen()), Boolean(station.then)]);
+    const key = JSON.stringify([verdict?.time, verdict?.state, asset, chosen(), station.causes.map(({ fault, pump }) => [fault, pump]), station.called(chosen()), Boolean(station.then)]);
     if (key === shown) return;
     shown = key;
     showCauses();
     const isOpen = fold.open;
     say(element.querySelector("h2"), t("What is wrong, pump {name}", { name: station.called(chosen()) }));
-    say(words, verdict ? sentence(verdict) : past.then.length || station.verdicts.size ? t("No verdict on this pump.") : t("No verdict yet."));
-    picture.replaceChildren(...(verdict && severityOf(verdict) ? [severityPicture(verdict)] : []));
-    money.replaceChildren(...(verdict ? moneyOf(verdict) : []));
+    const fault = shownFault(verdict);
+    say(words, verdict ? sentence(verdict, fault) : past.then.length || station.verdicts.size ? t("No verdict on this pump.") : t("No verdict yet."));
+    picture.replaceChildren(...(fault?.severity ? [severityPicture(fault)] : []));
+    money.replaceChildren(...(verdict ? moneyOf(verdict, fault) : []));
     statistics.replaceChildren(...(verdict ? statisticsOf(verdict) : []));
     fold.hidden = !verdict;
     fold.open = isOpen;
@@ -49,35 +51,39 @@ export function causePanel(view) {
   /** One button for each thing that is at fault: one cause is one, however many pumps feel it. */
   function showCauses() {
     const held = causes.contains(document.activeElement);
-    causes.replaceChildren(...station.causes.map((verdict) => {
-      const stage = stageOf(verdict);
-      const asset = assetWords(assetOf(verdict), (number) => station.called(number));
-      return html("button", { type: "button", class: `cause is-${kindOf(verdict)}`, "data-asset": assetOf(verdict), "aria-pressed": assetOf(verdict) === ownAsset(), onclick: () => choose(verdict.pump) },
-        icon(verdict.state, 16), html("span", {}, `${asset}: ${stage ? stage.word : state(verdict.state).word}`));
+    const own = shownFault(station.verdict(chosen()))?.asset;
+    causes.replaceChildren(...station.causes.map(({ fault, pump }) => {
+      const words_ = assetWords(fault.asset, (number) => station.called(number));
+      return html("button", { type: "button", class: `cause is-${kindOf(fault)}`, "data-asset": fault.asset, "aria-pressed": fault.asset === own, onclick: () => look(fault, pump) },
+        icon(fault.state, 16), html("span", {}, `${words_}: ${(stageOf(fault) ?? state(fault.state)).word}`));
     }));
     causes.hidden = station.causes.length === 0;
     if (held) causes.querySelector("button")?.focus();
   }
 
-  function ownAsset() {
-    const verdict = station.verdict(chosen());
-    return verdict && isFault(verdict.state) ? assetOf(verdict) : null;
+  function look(fault, pump) {
+    asset = fault.asset;
+    choose(faultsOf(station.verdict(chosen())).some((each) => each.asset === asset) ? chosen() : pump);
   }
 
-  function sentence(verdict) {
-    const asset = assetWords(assetOf(verdict), (number) => station.called(number));
-    if (!isFault(verdict.state)) {
-      const reason = verdict.evidence?.reason ? ` (${t(verdict.evidence.reason)})` : "";
-      return { normal: t("Pump {name} and its main are as they were learnt.", { name: station.called(verdict.pump) }), learning: t("The healthy station is being learnt.") }[verdict.state] ?? t("Not enough is known to judge") + `${reason}.`;
+  /** The fault that is told of: the one that was chosen, else the worst of the pump. */
+  function shownFault(verdict) {
+    const faults = faultsOf(verdict);
+    return faults.find((each) => each.asset === asset) ?? faults[0];
+  }
+
+  function sentence(verdict, fault) {
+    if (!fault) {
+      const reason = verdict.evidence?.reason ? ` (${verdict.evidence.reason})` : "";
+      return { normal: t("Pump {name} and its main are as they were learnt.", { name: station.called(verdict.pump) }), learning: t("The healthy station is being learnt.") }[verdict.state] ?? `${t("Not enough is known to judge")}${reason}.`;
     }
-    const parts = [t("{asset} is at fault since {time}", { asset: asset.charAt(0).toUpperCase() + asset.slice(1), time: moment(millis(verdict.onset ?? verdict.time)) })];
-    if (verdict.state === "pump_and_system_fault") parts.push(t("and so is the main"));
-    const severity = severityOf(verdict);
-    if (severity) parts.push(severityWords(severity));
-    const { trend } = verdict;
+    const words_ = assetWords(fault.asset, (number) => station.called(number));
+    const parts = [t("{asset} is at fault since {time}", { asset: words_.charAt(0).toUpperCase() + words_.slice(1), time: moment(millis(fault.since)) })];
+    if (fault.severity) parts.push(severityWords(fault.severity));
+    const { trend } = fault;
     if (trend) parts.push(t("it grows by {value} a day", { value: figure(trend.per_day, 2) }));
     if (trend?.reaches_limit) parts.push(t("the limit is reached on {day}{interval}", { day: day(millis(trend.reaches_limit)), interval: trend.interval_at?.every(Boolean) ? ` (${day(millis(trend.interval_at[0]))} – ${day(millis(trend.interval_at[1]))})` : "" }));
-    const stage = STAGES[verdict.stage];
+    const stage = STAGES[fault.stage];
     return `${parts.join(", ")}.${stage ? ` ${stage.word.charAt(0).toUpperCase()}${stage.word.slice(1)}: ${stage.says}.` : ""}`;
   }
 

@@ -5,9 +5,10 @@ import { html } from "../base/dom.js";
 import { figure } from "../base/format.js";
 import { t } from "../base/words.js";
 
-export function moneyOf({ evidence }) {
+export function moneyOf({ evidence }, fault) {
   const parts = [];
-  if (evidence?.advice) parts.push(html("p", { class: "advice" }, adviceWords(evidence.advice)));
+  const advice = fault?.advice || evidence?.advice;
+  if (advice) parts.push(html("p", { class: "advice" }, adviceWords(advice)));
   const cost = evidence?.cost;
   if (!cost) return parts;
   const entries = Object.entries(cost.expected);

@@ -4,6 +4,7 @@
 import { html, mark, panel, say, svg } from "../base/dom.js";
 import { figure, moment, signed } from "../base/format.js";
 import { grade } from "../base/quality.js";
+import { faultsOf, isOfMain } from "../base/states.js";
 import { t } from "../base/words.js";
 import { movedCurves } from "./moved_curves.js";
 
@@ -61,9 +62,10 @@ export function planePanel({ station, past, chosen }) {
       curves.replaceChildren();
       return;
     }
-    const verdict = station.pumpState(chosen());
-    const isPump = verdict === "pump_fault" || verdict === "pump_and_system_fault";
-    const isMain = verdict === "system_fault" || verdict === "pump_and_system_fault";
+    const verdict = station.verdict(chosen());
+    const faults = faultsOf(verdict);
+    const isMain = faults.some(isOfMain);
+    const isPump = faults.some((fault) => fault.asset.startsWith("pump"));
     curves.replaceChildren(
       line(known.configured_pump, "configured"), line(known.configured_system, "configured"),
       band(known.learnt_pump, "learnt"), band(known.learnt_system, "learnt"),

@@ -11,16 +11,7 @@ export const QUANTITIES = {
   static_head_rise_m: { word: t("more static head"), unit: "m", digits: 2 },
   wear_head_percent: { word: t("loss of head by wear"), unit: "%", digits: 1 },
 };
-const MAIN = { pump_fault: "speed_loss_percent", pump_and_system_fault: "speed_loss_percent", system_fault: "friction_rise_percent" };
 const WIDTH = 420;
-
-/** Severity of a verdict: {quantity, value, interval, limit}; of an earlier detector, which told no limit, from its evidence. */
-export function severityOf(verdict) {
-  if (verdict.severity) return verdict.severity;
-  const quantity = MAIN[verdict.state];
-  const told = verdict.evidence?.severity?.[quantity];
-  return told ? { quantity, ...told } : null;
-}
 
 const formOf = (quantity) => QUANTITIES[quantity] ?? { word: t(String(quantity).replaceAll("_", " ")), unit: "", digits: 2 };
 
@@ -32,13 +23,13 @@ export function severityWords({ quantity, value, interval, limit }) {
 }
 
 /** A bar from nothing to beyond the limit, with the interval as a whisker; half of the limit is where a visit is planned. */
-export function severityPicture(verdict) {
-  const { quantity, value, interval, limit } = severityOf(verdict);
+export function severityPicture(fault) {
+  const { quantity, value, interval, limit } = fault.severity;
   const { word, unit, digits } = formOf(quantity);
   const most = 1.15 * Math.max(limit ?? 0, Math.abs(value), ...(interval ?? []).map(Math.abs), 1e-9);
   const x = (amount) => Math.max(0, (WIDTH * amount) / most);
   const lines = limit == null ? [] : [[limit / 2, t("plan")], [limit, t("limit")]];
-  const drawing = svg("svg", { class: `severity is-${kindOf(verdict)}`, viewBox: `0 -16 ${WIDTH} 62`, role: "img", "aria-label": severityWords(severityOf(verdict)) },
+  const drawing = svg("svg", { class: `severity is-${kindOf(fault)}`, viewBox: `0 -16 ${WIDTH} 62`, role: "img", "aria-label": severityWords(fault.severity) },
     svg("rect", { class: "track", x: 0, y: 4, width: WIDTH, height: 16 }),
     svg("rect", { class: "bar", x: 0, y: 4, width: x(value).toFixed(1), height: 16 }),
     interval ? svg("path", { class: "whisker", d: `M${x(interval[0])} 12H${x(interval[1])}M${x(interval[0])} 7v10M${x(interval[1])} 7v10` }) : null,

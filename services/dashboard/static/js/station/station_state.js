@@ -1,13 +1,15 @@
 // What the page knows of one station: takes frames, keeps the last samples, verdicts and alarms.
 
 import { Currency } from "../base/quality.js";
-import { assetOf, isFault, kindOf, state } from "../base/states.js";
+import { faultsOf, isOfMain, kindOf, stageOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 
 const MOST_ROWS = 1500;
 const MOST_VERDICTS = 80;
 const PUMP_VALUES = 4;
 const FIRST_PUMP = 3;
+
+const rank = (fault) => 10 * (stageOf(fault)?.rank ?? 3) + state(fault.state).rank;
 
 export class StationState {
   constructor(name) {
@@ -169,27 +171,29 @@ export class StationState {
   /** How a pump is drawn: a fault of its main is no fault of the pump. */
   pumpLook(number) {
     const verdict = this.verdict(number);
-    const isOfMain = verdict && isFault(verdict.state) && verdict.state !== "pump_and_system_fault" && assetOf(verdict)?.startsWith("main");
-    if (isOfMain) return { kind: "calm", word: t("see main"), isFault: false, state: "normal" };
-    return { kind: verdict ? kindOf(verdict) : "doubt", word: state(this.pumpState(number)).word, isFault: isFault(this.pumpState(number)), state: this.pumpState(number) };
+    const faults = faultsOf(verdict);
+    const own = faults.find((fault) => !isOfMain(fault));
+    if (own) return { kind: kindOf(own), word: state(own.state).word, isFault: true, state: own.state };
+    if (faults.length) return { kind: "calm", word: t("see main"), isFault: false, state: "normal" };
+    return { kind: verdict ? kindOf(verdict) : "doubt", word: state(this.pumpState(number)).word, isFault: false, state: this.pumpState(number) };
   }
 
-  /** The verdict that names a main (by its place) as at fault; undefined if none does. */
+  /** The fault of a main (by its place), the worst that its pumps tell; undefined if none does. */
   mainFault(place) {
-    return this.numbers.filter((number) => this.mainOf(number) === place).map((number) => this.verdict(number))
-      .filter((verdict) => verdict && (verdict.state === "pump_and_system_fault" || (isFault(verdict.state) && assetOf(verdict)?.startsWith("main"))))
-      .sort((a, b) => state(b.state).rank - state(a.state).rank)[0];
+    return this.causes.find(({ fault, pump }) => isOfMain(fault) && this.mainOf(pump) === place)?.fault;
   }
 
-  /** Causes that verdicts name now, each once, the gravest first. */
+  /** What is at fault, each asset once however many pumps feel it, the gravest first: {fault, pump, verdict}. */
   get causes() {
     const found = new Map();
-    for (const number of this.numbers) {
-      const verdict = this.verdict(number);
-      const asset = verdict && assetOf(verdict);
-      if (verdict && isFault(verdict.state) && !found.has(asset)) found.set(asset, verdict);
+    for (const pump of this.numbers) {
+      const verdict = this.verdict(pump);
+      for (const fault of faultsOf(verdict)) {
+        const before = found.get(fault.asset);
+        if (!before || rank(fault) > rank(before.fault)) found.set(fault.asset, { fault, pump, verdict });
+      }
     }
-    return [...found.values()].sort((a, b) => state(b.state).rank - state(a.state).rank);
+    return [...found.values()].sort((a, b) => rank(b.fault) - rank(a.fault));
   }
 
   get numbers() {

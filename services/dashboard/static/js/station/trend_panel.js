@@ -7,7 +7,7 @@ import { csvOf, download } from "../base/export.js";
 import { figure, moment, zone } from "../base/format.js";
 import { grade } from "../base/quality.js";
 import { absence } from "../base/absent.js";
-import { STATES, assetOf, isFault, kindOf, stageOf } from "../base/states.js";
+import { STATES, faultsOf, isOfMain, kindOf, stageOf } from "../base/states.js";
 import { t } from "../base/words.js";
 
 const OF_PUMPS = [
@@ -60,16 +60,15 @@ export function trendPanel({ station, range, past, chosen, choose }) {
     return { verdicts: [], alarms: [] };
   }
 
-  const isMain = (band) => Boolean(assetOf(band)?.startsWith("main"));
-
   function laneBands() {
     const all = laneNames().length;
     const found = [];
     for (const band of bandsOf().verdicts) {
-      const isOfMain = isFault(band.state) && isMain(band);
-      const lane = band.pump - 1;
-      if (lane < station.pumps) found.push({ ...band, lane, lanes: all, pen: isOfMain && band.state !== "pump_and_system_fault" ? "line" : PENS[kindOf(band)] });
-      if (isOfMain || band.state === "pump_and_system_fault") found.push({ ...band, lane: station.pumps + station.mainOf(band.pump), lanes: all, pen: PENS[kindOf({ ...band, state: "system_fault" })] });
+      const faults = faultsOf(band);
+      const own = faults.find((fault) => !isOfMain(fault));
+      const ofMain = faults.find(isOfMain);
+      if (band.pump <= station.pumps) found.push({ ...band, lane: band.pump - 1, lanes: all, pen: own ? PENS[kindOf(own)] : ofMain ? "line" : PENS[kindOf({ state: band.state })] });
+      if (ofMain) found.push({ ...band, lane: station.pumps + station.mainOf(band.pump), lanes: all, pen: PENS[kindOf(ofMain)] });
     }
     for (const band of bandsOf().alarms) found.push({ ...band, lane: all - 1, lanes: all, pen: band.priority === "low" ? "doubt" : band.priority === "medium" ? "warn" : "urgent" });
     return found;
@@ -77,8 +76,11 @@ export function trendPanel({ station, range, past, chosen, choose }) {
 
   /** Faults of the chosen pump and of its main, behind each chart. */
   function shades() {
-    const mine = bandsOf().verdicts.filter((band) => isFault(band.state) && (isMain(band) ? station.mainOf(band.pump) === station.mainOf(chosen()) : band.pump === chosen()));
-    return mine.map((band) => ({ ...band, pen: kindOf(band) === "urgent" ? "urgent-ground" : kindOf(band) === "warn" ? "warn-ground" : "soft" }));
+    const isMine = (band, fault) => (isOfMain(fault) ? station.mainOf(band.pump) === station.mainOf(chosen()) : band.pump === chosen());
+    return bandsOf().verdicts.flatMap((band) => {
+      const fault = faultsOf(band).find((each) => isMine(band, each));
+      return fault ? [{ ...band, pen: { urgent: "urgent-ground", warn: "warn-ground" }[kindOf(fault)] ?? "soft" }] : [];
+    });
   }
 
   function linesOf(column, lines) {

@@ -109,7 +109,7 @@ export function wellPanel({ station, past, chosen, choose }) {
     const fault = station.mains.map((_, place) => station.mainFault(place)).find(Boolean);
     if (!fault) return "";
     const stage = stageOf(fault);
-    return `, ${fault.state === "pump_and_system_fault" ? t("fault of the main") : state(fault.state).word}${stage ? `: ${stage.word}` : ""}`;
+    return `, ${state(fault.state).word}${stage ? `: ${stage.word}` : ""}`;
   }
 
   /** Flow of a main, and the worst of how good its parts are; a pump without a meter of flow does not count. */
