@@ -10,7 +10,7 @@ from wetwell.protocols.messages.history import History
 from wetwell.services.dashboard.past.bands import alarm_bands, verdict_bands
 from wetwell.services.dashboard.past.client import history
 
-AT_ONCE = 8
+STATIONS_AT_ONCE = 8
 """Most stations that the historian is asked about at a time."""
 MOST_CHANGES = 5000
 """Most changes of a station that are drawn."""
@@ -48,7 +48,7 @@ async def journal(bus: Bus, stations: Sequence[str], query: Mapping[str, str]) -
     RefusalError
         If that is no question.
     """
-    gate = asyncio.Semaphore(AT_ONCE)
+    gate = asyncio.Semaphore(STATIONS_AT_ONCE)
 
     async def asked(station: str) -> History:
         async with gate:
