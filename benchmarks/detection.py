@@ -160,7 +160,9 @@ def configurations() -> dict[str, Configuration]:
         paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=148_000, after="clear"), clogging(0.25)
     )
     cleared = faults(
-        paper, Blockage(pump=1, speed_loss=0.1, start_s=126_400, end_s=137_200, after="clear"), clogging(0.25)
+        paper,
+        Blockage(pump=1, speed_loss=0.1, start_s=104_400, end_s=126_400, after="clear"),
+        PipeClogging(friction_rise=0.8, start_s=104_400, end_s=148_000, after="clear"),
     )
     later = faults(paper, blockage(90_000, 0.4), *paper.fault[1:])
     slow = altered(alpha, sump=alpha.sump.model_dump(exclude_none=True) | {"area_m2": LONG_RUNS_AREA_M2})

@@ -76,8 +76,8 @@ def kernel_s(station: Station, inflow_m3h: Floats, seed: int, repeats: int) -> f
     """Time of a day in the kernel, in blocks of an hour."""
     from wetwell.simulator.effects import effective_parameters  # noqa: PLC0415 - the benchmark runs without, too
 
-    pumps = len(station.pump)
-    blocks = [healthy_forcing(block_m3h, pumps) for block_m3h in np.split(inflow_m3h, inflow_m3h.size // BLOCK_S)]
+    parts = len(station.pump), len(station.mains)
+    blocks = [healthy_forcing(block_m3h, *parts) for block_m3h in np.split(inflow_m3h, inflow_m3h.size // BLOCK_S)]
     plant, rng = Plant(effective_parameters(station), 1.0), np.random.default_rng(seed)
 
     def run() -> None:

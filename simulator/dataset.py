@@ -17,11 +17,11 @@ from wetwell.protocols.quantities import STATION_QUANTITIES
 from wetwell.protocols.station.control import Control
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
-from wetwell.protocols.station.station_file import EffectTable, Station
+from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.station.sump import Sump
 from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.simulator.duty import check_operable, duty_flows_m3h
-from wetwell.simulator.effects import effective_parameters
+from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.faults.profile import Profile, PumpFault, SensorFault, SystemFault
 from wetwell.simulator.inflow import INFLOWS
@@ -205,7 +205,7 @@ def _station_table(base: Station, number: int, rng: np.random.Generator) -> dict
             name: _rounded(value * _log_uniform(rng, 0.5, 2.0)) if "noise" in name else value
             for name, value in base.sensors.model_dump().items()
         },
-        "effect": [effect.model_dump() for effect in base.effect if _pump_of(effect) <= pumps],
+        "effect": _effects(base, pumps, served),
     }
 
 
@@ -252,9 +252,15 @@ def _control(base: Control, pumps: int) -> dict[str, Any]:
     return table | {"out_of_service": in_service if len(in_service) < pumps else []}
 
 
-def _pump_of(effect: EffectTable) -> int:
-    pump = (effect.model_extra or {}).get("pump", 0)
-    return pump if isinstance(pump, int) else 0
+def _effects(base: Station, pumps: int, served: list[int]) -> list[dict[str, Any]]:
+    """Effects of the base on pumps and mains that are there, with the numbers that these have now."""
+    numbers = {0: 0} | {place + 1: number for number, place in enumerate(served, start=1)}
+    tables = []
+    for effect, written in zip(effects_of(base), base.effect, strict=True):
+        main = getattr(effect, "main", 0)
+        if getattr(effect, "pump", 0) <= pumps and main in numbers:
+            tables.append(written.model_dump() | ({"main": numbers[main]} if main else {}))
+    return tables
 
 
 def _capacity_m3h(station: Station) -> float:
@@ -322,6 +328,8 @@ def _fault(fault: type[Profile], times: dict[str, Any], station: Station, rng: n
             lowest = 1 if issubclass(fault, PumpFault) else 0
             pump = int(rng.integers(lowest, len(station.pump) + 1))
             table["pump"] = 0 if table.get("channel") in STATION_QUANTITIES else pump
+        if "main" in fault.model_fields and len(station.mains) > 1:
+            table["main"] = int(rng.integers(0, len(station.mains) + 1))
         table |= _strengths(fault, table, station, rng)
         try:
             return fault.model_validate(table).model_dump()

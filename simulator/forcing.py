@@ -11,10 +11,10 @@ from wetwell.simulator.telemetry.channels import channels
 class Forcing(NamedTuple):
     """What acts on the plant in a block of n seconds, to be worked into in place.
 
-    Inflow, friction, static head and voltage are (n,); factors and leaks of the pumps are (pumps, n). Factors are 1,
-    rises and leaks 0 in health. `is_plc_frozen` stops the PLC's program: outputs and telemetry stay as they are. The
-    sensor arrays are (channels, n), or (channels, 1) where not `has_sensor_faults`: a bias in units of the channel, a
-    factor on its noise, and whether it is stuck.
+    Inflow and voltage are (n,); friction and static head (mains, n); factors and leaks of the pumps (pumps, n).
+    Factors are 1, rises and leaks 0 in health. `is_plc_frozen` stops the PLC's program: outputs and telemetry stay as
+    they are. The sensor arrays are (channels, n), or (channels, 1) where not `has_sensor_faults`: a bias in units of
+    the channel, a factor on its noise, and whether it is stuck.
     """
 
     inflow_m3h: Floats
@@ -33,15 +33,15 @@ class Forcing(NamedTuple):
     is_sensor_stuck: Flags
 
 
-def healthy_forcing(inflow_m3h: Floats, pumps: int, *, with_sensors: bool = False) -> Forcing:
+def healthy_forcing(inflow_m3h: Floats, pumps: int, mains: int, *, with_sensors: bool = False) -> Forcing:
     """Forcing without any fault, with or without room for faults of the sensors."""
     seconds = inflow_m3h.size
     of_pumps = (pumps, seconds)
     of_channels = (channels(pumps), seconds if with_sensors else 1)
     return Forcing(
         inflow_m3h=inflow_m3h.copy(),
-        friction_factor=np.ones(seconds),
-        static_rise_m=np.zeros(seconds),
+        friction_factor=np.ones((mains, seconds)),
+        static_rise_m=np.zeros((mains, seconds)),
         voltage_factor=np.ones(seconds),
         is_plc_frozen=np.zeros(seconds, dtype=np.bool_),
         speed_factor=np.ones(of_pumps),

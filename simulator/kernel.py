@@ -157,8 +157,8 @@ def static_head_at_m(main: MainParameters, level_m: float, rise_m: float) -> flo
 @inlined
 def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, m: int, level_m: float) -> None:
     """Set the flows of main m after the second and their means over it."""
-    static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[second])
-    friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[second]
+    static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
+    friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     inertia_s2_m2 = plant.mains[m].inertia_s2_m2
     flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
@@ -236,11 +236,11 @@ def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, seco
         leak_m3h = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
         if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
             m = plant.pumps[i].main
-            static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[second])
+            static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
             head_m = max(static_head_m + state.pumps[i].air_m, 0.0)
             if plant.mains[m].is_common_header:
                 pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
-                friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[second]
+                friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
                 head_m += friction_h2_m5 * sum_of(state.mean_flow_m3h, pumps) ** 2
             back_m3h += leak_m3h * math.sqrt(head_m)
     return back_m3h

@@ -164,9 +164,10 @@ class PlantParameters:
         pumps = [changed(pump) if number in {0, i} else pump for i, pump in enumerate(self.pumps, start=1)]
         return replace(self, pumps=tuple(pumps))
 
-    def with_mains(self, changed: Callable[[MainParameters], MainParameters]) -> "PlantParameters":
-        """The same plant with all its mains changed."""
-        return replace(self, mains=tuple(changed(main) for main in self.mains))
+    def with_mains(self, changed: Callable[[MainParameters], MainParameters], number: int = 0) -> "PlantParameters":
+        """The same plant with one main changed (from 1), or all (0)."""
+        mains = [changed(main) if number in {0, m} else main for m, main in enumerate(self.mains, start=1)]
+        return replace(self, mains=tuple(mains))
 
     def main_of(self, pump: int) -> MainParameters:
         """Main of a pump, counted from 0."""

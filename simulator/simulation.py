@@ -39,19 +39,23 @@ class Simulation:
     Raises
     ------
     ValueError
-        If a fault names a pump that the station does not have, an effect of the station is not known or wrong, or
-        nobody knows when it starts its pumps, or the initial level lies under its floor.
+        If a fault names a pump or main that the station lacks, an effect of the station is not known or wrong,
+        or nobody knows when it starts its pumps, or the initial level lies under its floor.
     """
 
     def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
         check_driven(station)
         self._effects = effects_of(station)
         for number, fault in enumerate(scenario.fault, start=1):
-            if (pump := _pump_of(fault)) > len(station.pump):
-                raise ValueError(
-                    f"scenario '{scenario.name}': fault[{number}].pump: got {pump}, "
-                    f"station '{station.name}' has {len(station.pump)} pumps"
-                )
+            for part, place, count in (
+                ("pump", _pump_of(fault), len(station.pump)),
+                ("main", _main_of(fault), len(station.mains)),
+            ):
+                if place > count:
+                    raise ValueError(
+                        f"scenario '{scenario.name}': fault[{number}].{part}: got {place}, "
+                        f"station '{station.name}' has {count} {part}{'' if count == 1 else 's'}"
+                    )
         floor_m = station.sump.floor_level_m
         if scenario.initial_level_m < floor_m:
             raise ValueError(
@@ -124,6 +128,7 @@ class Simulation:
         forcing = healthy_forcing(
             self._inflow.next_seconds(seconds),
             len(self.station.pump),
+            len(self.station.mains),
             with_sensors=any(isinstance(fault, SensorFault) for fault in self.scenario.fault),
         )
         for effect in self._effects:
@@ -140,10 +145,9 @@ class Simulation:
         )
 
     def _truth_columns(self, true: Truth, forcing: Forcing, time_s: Floats) -> dict[str, npt.NDArray[Any]]:
-        """Truth columns; the state of a pump knows its own faults and those of the whole station."""
+        """Truth columns; the state of a pump knows its own faults, those of its main and of the whole station."""
         active = [fault.is_active(time_s) for fault in self.scenario.fault]
         shares = [fault.share(time_s) for fault in self.scenario.fault]
-        concerned = [_pump_of(fault) for fault in self.scenario.fault]
         kinds = [_KINDS.index(next(k for k in _KINDS if isinstance(fault, k))) for fault in self.scenario.fault]
         columns: dict[str, npt.NDArray[Any]] = {
             "truth_state": _state_names(kinds, active, time_s.size),
@@ -152,12 +156,17 @@ class Simulation:
             "truth_level_m": true.level_m,
             "truth_inflow_m3h": forcing.inflow_m3h,
             "truth_overflow_m3h": true.overflow_m3h,
-            "truth_friction_factor": forcing.friction_factor,
-            "truth_static_rise_m": forcing.static_rise_m,
         }
-        for i in range(len(self.station.pump)):
-            felt = [k for k, pump in enumerate(concerned) if pump in {0, i + 1}]
-            own = [shares[k] for k, pump in enumerate(concerned) if pump == i + 1]
+        for m, (friction, rise_m) in enumerate(zip(forcing.friction_factor, forcing.static_rise_m, strict=True), 1):
+            main = f"main{m}_" if len(self.station.mains) > 1 else ""
+            columns |= {f"truth_{main}friction_factor": friction, f"truth_{main}static_rise_m": rise_m}
+        for i, main_place in enumerate(self.station.main_of_pump):
+            felt = [
+                k
+                for k, fault in enumerate(self.scenario.fault)
+                if _pump_of(fault) in {0, i + 1} and _main_of(fault) in {0, main_place + 1}
+            ]
+            own = [shares[k] for k, fault in enumerate(self.scenario.fault) if _pump_of(fault) == i + 1]
             columns |= {
                 f"truth_pump{i + 1}_state": _state_names(
                     [kinds[k] for k in felt], [active[k] for k in felt], time_s.size
@@ -204,6 +213,11 @@ _SENSOR_FAULT = 4
 def _pump_of(fault: Fault) -> int:
     """Pump (from 1) that a fault is confined to; 0 where it concerns them all."""
     return fault.pump if isinstance(fault, PumpFault | ChannelFault) else 0
+
+
+def _main_of(fault: Fault) -> int:
+    """Main (from 1) that a fault is confined to; 0 where it concerns them all."""
+    return fault.main if isinstance(fault, SystemFault) else 0
 
 
 def _state_names(kinds: Sequence[int], active: Sequence[Flags], seconds: int) -> npt.NDArray[np.str_]:

@@ -1,7 +1,5 @@
 """Faults as they were, in the terms of a run that comes next."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.special import ndtr
 
@@ -29,8 +27,8 @@ def carry(
 ) -> tuple[Floats, Carried | None]:
     """(6,) prior of the hypotheses, and the faults that were there before.
 
-    A fault that is no larger than what a run scatters by is none: that part of its probability goes to health.
-    Without a head sensor no size is known, and nothing is carried.
+    What is no larger than a run scatters by is no size to hold the next run against: that part of the probability is
+    of a fault as new as any other. Without a head sensor no size is known, and nothing is carried.
 
     Parameters
     ----------
@@ -58,12 +56,11 @@ def carry(
     mean_m = np.array([-lost_m, rise * friction_m - change_m])
     variance_m2 = np.array([lost_m2, variance * friction_m**2 + change_m**2])
     is_known = np.array([asset.track.time_ns is not None for asset in (pump.asset, system.asset)])
-    is_fault = np.where(is_known, _beyond(mean_m, variance_m2, np.sqrt(own_m2[[PUMP, SYSTEM]])), 1.0)
+    is_fault = is_known * _beyond(mean_m, variance_m2, np.sqrt(own_m2[[PUMP, SYSTEM]]))
     begun = CHANGE_PER_RUN * np.array([PUMP_PRIOR, SYSTEM_PRIOR])
-    old = np.maximum(np.array([pump.pump, system.system]) - begun, 0.0) * is_fault
-    chance = begun + old
-    prior = joint_prior(replace(pump, pump=float(chance[0])), replace(system, system=float(chance[1])))
-    return prior, Carried(mean_m=mean_m, variance_m2=variance_m2, share=is_known * old / chance)
+    chance = np.array([pump.pump, system.system])
+    share = np.maximum(chance - begun, 0.0) / chance * is_fault
+    return joint_prior(pump, system), Carried(mean_m=mean_m, variance_m2=variance_m2, share=share)
 
 
 def _beyond(mean: Floats, variance: Floats, limit: Floats) -> Floats:

@@ -1,6 +1,7 @@
 """Which state explains a run: normal, pump, system, both, or a meter that is wrong."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
@@ -39,29 +40,47 @@ RISING_SHARE = 0.9
 
 
 _FAULTS = [PUMP_FAULT, SYSTEM_FAULT, BOTH]
-_MOVES_PUMP = (PUMP_FAULT, BOTH)
-_MOVES_SYSTEM = (SYSTEM_FAULT, BOTH)
 
 
-def _table_of_ways() -> Floats:
-    """(w, 5) ways to shift: hypothesis, scale of a new fault of pump and of main, whether it is the one carried.
+class _Table(NamedTuple):
+    """Ways to shift: of each its hypothesis, the scales of new faults, the curves that one that is carried moves."""
 
-    First those of new faults, of each hypothesis the one at full scale before the others, then those with a fault
-    that was there before.
-    """
-    rows: list[tuple[float, float, float, bool, bool]] = [(NORMAL, 0.0, 0.0, False, False)]
+    hypotheses: Integers
+    new: Floats
+    moves: Flags
+    is_old: Flags
+    flow: Integers
+    head: Integers
+    log_share: Floats
+    is_of: Flags
+
+
+def _table(*, carried: bool) -> _Table:
+    """Ways of new faults, of each hypothesis the one at full scale before the others, then those that are carried."""
+    rows: list[tuple[int, float, float, bool, bool]] = [(NORMAL, 0.0, 0.0, False, False)]
     for scale in SCALES:
         rows += [(PUMP_FAULT, scale, 0.0, False, False), (SYSTEM_FAULT, 0.0, scale, False, False)]
         rows += [(cause, scale, scale, False, False) for cause in (BOTH, FLOW_METER, HEAD_SENSOR)]
-    rows += [(PUMP_FAULT, 0.0, 0.0, True, False), (SYSTEM_FAULT, 0.0, 0.0, False, True)]
-    for scale in SCALES:
-        rows += [(BOTH, 0.0, scale, True, False), (BOTH, scale, 0.0, False, True)]
-    rows.append((BOTH, 0.0, 0.0, True, True))
-    return np.array(rows, dtype=np.float64)
+    if carried:
+        rows += [(PUMP_FAULT, 0.0, 0.0, True, False), (SYSTEM_FAULT, 0.0, 0.0, False, True)]
+        for scale in SCALES:
+            rows += [(BOTH, 0.0, scale, True, False), (BOTH, scale, 0.0, False, True)]
+        rows.append((BOTH, 0.0, 0.0, True, True))
+    hypotheses = np.array([row[0] for row in rows])
+    new = np.array([row[1:3] for row in rows])
+    return _Table(
+        hypotheses=hypotheses,
+        new=new,
+        moves=np.column_stack([np.isin(hypotheses, (PUMP_FAULT, BOTH)), np.isin(hypotheses, (SYSTEM_FAULT, BOTH))]),
+        is_old=np.array([row[3:] for row in rows]),
+        flow=np.flatnonzero(hypotheses == FLOW_METER),
+        head=np.flatnonzero(hypotheses == HEAD_SENSOR),
+        log_share=np.where(new.any(axis=1), -np.log(len(SCALES)), 0.0),
+        is_of=hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis],
+    )
 
 
-_WAYS = _table_of_ways()
-_NEW_WAYS = 1 + 5 * len(SCALES)
+_NEW, _CARRIED = _table(carried=False), _table(carried=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,44 +145,44 @@ class Carried:
 
 def _ways(
     observation: Observation, scales: Scales, known: Flags, carried: Carried | None
-) -> tuple[Integers, Floats, Floats, Floats]:
-    """Each way to shift: (w,) hypothesis, (w,) logarithm of its share in that, (w, 4) mean, (w, 4, 4) covariance.
+) -> tuple[Flags, Floats, Floats, Floats]:
+    """Each way to shift: (6, w) of which hypothesis, (w,) log of its share in that, (w, 4) mean, (w, 4, 4) spread.
 
     The first way of each hypothesis is the one at full scale.
     """
-    table = _WAYS if carried is not None else _WAYS[:_NEW_WAYS]
-    hypotheses, new_p, new_s = table[:, 0].astype(np.int64), table[:, 1], table[:, 2]
-    moves_p, moves_s = np.isin(hypotheses, _MOVES_PUMP), np.isin(hypotheses, _MOVES_SYSTEM)
+    table = _NEW if carried is None else _CARRIED
+    new, moves = table.new, table.moves
     v_p, v_s = observation.slope_variance
-    log_share = np.where((new_p > 0.0) | (new_s > 0.0), -np.log(len(SCALES)), 0.0)
-    offset, spread = np.zeros((len(table), 4)), np.zeros((len(table), 4, 4))
-    spread[:, PUMP, PUMP] = moves_p * new_p * scales.pump_m**2 + moves_s * v_p
-    spread[:, SYSTEM, SYSTEM] = moves_s * new_s * scales.system_m**2 + moves_p * v_s
-    spread[:, PUMP, PUMP] += moves_s * new_s * (scales.system_m * observation.system_in_pump) ** 2
-    flow, head = hypotheses == FLOW_METER, hypotheses == HEAD_SENSOR
-    scale = new_p[:, np.newaxis, np.newaxis]
-    spread[flow] = scale[flow] * FLOW_METER_ERROR**2 * np.outer(observation.flow_meter, observation.flow_meter)
-    spread[head] = scale[head] * scales.head_m**2 * np.outer(observation.head_sensor, observation.head_sensor)
+    log_share = table.log_share
+    offset, spread = np.zeros((len(new), 4)), np.zeros((len(new), 4, 4))
+    tau_p, tau_s = scales.pump_m**2, scales.system_m**2
+    spread[:, PUMP, PUMP] = moves[:, 0] * new[:, 0] * tau_p + moves[:, 1] * (
+        v_p + new[:, 1] * tau_s * observation.system_in_pump**2
+    )
+    spread[:, SYSTEM, SYSTEM] = moves[:, 1] * new[:, 1] * tau_s + moves[:, 0] * v_s
+    for meter, variance, way in (
+        (table.flow, FLOW_METER_ERROR**2, observation.flow_meter),
+        (table.head, scales.head_m**2, observation.head_sensor),
+    ):
+        spread[meter] = new[meter, :1, np.newaxis] * variance * (way[:, np.newaxis] * way)
     if carried is not None:
-        is_old = table[:, 3:] > 0.0
-        offset[:, : SYSTEM + 1] = is_old * carried.mean_m
-        spread[:, PUMP, PUMP] += is_old[:, 0] * carried.variance_m2[0]
-        spread[:, SYSTEM, SYSTEM] += is_old[:, 1] * carried.variance_m2[1]
+        offset[:, : SYSTEM + 1] = table.is_old * carried.mean_m
+        spread[:, PUMP, PUMP] += table.is_old[:, 0] * carried.variance_m2[0]
+        spread[:, SYSTEM, SYSTEM] += table.is_old[:, 1] * carried.variance_m2[1]
         log_old, log_new = np.log(np.maximum([carried.share, 1.0 - carried.share], 1e-300))
-        chosen = np.where(is_old, log_old, log_new) * np.column_stack([moves_p, moves_s])
-        log_share = log_share + chosen.sum(axis=1)
+        log_share = log_share + (np.where(table.is_old, log_old, log_new) * moves).sum(axis=1)
     disturbed = (1.0 - DISTURBED_SHARE, DISTURBED_SHARE) if known[DRAWDOWN] else (1.0,)
     witnesses = 2 * len(disturbed) if known[POWER] else len(disturbed)
-    ways = np.repeat(spread, witnesses, axis=0).reshape(len(table), len(disturbed), -1, 4, 4)
+    ways = np.repeat(spread, witnesses, axis=0).reshape(len(new), len(disturbed), -1, 4, 4)
     ways[:, 1:, :, DRAWDOWN, DRAWDOWN] += DISTURBED_DRAWDOWN**2
     ways[:, :, 1:, POWER, POWER] += POWER_SHIFT**2
     share = np.array(disturbed)[:, np.newaxis]
     if known[POWER]:
-        moving = np.where(flow | head, DISTURBED_SHARE, LOAD_SHARE)
+        moving = np.where(table.hypotheses < FLOW_METER, LOAD_SHARE, DISTURBED_SHARE)
         share = share * np.column_stack([1.0 - moving, moving])[:, np.newaxis]
-    log_each = log_share[:, np.newaxis, np.newaxis] + np.log(share)
-    log_each = np.broadcast_to(log_each, ways.shape[:3]).ravel()
-    return np.repeat(hypotheses, witnesses), log_each, np.repeat(offset, witnesses, axis=0), ways.reshape(-1, 4, 4)
+    log_each = np.broadcast_to(log_share[:, np.newaxis, np.newaxis] + np.log(share), ways.shape[:3]).ravel()
+    is_of = np.repeat(table.is_of, witnesses, axis=1)
+    return is_of, log_each, np.repeat(offset, witnesses, axis=0), ways.reshape(-1, 4, 4)
 
 
 def _log_sums(log_values: Floats) -> Floats:
@@ -216,13 +235,12 @@ def posterior_of(
     """
     known = np.isfinite(observation.mean) & np.isfinite(np.diag(observation.covariance))
     mean = observation.mean[known]
-    hypotheses, log_share, offset, spread = _ways(observation, scales, known, carried)
+    is_of, log_share, offset, spread = _ways(observation, scales, known, carried)
     every = spread[:, known][:, :, known] + observation.covariance[np.ix_(known, known)]
     _, log_determinant = np.linalg.slogdet(every)
     inverse = np.linalg.inv(every)
     error = mean - offset[:, known]
     log_each = log_share - 0.5 * (log_determinant + np.einsum("hi,hij,hj->h", error, inverse, error))
-    is_of = hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis]
     log_likelihood = _log_sums(np.where(is_of, log_each, -np.inf))
     inverse = inverse[is_of.argmax(axis=1)]
     estimates, deviations = _shifts(observation, scales, inverse, mean)

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.timestamps import NS_PER_DAY
@@ -69,9 +68,15 @@ class SizeTrack:
         disturbance : float
             Variance of what disturbs all runs of some hours alike. [unit², as all variances]
         """
-        mean, covariance, log_weight = self._ahead(time_ns, scale, disturbance)
-        h = np.array([1.0, 0.0, 1.0])
-        return _mixed(mean @ h, covariance @ h @ h, log_weight)
+        if self.time_ns is None:
+            return 0.0, disturbance
+        days = max(time_ns - self.time_ns, 0) / NS_PER_DAY
+        kept = math.exp(-days / DISTURBANCE_DAYS)
+        mean = self.mean[:, SIZE] + days * self.mean[:, RATE] + kept * self.mean[:, DISTURBANCE]
+        way = np.array([1.0, days, kept])
+        variance = self.covariance @ way @ way
+        variance += (RATE_CHANGES * scale) ** 2 * days**3 / 3.0 + (1.0 - kept**2) * disturbance
+        return _mixed(mean, variance, _normalised(math.exp(-days / WEIGHT_DAYS) * self.log_weight))
 
     def update(
         self,
@@ -103,13 +108,11 @@ class SizeTrack:
         total = gain[:, SIZE] + gain[:, DISTURBANCE] + variance
         error = value - mean[:, SIZE] - mean[:, DISTURBANCE]
         log_each = log_weight - 0.5 * (np.log(total) + error**2 / total)
-        log_carried = float(logsumexp(log_each))
+        log_carried = _log_sum(log_each)
         own = variance + disturbance
         log_gone = math.log(change_share) - 0.5 * (math.log(own) + value**2 / own)
         jumps = own + scale**2 * np.array(JUMP_SCALES)
-        log_jump = math.log(change_share**2 / len(jumps)) + float(
-            logsumexp(-0.5 * (np.log(jumps) + value**2 / jumps))
-        )
+        log_jump = math.log(change_share**2 / len(jumps)) + _log_sum(-0.5 * (np.log(jumps) + value**2 / jumps))
         was_strange, self.is_strange = self.is_strange, max(log_gone, log_jump) > log_carried
         is_anew = self.is_strange and (is_sure or was_strange)
         if is_anew:
@@ -161,7 +164,7 @@ class SizeTrack:
         covariance[:, RATE, RATE] += change * days
         covariance[:, DISTURBANCE, DISTURBANCE] += (1.0 - kept**2) * disturbance
         log_weight = math.exp(-days / WEIGHT_DAYS) * self.log_weight
-        return self.mean @ step.T, covariance, log_weight - logsumexp(log_weight)
+        return self.mean @ step.T, covariance, _normalised(log_weight)
 
 
 def _anew(value: float, variance: float, scale: float, disturbance: float) -> tuple[Floats, Floats]:
@@ -173,6 +176,16 @@ def _anew(value: float, variance: float, scale: float, disturbance: float) -> tu
     covariance[:, RATE, RATE] = FIRST_RATE_DAYS * (RATE_CHANGES * scale) ** 2
     covariance[:, DISTURBANCE, DISTURBANCE] = disturbance
     return mean, covariance
+
+
+def _log_sum(log_values: Floats) -> float:
+    """Logarithm of the sum of logarithms; SciPy's takes ten times as long on five."""
+    top = float(log_values.max())
+    return top + math.log(float(np.exp(log_values - top).sum()))
+
+
+def _normalised(log_weight: Floats) -> Floats:
+    return log_weight - _log_sum(log_weight)
 
 
 def _mixed(means: Floats, variances: Floats, log_weight: Floats) -> tuple[float, float]:

@@ -1,27 +1,40 @@
 """Messages on alarms, after ISA-18.2: the alarm itself, an act of an operator on it, the answer."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from wetwell.protocols.messages.message import Message, Stamp
+from wetwell.protocols.messages.verdict import Severity, Stage, Trend
 
 AlarmState = Literal[
     "normal",
     "unacknowledged",
     "acknowledged",
     "returned",
+    "latched_unacknowledged",
+    "latched_acknowledged",
     "shelved",
+    "suppressed",
     "out_of_service",
 ]
 """ISA-18.2: normal (A), unacknowledged alarm (B), acknowledged alarm (C), returned to normal unacknowledged (D),
-shelved (G), out of service (I)."""
+latched unacknowledged (E), latched acknowledged (F), shelved (G), suppressed by design (H), out of service (I)."""
 
-Priority = Literal["low", "medium", "high", "urgent"]
+Priority = Literal["advisory", "low", "medium", "high", "urgent"]
+"""An advisory calls nobody and waits for no acknowledgement."""
 
-Act = Literal["acknowledge", "shelve", "unshelve", "out_of_service", "in_service"]
+Mode = Literal["maintenance", "stopped"]
+"""Of a station: somebody works on it; it is not to run. Alarms that would be its consequence are suppressed."""
+
+Act = Literal["acknowledge", "reset", "shelve", "unshelve", "out_of_service", "in_service"]
+ModeAct = Literal["maintenance", "stop", "resume"]
+
+STATION = "station"
+"""In place of an alarm: an act on the mode of the station."""
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
+AlarmName = Annotated[str, Field(min_length=1, max_length=128)]
 
 RuleName = Literal[
     "pump_fault",
@@ -42,13 +55,21 @@ RuleName = Literal[
 
 
 class Alarm(Message):
-    """An alarm after its last change. `id` names the condition, such as `pump2.pump_fault`, and stays the same."""
+    """An alarm after its last change. `id` names the condition, such as `pump2.pump_fault`, and stays the same.
+
+    `asset`, `stage`, `severity` and `trend` are those of the fault, where it is one; times but `until` are those of
+    the station.
+    """
 
     schema_name: Literal["wetwell.alarm/1"] = Field("wetwell.alarm/1", alias="schema")
-    id: Name
+    id: AlarmName
     time: Stamp
     station: str
     pump: int | None = Field(None, ge=1)
+    asset: str | None = None
+    stage: Stage | None = None
+    severity: Severity | None = None
+    trend: Trend | None = None
     priority: Priority
     state: AlarmState
     is_active: bool
@@ -63,13 +84,16 @@ class Alarm(Message):
 
 
 class AlarmAct(Message):
-    """What an operator does to an alarm. `id` makes it safe to ask twice; `minutes` is for how long it is shelved."""
+    """What an operator does to an alarm. `id` makes it safe to ask twice; `minutes` is for how long it is shelved.
+
+    Of the alarm "station" it is an act on the mode of the station: under maintenance, stopped, or neither again.
+    """
 
     schema_name: Literal["wetwell.alarm-act/1"] = Field("wetwell.alarm-act/1", alias="schema")
     id: Name
     station: str
-    alarm: Name
-    act: Act
+    alarm: AlarmName
+    act: Act | ModeAct
     by: Name
     minutes: float | None = Field(None, gt=0.0, le=7 * 24 * 60)
     reason: str = Field("", max_length=500)
@@ -78,6 +102,8 @@ class AlarmAct(Message):
     def _a_shelf_has_an_end(self) -> Self:
         if self.act == "shelve" and self.minutes is None:
             raise ValueError("minutes must be given to shelve an alarm")
+        if (self.act in get_args(ModeAct)) != (self.alarm == STATION):
+            raise ValueError(f"act: got '{self.act}' for '{self.alarm}', an act on the mode is one on '{STATION}'")
         return self
 
 

@@ -65,7 +65,7 @@ class Verdict(Message):
 
     `probability` sums to one over the states that were weighed; `evidence` holds the figures that it rests on;
     `window` is the time that was judged. `faults` are those of the pump, its main and its meters that stand, the
-    worst first; `asset`, `stage`, `severity` and `trend` are those of the worst.
+    worst first, None where the sender does not tell them; `asset`, `stage`, `severity` and `trend` are of the worst.
     """
 
     schema_name: Literal["wetwell.verdict/1"] = Field("wetwell.verdict/1", alias="schema")
@@ -81,4 +81,29 @@ class Verdict(Message):
     stage: Stage | None = None
     severity: Severity | None = None
     trend: Trend | None = None
-    faults: tuple[AssetFault, ...] = ()
+    faults: tuple[AssetFault, ...] | None = None
+
+    @property
+    def main(self) -> str:
+        """The asset that is the main of the pump."""
+        name = self.evidence.get("main")
+        return f"main:{name}" if isinstance(name, str) and name else "main"
+
+    def standing(self) -> tuple[AssetFault, ...] | None:
+        """Faults that stand of the pump, its main and its meters; None where the verdict says nothing of them.
+
+        Those of a sender that tells a state alone are that state, to be acted on.
+        """
+        if self.faults is not None:
+            return self.faults
+        if self.state == "unknown":
+            return None
+        assets = {
+            "pump_fault": (f"pump:{self.pump}",),
+            "system_fault": (self.main,),
+            "pump_and_system_fault": (f"pump:{self.pump}", self.main),
+            "sensor_fault": (f"sensor:pump{self.pump}",),
+        }.get(self.state, ())
+        since = self.time if self.onset is None else self.onset
+        stage = self.stage or "act"
+        return tuple(AssetFault(asset=asset[:64], stage=stage, since=since) for asset in assets)

@@ -10,6 +10,7 @@ from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alarm_report_key
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmReport
+from wetwell.services.alarms.rules import RANK
 from wetwell.services.runtime.client import ask_service, first_answer
 from wetwell.services.runtime.settings import Settings
 
@@ -17,7 +18,6 @@ T = TypeVar("T")
 
 ANSWER_S = 10.0
 TRY_S = 2.0
-RANK = {"urgent": 0, "high": 1, "medium": 2, "low": 3}
 
 
 async def ask_alarms(settings: Settings, question: Callable[[Bus], Awaitable[T]]) -> T:

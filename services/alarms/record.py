@@ -2,19 +2,24 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wetwell.protocols.messages.alarm import Alarm, RuleName
-from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.protocols.messages.alarm import Alarm, Priority, RuleName
+from wetwell.protocols.messages.verdict import AssetFault
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_DAY, NS_PER_S
 from wetwell.services.alarms.delay import Delay
-from wetwell.services.alarms.rules import Rule, alarm_id
-from wetwell.services.alarms.status import AlarmStatus, with_condition
+from wetwell.services.alarms.rules import PRIORITIES, RANK, Rule, alarm_id
+from wetwell.services.alarms.status import AlarmStatus, escalated, with_condition
 
 CHANGES = 100
 """Changes of the condition within an hour that are remembered at most."""
 HOUR_NS = 3600 * NS_PER_S
+NEWS_SHARE = 0.1
+"""Of the limit, by which a severity must have moved to be told anew."""
 
 
 class AlarmRecord(BaseModel):
     """An alarm: how it stands, its delays, its words, and when its condition changed within the last hour.
+
+    `fault` is what was told of it last, where it is one of an asset.
 
     On disk its status is called standing.
     """
@@ -24,6 +29,8 @@ class AlarmRecord(BaseModel):
     station: str
     rule: RuleName
     pump: int | None = None
+    asset: str | None = None
+    fault: AssetFault | None = None
     status: AlarmStatus = Field(default=AlarmStatus(), alias="standing")
     delay: Delay = Field(default_factory=Delay)
     text: str = ""
@@ -34,7 +41,7 @@ class AlarmRecord(BaseModel):
     @property
     def id(self) -> str:
         """Name of the alarm within its station."""
-        return alarm_id(self.rule, self.pump)
+        return alarm_id(self.rule, self.pump, self.asset)
 
     def observe(self, wanted: bool, time_ns: int, rule: Rule) -> bool:
         """Take a look at the condition; whether the alarm has changed by it."""
@@ -42,10 +49,37 @@ class AlarmRecord(BaseModel):
         before = self.status
         if is_active == before.is_active:
             return False
-        self.status = with_condition(before, is_active=is_active, time_ns=time_ns)
+        self.status = with_condition(
+            before,
+            is_active=is_active,
+            time_ns=time_ns,
+            is_call=self.priority(rule) != "advisory",
+            is_latching=rule.is_latching,
+        )
         self.changes_ns = [*(at for at in self.changes_ns if 0 <= time_ns - at < HOUR_NS), time_ns][-CHANGES:]
         self.touch(time_ns)
         return True
+
+    def priority(self, rule: Rule) -> Priority:
+        """By the stage of the fault, where it is one; at the stage "act" that of the rule."""
+        return rule.priority if self.fault is None else PRIORITIES.get(self.fault.stage, rule.priority)
+
+    def follow(self, fault: AssetFault | None, time_ns: int, rule: Rule) -> bool:
+        """Take what is told of an alarm that stands; whether that is news: a stage, a tenth of the limit, a day."""
+        before, self.fault = self.fault, fault or self.fault
+        if fault is None or before is None:
+            return fault is not None
+        priority = PRIORITIES.get(before.stage, rule.priority)
+        if RANK[self.priority(rule)] < RANK[priority]:
+            self.status = escalated(self.status)
+        is_news = before.stage != fault.stage or time_ns - self.time_ns >= NS_PER_DAY
+        if before.severity is not None and fault.severity is not None and not is_news:
+            is_news = abs(fault.severity.value - before.severity.value) >= NEWS_SHARE * fault.severity.limit
+        if is_news:
+            self.touch(time_ns)
+        else:
+            self.fault = before
+        return is_news
 
     def touch(self, time_ns: int) -> None:
         """Note a change; no two changes of an alarm have the same time, and a later one never has an earlier one."""
@@ -63,7 +97,11 @@ class AlarmRecord(BaseModel):
             time=self.time_ns,
             station=self.station,
             pump=self.pump,
-            priority=rule.priority,
+            asset=self.asset,
+            stage=None if self.fault is None else self.fault.stage,
+            severity=None if self.fault is None else self.fault.severity,
+            trend=None if self.fault is None else self.fault.trend,
+            priority=self.priority(rule),
             state=status.state,
             is_active=status.is_active,
             text=self.text or rule.text,

@@ -2,14 +2,24 @@
 
 from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import replace
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, RuleName
+from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, Mode, RuleName
+from wetwell.protocols.messages.verdict import AssetFault
 from wetwell.services.alarms.rates import AlarmRates
 from wetwell.services.alarms.record import AlarmRecord
-from wetwell.services.alarms.rules import RULES, Rule, alarm_id, parse_alarm_id
-from wetwell.services.alarms.status import ActRefusedError, AlarmStatus, back, is_shelf_over, with_act
+from wetwell.services.alarms.rules import BY_DESIGN, RULES, Rule, alarm_id, parse_alarm_id
+from wetwell.services.alarms.status import (
+    SUPPRESSED,
+    ActRefusedError,
+    AlarmStatus,
+    back,
+    by_design,
+    is_shelf_over,
+    with_act,
+)
 
 ANSWERS = 200
 """Acts that are remembered with their answers, so that one that is asked again is not carried out twice."""
@@ -27,6 +37,7 @@ class RegistryState(BaseModel):
     answers: list[AlarmAnswer] = Field(default_factory=list)
     calls_ns: list[int] = Field(default_factory=list)
     is_flood: bool = False
+    modes: dict[str, Mode] = Field(default_factory=dict)
 
 
 class AlarmRegistry:
@@ -36,7 +47,9 @@ class AlarmRegistry:
         self.rules = RULES if rules is None else rules
         self.changed: list[Alarm] = []
         self.records: dict[tuple[str, str], AlarmRecord] = {}
+        self.modes: dict[str, Mode] = {}
         self.rates = AlarmRates()
+        self._names: dict[str, set[str]] = {}
         self._answers: OrderedDict[str, AlarmAnswer] = OrderedDict()
         self._pending: set[tuple[str, str]] = set()
 
@@ -49,6 +62,8 @@ class AlarmRegistry:
         now_ns: int,
         *,
         pump: int | None = None,
+        asset: str | None = None,
+        fault: AssetFault | None = None,
         text: str = "",
         advice: str = "",
     ) -> None:
@@ -56,8 +71,10 @@ class AlarmRegistry:
 
         Parameters
         ----------
-        station, rule, pump
+        station, rule, pump, asset
             Which alarm.
+        fault : AssetFault or None
+            What is known of the fault, where it is one.
         wanted : bool
             Whether its condition is there, before delays.
         time_ns, now_ns : int
@@ -68,14 +85,22 @@ class AlarmRegistry:
         table = self.rules[rule]
         if not table.is_enabled:
             return
-        name = (station, alarm_id(rule, pump))
+        name = (station, alarm_id(rule, pump, asset))
         record = self.records.get(name)
         if record is None:
             if not wanted:
                 return
-            record = self.records[name] = AlarmRecord(station=station, rule=rule, pump=pump)
-        if wanted and not record.delay.is_active:
-            record.text, record.advice = text, advice
+            record = self._add(AlarmRecord(station=station, rule=rule, pump=pump, asset=asset))
+        mode = self.modes.get(station)
+        if mode is not None and rule in BY_DESIGN[mode]:
+            record.status = by_design(record.status)
+        if wanted and record.delay.is_active:
+            before = record.status
+            if record.follow(fault, time_ns, table):
+                record.text, record.advice = text, advice
+                self._tell(record, now_ns, is_call=record.status.state == "unacknowledged" != before.state)
+        elif wanted:
+            record.text, record.advice, record.fault = text, advice, fault
         if record.observe(wanted, time_ns, table):
             self._tell(record, now_ns, is_call=record.status.state == "unacknowledged")
         if record.delay.held_s is None:
@@ -88,8 +113,50 @@ class AlarmRegistry:
         for name in [name for name in self._pending if name[0] == station]:
             record = self.records[name]
             wanted = not record.delay.is_active
-            words = {"text": record.text, "advice": record.advice}
-            self.observe(station, record.rule, wanted, time_ns, now_ns, pump=record.pump, **words)
+            self.observe(
+                station,
+                record.rule,
+                wanted,
+                time_ns,
+                now_ns,
+                pump=record.pump,
+                asset=record.asset,
+                fault=record.fault,
+                text=record.text,
+                advice=record.advice,
+            )
+
+    def of_station(self, station: str) -> list[AlarmRecord]:
+        """All alarms of a station that there ever were."""
+        return [self.records[station, name] for name in sorted(self._names.get(station, ()))]
+
+    def set_mode(self, station: str, mode: Mode | None, by: str, reason: str, time_ns: int, now_ns: int) -> None:
+        """Put a station under maintenance, stop it, or neither: what that suppresses calls nobody until it ends."""
+        if mode is None:
+            self.modes.pop(station, None)
+        else:
+            self.modes[station] = mode
+        for record in self.of_station(station):
+            is_covered = mode is not None and record.rule in BY_DESIGN[mode]
+            if is_covered and record.status.state not in SUPPRESSED:
+                record.status = replace(by_design(record.status), by=by, reason=reason)
+            elif not is_covered and record.status.state == "suppressed":
+                record.status = self._back(record, by, reason)
+            else:
+                continue
+            record.touch(time_ns)
+            self._tell(record, now_ns, is_call=record.status.state == "unacknowledged")
+
+    def _back(self, record: AlarmRecord, by: str, reason: str = "") -> AlarmStatus:
+        """Status after a suppression; an advisory calls nobody then either."""
+        status = back(record.status, by, reason)
+        is_advisory = record.priority(self.rules[record.rule]) == "advisory"
+        return replace(status, state="acknowledged") if is_advisory and status.is_active else status
+
+    def _add(self, record: AlarmRecord) -> AlarmRecord:
+        self.records[record.station, record.id] = record
+        self._names.setdefault(record.station, set()).add(record.id)
+        return record
 
     def is_wanted(self, station: str, rule: RuleName, pump: int | None = None) -> bool:
         """Whether the condition of an alarm counts as there; for deadbands."""
@@ -100,7 +167,7 @@ class AlarmRegistry:
         """The answer that an act with this id got before."""
         return self._answers.get(act.id)
 
-    def after(self, act: AlarmAct, now_ns: int) -> tuple[AlarmRecord, AlarmStatus]:
+    def after(self, act: AlarmAct, now_ns: int, time_ns: int) -> tuple[AlarmRecord, AlarmStatus]:
         """The alarm that an act is for and how it would stand after it; nothing is changed.
 
         Raises
@@ -111,18 +178,18 @@ class AlarmRegistry:
         record = self.records.get((act.station, act.alarm))
         if record is None:
             try:
-                rule, pump = parse_alarm_id(act.alarm)
+                rule, pump, asset = parse_alarm_id(act.alarm)
             except ValueError as error:
                 raise ActRefusedError(str(error)) from error
-            record = AlarmRecord(station=act.station, rule=rule, pump=pump)
-        return record, with_act(record.status, act, now_ns)
+            record = AlarmRecord(station=act.station, rule=rule, pump=pump, asset=asset)
+        return record, with_act(record.status, act, now_ns, time_ns)
 
     def carry_out(
         self, act: AlarmAct, record: AlarmRecord, status: AlarmStatus, time_ns: int, now_ns: int
     ) -> AlarmAnswer:
         """Let an alarm stand as `after` has said, and answer the act."""
         is_call = status.state == "unacknowledged"
-        self.records[record.station, record.id] = record
+        self._add(record)
         record.status = status
         record.touch(time_ns)
         alarm = self._tell(record, now_ns, is_call=is_call)
@@ -138,7 +205,7 @@ class AlarmRegistry:
     def ended_shelves(self, now_ns: int) -> list[tuple[AlarmRecord, AlarmStatus]]:
         """Alarms whose shelf has ended, and how they stand then."""
         over = [record for record in self.records.values() if is_shelf_over(record.status, now_ns)]
-        return [(record, back(record.status, SHELF)) for record in over]
+        return [(record, self._back(record, SHELF)) for record in over]
 
     def unshelve(self, record: AlarmRecord, status: AlarmStatus, time_ns: int, now_ns: int) -> None:
         """Let an alarm come from its shelf."""
@@ -175,11 +242,15 @@ class AlarmRegistry:
             answers=list(self._answers.values()),
             calls_ns=self.rates.calls_ns,
             is_flood=self.rates.is_flood,
+            modes=self.modes,
         )
 
     def restore(self, state: RegistryState) -> None:
         """Go on from what was kept."""
-        self.records = {(record.station, record.id): record for record in state.records}
+        self.records, self._names = {}, {}
+        for record in state.records:
+            self._add(record)
+        self.modes = dict(state.modes)
         self._pending = {name for name, record in self.records.items() if record.delay.held_s is not None}
         self._answers = OrderedDict((answer.id, answer) for answer in state.answers)
         self.rates = AlarmRates(state.calls_ns, is_flood=state.is_flood)

@@ -1,11 +1,14 @@
 """The rule table: what is an alarm, how urgent, after what delays, and what to do."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_args
+from urllib.parse import unquote
 
-from wetwell.protocols.messages.alarm import Priority, RuleName
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.alarm import Mode, Priority, RuleName
+from wetwell.protocols.messages.verdict import AssetFault, Stage, Verdict
+from wetwell.protocols.timestamps import to_iso
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,7 @@ class Rule:
     on_delay_s: float = 0.0
     off_delay_s: float = 0.0
     is_enabled: bool = True
+    is_latching: bool = False
 
 
 RULES: Mapping[RuleName, Rule] = {
@@ -37,10 +41,21 @@ RULES: Mapping[RuleName, Rule] = {
     "historian_silent": Rule("medium", "historian is not running", "nothing is kept: start the historian"),
     "bus_lost": Rule("high", "alarms had no router", "what happened meanwhile may be missing: check the router"),
 }
-"""Defaults; the setting `alarms.rules` changes priority, delays and whether a rule is there at all."""
+"""Defaults; the setting `alarms.rules` changes priority, delays, latching and whether a rule is there at all.
+
+The priority of a fault is the rule's where somebody has to act; `PRIORITIES` has those of the stages before."""
+PRIORITIES: Mapping[Stage, Priority] = {"watch": "advisory", "plan": "low"}
+RANK: Mapping[Priority, int] = {name: rank for rank, name in enumerate(reversed(get_args(Priority)))}
+"""The most urgent first."""
 
 VERDICT_RULES: tuple[RuleName, ...] = ("pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault")
 MAX_PUMPS = 32
+BY_DESIGN: Mapping[Mode, frozenset[RuleName]] = {
+    "maintenance": frozenset(VERDICT_RULES),
+    "stopped": frozenset(RULES) - {"overflow_risk"},
+}
+"""Alarms that a mode of the station suppresses: what a crew does to pumps is no fault; a stopped one may stand and be
+silent, but not flood."""
 
 
 def changed_rules(changes: Mapping[RuleName, Mapping[str, Any]]) -> dict[RuleName, Rule]:
@@ -48,19 +63,40 @@ def changed_rules(changes: Mapping[RuleName, Mapping[str, Any]]) -> dict[RuleNam
     return {name: replace(rule, **changes.get(name, {})) for name, rule in RULES.items()}
 
 
-def alarm_id(rule: RuleName, pump: int | None = None) -> str:
-    """Name of an alarm of a station.
+def alarm_id(rule: RuleName, pump: int | None = None, asset: str | None = None) -> str:
+    """Name of an alarm of a station; what cannot stand in a key of the bus is escaped.
 
     Examples
     --------
     >>> alarm_id("pump_fault", 2), alarm_id("level_high")
     ('pump2.pump_fault', 'level_high')
+    >>> alarm_id("system_fault", asset="main:line 1/2"), alarm_id("sensor_fault", asset="sensor:level_m")
+    ('main:line 1%2F2.system_fault', 'level_m.sensor_fault')
     """
-    return rule if pump is None else f"pump{pump}.{rule}"
+    if pump is not None:
+        return f"pump{pump}.{rule}"
+    if asset is None:
+        return rule
+    name = "".join(f"%{ord(letter):02X}" if letter in "/*$?#%" else letter for letter in asset)
+    return f"{name.removeprefix('sensor:')}.{rule}"
 
 
-def parse_alarm_id(text: str) -> tuple[RuleName, int | None]:
-    """Rule and pump of an alarm's name.
+def rule_of(asset: str) -> tuple[RuleName, int | None]:
+    """Rule of the fault of an asset, and the pump if it is one.
+
+    Examples
+    --------
+    >>> rule_of("pump:2"), rule_of("main:line 1"), rule_of("sensor:level_m")
+    (('pump_fault', 2), ('system_fault', None), ('sensor_fault', None))
+    """
+    kind, _, name = asset.partition(":")
+    if kind == "pump" and name.isdecimal():
+        return "pump_fault", int(name)
+    return ("system_fault" if kind == "main" else "sensor_fault"), None
+
+
+def parse_alarm_id(text: str) -> tuple[RuleName, int | None, str | None]:
+    """Rule, pump and asset of an alarm's name.
 
     Raises
     ------
@@ -70,17 +106,23 @@ def parse_alarm_id(text: str) -> tuple[RuleName, int | None]:
     Examples
     --------
     >>> parse_alarm_id("pump2.pump_fault"), parse_alarm_id("level_high")
-    (('pump_fault', 2), ('level_high', None))
+    (('pump_fault', 2, 'pump:2'), ('level_high', None, None))
+    >>> parse_alarm_id("main:line 1%2F2.system_fault"), parse_alarm_id("level_m.sensor_fault")
+    (('system_fault', None, 'main:line 1/2'), ('sensor_fault', None, 'sensor:level_m'))
     """
     prefix, dot, last = text.rpartition(".")
     for rule in RULES:
         if rule == last and (rule in VERDICT_RULES) == bool(dot):
-            number = prefix.removeprefix("pump")
             if not dot:
-                return rule, None
+                return rule, None, None
+            number = prefix.removeprefix("pump")
             if prefix.startswith("pump") and number.isdecimal() and 1 <= int(number) <= MAX_PUMPS:
-                return rule, int(number)
-    raise ValueError(f"alarm '{text}' is none of {', '.join(RULES)}, those of a pump with 'pump2.' before")
+                return rule, int(number), f"pump:{int(number)}" if rule == "pump_fault" else None
+            if rule == "system_fault" and prefix.partition(":")[0] == "main":
+                return rule, None, unquote(prefix)
+            if rule == "sensor_fault" and re.fullmatch(r"[a-z0-9_]+", prefix):
+                return rule, None, f"sensor:{prefix}"
+    raise ValueError(f"alarm '{text}' is none of {', '.join(RULES)}, of an asset with 'pump2.' or 'main.' before")
 
 
 def verdict_text(verdict: Verdict) -> str:
@@ -101,6 +143,42 @@ def verdict_text(verdict: Verdict) -> str:
         if figure is not None:
             words.append(f"{label} {figure[0]:.3g} {unit} ({figure[1]:.3g} to {figure[2]:.3g})")
     return ", ".join(words)
+
+
+def fault_text(fault: AssetFault) -> str:
+    """What is known of a fault, in one line for an operator.
+
+    Examples
+    --------
+    >>> from wetwell.protocols.messages.verdict import Severity, Trend
+    >>> from wetwell.protocols.timestamps import from_iso
+    >>> severity = Severity(quantity="friction_rise_percent", value=8.94, interval=(8.53, 9.3), limit=15.0)
+    >>> trend = Trend(per_day=2.88, interval=(2.3, 3.4), reaches_limit=from_iso("2026-11-24T08:00:00Z"))
+    >>> fault_text(AssetFault(asset="main", stage="plan", since=0, severity=severity, trend=trend))
+    'main: plan, friction 8.9 % (8.5 to 9.3), limit 15 %, 2.9 % a day, limit about 2026-11-24'
+    """
+    kind, _, name = fault.asset.partition(":")
+    words = [f"{name if kind == 'sensor' else f'{kind} {name}'.strip()}: {fault.stage}"]
+    if fault.severity is not None:
+        label, unit = QUANTITIES.get(fault.severity.quantity, (fault.severity.quantity, ""))
+        low, high = fault.severity.interval
+        words.append(f"{label} {fault.severity.value:.2g} {unit} ({low:.2g} to {high:.2g})")
+        words.append(f"limit {fault.severity.limit:g} {unit}")
+        if fault.trend is not None:
+            words.append(f"{fault.trend.per_day:.2g} {unit} a day")
+            if fault.trend.reaches_limit is not None:
+                words.append(f"limit about {to_iso(fault.trend.reaches_limit)[:10]}")
+    return ", ".join(words)
+
+
+QUANTITIES: Mapping[str, tuple[str, str]] = {
+    "speed_loss_percent": ("speed loss", "%"),
+    "wear_head_percent": ("loss of head", "%"),
+    "friction_rise_percent": ("friction", "%"),
+    "static_head_rise_m": ("static head", "m"),
+    "meter_error_percent": ("error", "%"),
+}
+"""Words and units of severities."""
 
 
 def verdict_advice(verdict: Verdict, rule: Rule) -> str:

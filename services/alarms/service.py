@@ -3,12 +3,21 @@
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Request
 from wetwell.protocols.bus.keys import SITE, alarm_act_key, alarm_key
 from wetwell.protocols.errors import RecordingError
-from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, AlarmFigure, AlarmReport, AlarmState
+from wetwell.protocols.messages.alarm import (
+    STATION,
+    Alarm,
+    AlarmAct,
+    AlarmAnswer,
+    AlarmFigure,
+    AlarmReport,
+    AlarmState,
+    Mode,
+)
 from wetwell.protocols.messages.decoding import M, SampleMessage, decoded, samples_of
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.messages.sample import Sample
@@ -29,6 +38,9 @@ log = logging.getLogger(__name__)
 
 MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
+
+
+_MODES: Mapping[str, Mode | None] = {"maintenance": "maintenance", "stop": "stopped", "resume": None}
 
 
 class AlarmService:
@@ -125,7 +137,9 @@ class AlarmService:
         if act.station not in self.stations:
             return AlarmAnswer(id=act.id, is_done=False, reason=f"station '{act.station}' is not known")
         try:
-            record, after = self.registry.after(act, now.wall_ns)
+            if act.alarm == STATION:
+                return self._set_mode(act, now)
+            record, after = self.registry.after(act, now.wall_ns, self._clock_ns(act.station, now))
         except ActRefusedError as error:
             self._write_down(now, act, refused=str(error))
             return self.registry.remember(AlarmAnswer(id=act.id, is_done=False, reason=str(error)))
@@ -134,6 +148,20 @@ class AlarmService:
         self._counts["acts"] += 1
         time_ns = self._clock_ns(act.station, now)
         return self.registry.carry_out(act, record, after, time_ns, now.wall_ns)
+
+    def _set_mode(self, act: AlarmAct, now: Now) -> AlarmAnswer:
+        """Put a station under maintenance, stop it, or end that."""
+        modes = self.registry.modes
+        before, after = modes.get(act.station), _MODES[act.act]
+        if before == after:
+            raise ActRefusedError(f"{act.act}: the station is {before or 'in operation'}")
+        if not self._write_down(now, act, before=before or "", after=after or ""):
+            return AlarmAnswer(id=act.id, is_done=False, reason="the audit cannot be written, so nothing was done")
+        self._counts["acts"] += 1
+        time_ns = self._clock_ns(act.station, now)
+        self.registry.set_mode(act.station, after, act.by, act.reason, time_ns, now.wall_ns)
+        self.save()
+        return self.registry.remember(AlarmAnswer(id=act.id, is_done=True))
 
     def look(self) -> None:
         """Once a second: what does not come any more, shelves that end, floods."""

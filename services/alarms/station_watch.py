@@ -1,6 +1,7 @@
 """What is heard of one station: its clock, its samples, verdicts and services, turned into conditions of alarms."""
 
 import math
+import re
 from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
@@ -9,8 +10,9 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.alarms.record import AlarmRecord
 from wetwell.services.alarms.registry import AlarmRegistry
-from wetwell.services.alarms.rules import VERDICT_RULES, verdict_advice, verdict_text
+from wetwell.services.alarms.rules import VERDICT_RULES, fault_text, rule_of, verdict_advice, verdict_text
 
 KNOWN_VERDICTS = 200
 """Times of verdicts of a pump that are remembered, more than a publisher keeps for late joiners."""
@@ -125,24 +127,44 @@ class StationWatch:
         registry.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
 
     def handle_verdict(self, verdict: Verdict, now: Now, registry: AlarmRegistry) -> bool:
-        """Look at a verdict; whether it was new. "unknown" leaves the alarms of the pump as they are."""
+        """Look at a verdict; whether it was new.
+
+        It speaks of its pump, the main of that and its meters; "unknown" of a sender that tells states alone leaves
+        all as it is.
+        """
         is_start = now.steady_s - self.start_s < START_S
         if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time, is_start=is_start):
             return False
-        if verdict.state == "unknown":
+        faults = verdict.standing()
+        if faults is None:
             return True
-        for rule in VERDICT_RULES:
-            is_there = verdict.state == rule
+        for fault in faults:
+            rule, pump = rule_of(fault.asset)
+            is_plain = fault.severity is None
             registry.observe(
                 self.name,
                 rule,
-                is_there,
+                True,
                 verdict.time,
                 now.wall_ns,
-                pump=verdict.pump,
-                text=verdict_text(verdict) if is_there else "",
-                advice=verdict_advice(verdict, registry.rules[rule]) if is_there else "",
+                pump=pump,
+                asset=fault.asset,
+                fault=fault,
+                text=verdict_text(verdict) if is_plain else fault_text(fault),
+                advice=fault.advice or verdict_advice(verdict, registry.rules[rule]),
             )
+        standing = {fault.asset for fault in faults}
+        for record in registry.of_station(self.name):
+            if _speaks_of(verdict, record) and record.asset not in standing:
+                registry.observe(
+                    self.name,
+                    record.rule,
+                    False,
+                    verdict.time,
+                    now.wall_ns,
+                    pump=record.pump,
+                    asset=record.asset,
+                )
         return True
 
     @property
@@ -180,3 +202,15 @@ class StationWatch:
         """Count silence from now on: until now it was that of the bus."""
         self.missed_s = now.steady_s
         self.gone_s = {service: None if gone_s is None else now.steady_s for service, gone_s in self.gone_s.items()}
+
+
+def _speaks_of(verdict: Verdict, record: AlarmRecord) -> bool:
+    """Whether a verdict says whether an alarm stands; those of other versions were one a pump and state."""
+    if record.rule not in VERDICT_RULES:
+        return False
+    if record.asset is None or record.rule == "pump_fault":
+        return record.pump == verdict.pump
+    if record.rule == "system_fault":
+        return record.asset == verdict.main
+    of_pump = re.match(r"sensor:pump(\d+)", record.asset)
+    return of_pump is None or int(of_pump[1]) == verdict.pump

@@ -102,6 +102,7 @@ def _add_act(act: str, text: str) -> None:
 
 
 _add_act("acknowledge", "Say that an alarm was seen.")
+_add_act("reset", "Let a latched alarm go that was acknowledged.")
 
 
 @app.command(cls=about("--alarm"))
@@ -122,6 +123,26 @@ def shelve(
 _add_act("unshelve", "Take an alarm from the shelf before its time.")
 _add_act("out_of_service", "Take an alarm out of service, for maintenance, until it is put in again.")
 _add_act("in_service", "Put an alarm into service again.")
+
+
+def _add_mode(act: str, text: str) -> None:
+    """Add the command of an act on the mode of a station."""
+
+    @app.command(act, help=text, cls=about("--station"))
+    def command(
+        station: StationNameOption,
+        by: ByOption,
+        reason: ReasonOption = "",
+        zenoh: ZenohOption = None,
+        config: ConfigOption = None,
+        as_json: JsonOption = False,
+    ) -> None:
+        _act(act, (station, "station", by, reason), None, settings_of(config, zenoh), as_json=as_json)
+
+
+_add_mode("maintenance", "Say that somebody works on a station: its faults call nobody until it resumes.")
+_add_mode("stop", "Say that a station is not to run: all but a flood calls nobody until it resumes.")
+_add_mode("resume", "End the maintenance or the stop of a station.")
 
 
 def _act(

@@ -121,6 +121,7 @@ class RuleSettings(Table):
     on_delay_s: NonNegative | None = None
     off_delay_s: NonNegative | None = None
     is_enabled: bool | None = None
+    is_latching: bool | None = None
 
 
 class AlarmSettings(Table):

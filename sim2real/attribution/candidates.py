@@ -50,7 +50,7 @@ class FreeParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """An effect with what is fixed (a pump, a channel) and what is free."""
+    """An effect with what is fixed (a pump, a main, a channel) and what is free."""
 
     name: str
     fixed: tuple[tuple[str, Any], ...]
@@ -91,13 +91,14 @@ class Candidate:
 
 
 def candidates_of(
-    pumps: int, *, only: Iterable[str] | None = None, without: Iterable[str] = ()
+    pumps: int, mains: int, *, only: Iterable[str] | None = None, without: Iterable[str] = ()
 ) -> tuple[Candidate, ...]:
     """Candidates for a station.
 
     Parameters
     ----------
-    pumps : int
+    pumps, mains : int
+        How many there are.
     only, without : names of effects
         Restrict the library.
 
@@ -113,14 +114,15 @@ def candidates_of(
             raise ValueError(f"effect '{name}' is not in the library: see wetwell effects")
     if not wanted - dropped:
         raise ValueError("no effect of the library is left")
+    counts = {"pump": pumps, "main": mains}
     found: list[Candidate] = []
     for row in effect_table():
         if row["name"] not in wanted - dropped:
             continue
         choices = {
-            parameter["name"]: parameter.get("choices") or _pump_numbers(pumps)
+            parameter["name"]: parameter.get("choices") or _numbers(counts[parameter["name"]])
             for parameter in row["parameters"]
-            if "unit" not in parameter
+            if "unit" not in parameter and (parameter["name"], mains) != ("main", 1)
         }
         free = tuple(_free_parameter(parameter) for parameter in row["parameters"] if "unit" in parameter)
         found += [
@@ -130,8 +132,9 @@ def candidates_of(
     return tuple(found)
 
 
-def _pump_numbers(pumps: int) -> list[int]:
-    return [0, *(range(1, pumps + 1) if pumps > 1 else ())]
+def _numbers(count: int) -> list[int]:
+    """All of them, then each; one alone is all."""
+    return [0, *(range(1, count + 1) if count > 1 else ())]
 
 
 def _free_parameter(parameter: Mapping[str, Any]) -> FreeParameter:

@@ -120,7 +120,7 @@ def diagnose(
         If recording and station do not fit, the recording is too short or in other units, or a name is not in the
         library.
     """
-    library = candidates_of(len(station.pump), only=only, without=without)
+    library = candidates_of(len(station.pump), len(station.mains), only=only, without=without)
     is_external = station.control.is_external
     candidates = [each for each in library if not (is_external and each.component == "controller")]
     traces = excerpt(traces_of(recording, station))

@@ -69,7 +69,8 @@ def steady_values(
     frequency_hz = np.repeat(np.array([point.frequency_hz for point in points]).T, HOLD_S, axis=1)
     level_m = np.repeat([point.level_m for point in points], HOLD_S)
     volume_m3 = np.array([volume_at_level_m3(level, records.profile) for level in level_m.tolist()])
-    forcing = healthy_forcing(np.repeat([point.inflow_m3h for point in points], HOLD_S), count, with_sensors=True)
+    inflow_m3h = np.repeat([point.inflow_m3h for point in points], HOLD_S)
+    forcing = healthy_forcing(inflow_m3h, count, len(plant.mains), with_sensors=True)
     for fault in faults:
         fault.apply(forcing, np.arange(seconds, dtype=np.float64))  # type: ignore[attr-defined]
     measured = np.zeros((channels(count), seconds))

@@ -15,6 +15,8 @@ CHUNK_ROWS = 3600
 MIN_STEP_S = 0.1
 MAX_INFLOW_M3H = 1440.0
 """The paper's limit of 0.4 m³/s, over which a difference is a spike and no inflow."""
+MOST_PUMPED = 2.4
+"""The same, as a share of what all pumps of its station move, for larger ones."""
 
 
 def infer_inflow_m3h(recording: Recording, station: Station, *, window_s: float = 60.0) -> Floats:
@@ -38,7 +40,7 @@ def infer_inflow_m3h(recording: Recording, station: Station, *, window_s: float 
     -------
     inflow_m3h : (n,) array
         NaN where level or flow is missing, at steps under 0.1 s, and where the paper would discard it: negative, or
-        over 1,440 m³/h. [m³/h]
+        over 1,440 m³/h and 2.4 times what all pumps move. [m³/h]
 
     Raises
     ------
@@ -53,7 +55,8 @@ def infer_inflow_m3h(recording: Recording, station: Station, *, window_s: float 
     time_s = (recording.time_ns - recording.time_ns[0]) / NS_PER_S
     inflow_m3h = 3600.0 * _slopes(time_s, volume_m3, window_s) + pumped_m3h(recording, station)
     too_near = np.concatenate([[False], np.diff(time_s) < MIN_STEP_S])
-    inflow_m3h[too_near | (inflow_m3h < 0.0) | (inflow_m3h > MAX_INFLOW_M3H)] = np.nan
+    most_m3h = max(MAX_INFLOW_M3H, MOST_PUMPED * float(parameters.rated_flow_m3h.sum()))
+    inflow_m3h[too_near | (inflow_m3h < 0.0) | (inflow_m3h > most_m3h)] = np.nan
     return inflow_m3h
 
 

@@ -80,7 +80,7 @@ class Replay:
         self.station = station
         self.own = tuple(own)
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
-        self._forcing = healthy_forcing(inflow_m3h, traces.pumps)
+        self._forcing = healthy_forcing(inflow_m3h, traces.pumps, len(station.mains))
         self._kept: tuple[_Run, ...] = ()
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
@@ -239,7 +239,9 @@ class Replay:
         delay_s = plant.sensors[INFLOW].delay_s
         if not writing and delay_s == 0.0:
             return self._forcing
-        forcing = healthy_forcing(later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps)
+        forcing = healthy_forcing(
+            later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps, len(self.station.mains)
+        )
         for effect in writing:
             effect.force(forcing, self.traces.time_s)
         return forcing

@@ -74,7 +74,7 @@ def effects_of(station: Station) -> tuple[Effect, ...]:
     Raises
     ------
     ValueError
-        If a name is unknown, a parameter breaks its rule, or a pump is not there; one line.
+        If a name is unknown, a parameter breaks its rule, or a pump or main is not there; one line.
     """
     tables = [effect.model_dump() for effect in station.effect]
     try:
@@ -82,11 +82,13 @@ def effects_of(station: Station) -> tuple[Effect, ...]:
     except ValidationError as error:
         raise ValueError(f"station '{station.name}': effect{first_fault(error)}") from error
     for number, effect in enumerate(effects, start=1):
-        pump = getattr(effect, "pump", 0)
-        if pump > len(station.pump):
-            raise ValueError(
-                f"station '{station.name}': effect[{number}].pump: got {pump}, there are {len(station.pump)} pumps"
-            )
+        for part, count in (("pump", len(station.pump)), ("main", len(station.mains))):
+            place = getattr(effect, part, 0)
+            if place > count:
+                raise ValueError(
+                    f"station '{station.name}': effect[{number}].{part}: got {place}, "
+                    f"there {'is' if count == 1 else 'are'} {count} {part}{'' if count == 1 else 's'}"
+                )
     return effects
 
 

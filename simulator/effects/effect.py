@@ -23,6 +23,7 @@ Component = Literal[
 ]
 
 PumpNumber = Annotated[int, Field(ge=0, le=32, description="pump, counted from 1; 0 for all pumps")]
+MainNumber = Annotated[int, Field(ge=0, le=32, description="main, counted from 1 as in the file; 0 for all mains")]
 
 
 def limits(low: float, high: float, unit: str) -> Any:

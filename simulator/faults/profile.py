@@ -73,7 +73,13 @@ class PumpFault(Profile):
 
 
 class SystemFault(Profile):
-    """A fault of the rising main, felt by all pumps."""
+    """A fault of a rising main, counted from 1 as in the file, or of all (0); felt by all pumps on it."""
+
+    main: Annotated[int, Field(ge=0)] = 0
+
+    def of_main(self, values: Floats) -> Floats:
+        """(k, n) rows of (mains, n) values that are those of the main."""
+        return values[self.main - 1 : self.main] if self.main else values
 
 
 class SensorFault(Profile):

@@ -42,6 +42,11 @@ def needed(part):
     return {name: NEEDED[name] for name, field in part.model_fields.items() if field.is_required()}
 
 
+def three_pumps():
+    """Forcing of a station with one main, in health."""
+    return healthy_forcing(np.linspace(0, 50, 100), pumps=3, mains=1, with_sensors=True)
+
+
 def in_toml(value):
     """TOML text of a value; tables become inline tables."""
     if isinstance(value, dict):
@@ -161,7 +166,7 @@ def have_same_bytes(one, other):
 def test_fault_of_zero_strength_is_identity(part):
     assert set(part.neutral) <= set(part.model_fields)
     nothing = part(**(needed(part) | part.neutral))
-    forcing, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(2))
+    forcing, untouched = (three_pumps() for _ in range(2))
     nothing.apply(forcing, np.arange(100.0))
     assert have_same_bytes(forcing, untouched)
 
@@ -183,7 +188,7 @@ SHAPED = [
 def test_fault_acts_only_in_its_time_and_in_any_blocks(part, shape, after):
     fault = part(**(needed(part) | {"shape": shape, "after": after, "period_s": 7.0, "duty": 0.4}))
     time_s = np.arange(100.0)
-    whole, parts, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(3))
+    whole, parts, untouched = (three_pumps() for _ in range(3))
     fault.apply(whole, time_s)
     for first, last in ((0, 1), (1, 37), (37, 37), (37, 100)):
         fault.apply(part_of(parts, first, last), time_s[first:last])
@@ -206,7 +211,7 @@ def test_fault_concerns_its_pump_only(part):
     if "pump" not in part.model_fields:
         assert issubclass(part, SystemFault | SensorFault)
         return
-    forcing, untouched = (healthy_forcing(np.linspace(0, 50, 100), pumps=3, with_sensors=True) for _ in range(2))
+    forcing, untouched = (three_pumps() for _ in range(2))
     part(**(needed(part) | {"pump": 2})).apply(forcing, np.arange(100.0))
     for left, right in zip(forcing, untouched, strict=True):
         if np.shape(left) == (3, 100):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -26,6 +26,8 @@ class AirPocket(Effect):
     pocket : str
         "own": mains of their own have a pocket each; "shared": they meet at the high point, and whichever runs purges
         it for all. One main has one pocket.
+    main : int
+        0 for all.
 
     References
     ----------
@@ -41,6 +43,7 @@ class AirPocket(Effect):
     growth_s: Annotated[float, limits(10.0, 1.0e5, "s")] = 1800.0
     purge_s: Annotated[float, limits(5.0, 1.0e4, "s")] = 120.0
     pocket: Literal["own", "shared"] = "own"
+    main: MainNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let air gather."""
@@ -51,5 +54,6 @@ class AirPocket(Effect):
                 air_growth_s=self.growth_s,
                 air_purge_s=self.purge_s,
                 is_air_shared=self.pocket == "shared",
-            )
+            ),
+            self.main,
         )

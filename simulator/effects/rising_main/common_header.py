@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -18,6 +18,8 @@ class CommonHeader(Effect):
     ----------
     shared_fraction : float
         σ, share of the friction that is in the shared pipe. One pump alone does not notice it. [1]
+    main : int
+        0 for all.
 
     References
     ----------
@@ -29,9 +31,10 @@ class CommonHeader(Effect):
 
     name: Literal["common_header"] = "common_header"
     shared_fraction: Annotated[float, limits(0.0, 1.0, "1")] = 1.0
+    main: MainNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Join the mains."""
         return parameters.with_mains(
-            lambda main: replace(main, is_common_header=True, shared_friction=self.shared_fraction)
+            lambda main: replace(main, is_common_header=True, shared_friction=self.shared_fraction), self.main
         )

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -16,6 +16,8 @@ class FrictionBias(Effect):
     ----------
     factor : float
         φ; 1 is no effect. [1]
+    main : int
+        0 for all.
 
     References
     ----------
@@ -28,7 +30,10 @@ class FrictionBias(Effect):
 
     name: Literal["friction_bias"] = "friction_bias"
     factor: Annotated[float, limits(0.2, 5.0, "1")]
+    main: MainNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Scale the friction."""
-        return parameters.with_mains(lambda main: replace(main, friction_h2_m5=main.friction_h2_m5 * self.factor))
+        return parameters.with_mains(
+            lambda main: replace(main, friction_h2_m5=main.friction_h2_m5 * self.factor), self.main
+        )

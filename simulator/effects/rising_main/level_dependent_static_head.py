@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -20,6 +20,8 @@ class LevelDependentStaticHead(Effect):
         s; 1 is what geometry asks for, 0 is no effect. [m/m]
     reference_level_m : float
         L_r, level at which the static head is the configured one. [m]
+    main : int
+        0 for all.
 
     References
     ----------
@@ -32,9 +34,10 @@ class LevelDependentStaticHead(Effect):
     name: Literal["level_dependent_static_head"] = "level_dependent_static_head"
     slope: Annotated[float, limits(0.0, 2.0, "m/m")]
     reference_level_m: Annotated[float, limits(0.0, 20.0, "m")] = 0.0
+    main: MainNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let the lift follow the level."""
         return parameters.with_mains(
-            lambda main: replace(main, lift_slope=self.slope, lift_reference_m=self.reference_level_m)
+            lambda main: replace(main, lift_slope=self.slope, lift_reference_m=self.reference_level_m), self.main
         )

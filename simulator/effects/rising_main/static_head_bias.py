@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -16,6 +16,8 @@ class StaticHeadBias(Effect):
     ----------
     offset_m : float
         ΔH_s; 0 is no effect. [m]
+    main : int
+        0 for all.
 
     References
     ----------
@@ -28,7 +30,10 @@ class StaticHeadBias(Effect):
 
     name: Literal["static_head_bias"] = "static_head_bias"
     offset_m: Annotated[float, limits(-10.0, 20.0, "m")]
+    main: MainNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Shift the static head."""
-        return parameters.with_mains(lambda main: replace(main, static_head_m=main.static_head_m + self.offset_m))
+        return parameters.with_mains(
+            lambda main: replace(main, static_head_m=main.static_head_m + self.offset_m), self.main
+        )

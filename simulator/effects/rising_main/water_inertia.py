@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -20,6 +20,8 @@ class WaterInertia(Effect):
     ----------
     inertia_s2_m2 : float
         I, of length ℓ and cross-section A of the main; 300 m of 0.2 m diameter are 973. 0 is no effect. [s²/m²]
+    main : int
+        0 for all.
 
     References
     ----------
@@ -31,11 +33,12 @@ class WaterInertia(Effect):
 
     name: Literal["water_inertia"] = "water_inertia"
     inertia_s2_m2: Annotated[float, limits(0.0, 3.0e4, "s²/m²")]
+    main: MainNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Give the water its inertia."""
         return parameters.with_mains(
-            lambda main: replace(main, inertia_s2_m2=main.inertia_s2_m2 + self.inertia_s2_m2)
+            lambda main: replace(main, inertia_s2_m2=main.inertia_s2_m2 + self.inertia_s2_m2), self.main
         )
 
     def is_seen(self, parameters: PlantParameters) -> bool:

@@ -18,6 +18,8 @@ class AirPocket(SystemFault):
 
     Parameters
     ----------
+    main : int
+        0 for all.
     static_rise_m : float
         ΔH_s, height over which the pocket stretches at full strength. [m]
 
@@ -34,4 +36,4 @@ class AirPocket(SystemFault):
 
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Raise the static head over a block that begins at `time_s[0]`."""
-        forcing.static_rise_m[:] += self.static_rise_m * self.share(time_s)
+        self.of_main(forcing.static_rise_m)[:] += self.static_rise_m * self.share(time_s)

@@ -19,6 +19,8 @@ class PartlyClosedValve(SystemFault):
 
     Parameters
     ----------
+    main : int
+        0 for all.
     opening : float
         x1, open share of the valve's area at full strength, 0.01..1. [1]
     valve_share : float
@@ -38,4 +40,4 @@ class PartlyClosedValve(SystemFault):
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Raise the friction over a block that begins at `time_s[0]`."""
         opening = 1.0 - (1.0 - self.opening) * self.share(time_s)
-        forcing.friction_factor[:] *= 1.0 + self.valve_share * (1.0 / opening**2 - 1.0)
+        self.of_main(forcing.friction_factor)[:] *= 1.0 + self.valve_share * (1.0 / opening**2 - 1.0)

@@ -9,7 +9,7 @@ from wetwell.simulator.forcing import Forcing
 
 
 class PipeClogging(SystemFault):
-    r"""Deposits and trapped air: more friction, and more static head, for all pumps.
+    r"""Deposits and trapped air: more friction, and more static head, for all pumps on the main.
 
     $$k(t) = k_0 (1 + \Delta k\, r(t)), \qquad H_s(t) = H_{s,0} + \Delta H_s\, r(t)$$
 
@@ -17,6 +17,8 @@ class PipeClogging(SystemFault):
 
     Parameters
     ----------
+    main : int
+        0 for all.
     friction_rise : float
         Δk, relative rise of the friction coefficient at full strength. [1]
     static_rise_m : float
@@ -37,5 +39,5 @@ class PipeClogging(SystemFault):
     def apply(self, forcing: Forcing, time_s: Floats) -> None:
         """Raise friction and static head over a block that begins at `time_s[0]`."""
         share = self.share(time_s)
-        forcing.friction_factor[:] *= 1.0 + self.friction_rise * share
-        forcing.static_rise_m[:] += self.static_rise_m * share
+        self.of_main(forcing.friction_factor)[:] *= 1.0 + self.friction_rise * share
+        self.of_main(forcing.static_rise_m)[:] += self.static_rise_m * share

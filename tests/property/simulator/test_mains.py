@@ -36,7 +36,7 @@ def run(station, frequency_hz):
     replay_seconds(
         plant.records(),
         first_state(plant, LEVEL_M),
-        healthy_forcing(np.zeros(seconds), pumps),
+        healthy_forcing(np.zeros(seconds), pumps, len(station.mains)),
         np.zeros((3, pumps)),
         np.ascontiguousarray(frequency_hz),
         np.full(seconds, np.nan),

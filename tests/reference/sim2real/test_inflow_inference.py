@@ -68,6 +68,30 @@ def test_flow_from_the_duty_point_and_from_the_meter_agree(quiet_alpha):
     assert computed_m3h == pytest.approx(metered_m3h, abs=0.5)
 
 
+def test_a_large_station_has_large_inflows(quiet_alpha):
+    """Ten times the area and pumps of ten times the flow: ten times the inflow, none of it a spike."""
+    pumps = [
+        pump.model_copy(update={"curve": (c0, c1 / 10.0, c2 / 100.0)})
+        for pump in quiet_alpha.pump
+        for c0, c1, c2 in [pump.coefficients]
+    ]
+    main = quiet_alpha.rising_main.model_copy(
+        update={"friction_h2_m5": quiet_alpha.rising_main.friction_h2_m5 / 100.0}
+    )
+    large = quiet_alpha.model_copy(
+        update={
+            "pump": tuple(pumps),
+            "rising_main": main,
+            "sump": quiet_alpha.sump.model_copy(update={"area_m2": 10.0 * quiet_alpha.sump.area_m2}),
+        }
+    )
+    inflow = RecordedInflow(time_s=(0.0, 7200.0), flow_m3h=(1900.0, 1900.0))
+    recording = Simulation(large, Scenario(name="rain", inflow=inflow), 1).advance(7200)
+    inferred_m3h = infer_inflow_m3h(recording, large)
+    assert np.isfinite(inferred_m3h).mean() > 0.9
+    assert np.nanmedian(inferred_m3h) == pytest.approx(1900.0, rel=0.02)
+
+
 def test_what_is_missing_is_said(alpha):
     recording = day(alpha)
     with pytest.raises(ValueError, match="'level_m' is missing"):

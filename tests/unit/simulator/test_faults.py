@@ -81,7 +81,7 @@ def test_intermittent_comes_and_goes(duty, on_s):
 
 
 def test_blockage_takes_speed_from_its_own_pump_only():
-    forcing = healthy_forcing(np.zeros(4), pumps=3)
+    forcing = healthy_forcing(np.zeros(4), pumps=3, mains=1)
     Blockage(pump=2, start_s=0, end_s=2, speed_loss=0.4).apply(forcing, np.arange(4.0))
     assert forcing.speed_factor[1] == pytest.approx([1.0, 0.8, 0.6, 0.6])
     assert (forcing.speed_factor[[0, 2]] == 1).all()
@@ -90,15 +90,15 @@ def test_blockage_takes_speed_from_its_own_pump_only():
 
 
 def test_clogging_raises_friction_and_static_head():
-    forcing = healthy_forcing(np.zeros(4), pumps=3)
+    forcing = healthy_forcing(np.zeros(4), pumps=3, mains=1)
     PipeClogging(start_s=0, end_s=2, friction_rise=1.0, static_rise_m=0.5).apply(forcing, np.arange(4.0))
-    assert forcing.friction_factor == pytest.approx([1.0, 1.5, 2.0, 2.0])
-    assert forcing.static_rise_m == pytest.approx([0.0, 0.25, 0.5, 0.5])
+    assert forcing.friction_factor[0] == pytest.approx([1.0, 1.5, 2.0, 2.0])
+    assert forcing.static_rise_m[0] == pytest.approx([0.0, 0.25, 0.5, 0.5])
     assert (forcing.speed_factor == 1).all()
 
 
 def test_faults_at_the_same_time_combine():
-    forcing = healthy_forcing(np.zeros(2), pumps=1)
+    forcing = healthy_forcing(np.zeros(2), pumps=1, mains=1)
     for fault in (
         Blockage(pump=1, start_s=0, end_s=1, speed_loss=0.5),
         Blockage(pump=1, start_s=0, end_s=1, speed_loss=0.2),
@@ -107,8 +107,8 @@ def test_faults_at_the_same_time_combine():
     ):
         fault.apply(forcing, np.array([0.0, 1.0]))
     assert forcing.speed_factor[0] == pytest.approx([1.0, 0.4])
-    assert forcing.friction_factor == pytest.approx([1.0, 3.0])
-    assert forcing.static_rise_m == pytest.approx([0.0, 0.75])
+    assert forcing.friction_factor[0] == pytest.approx([1.0, 3.0])
+    assert forcing.static_rise_m[0] == pytest.approx([0.0, 0.75])
 
 
 def test_blockage_slides_along_the_system_curve(quiet_alpha):

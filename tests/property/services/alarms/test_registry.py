@@ -79,7 +79,7 @@ class Alarms(RuleBasedStateMachine):
     def ask(self, act: AlarmAct) -> None:
         now_ns = self.now_s * NS_PER_S
         try:
-            record, after = self.registry.after(act, now_ns)
+            record, after = self.registry.after(act, now_ns, now_ns)
         except ActRefusedError:
             return
         answer = self.registry.carry_out(act, record, after, now_ns, now_ns)

@@ -48,9 +48,9 @@ def test_an_act_leads_where_the_standard_says_or_is_refused(state, name):
     expected = AFTER.get((state, name))
     if expected is None:
         with pytest.raises(ActRefusedError, match=f"{name}: the alarm is {state}"):
-            with_act(STATES[state], act(name), 5)
+            with_act(STATES[state], act(name), 5, 7)
     else:
-        after = with_act(STATES[state], act(name), 5)
+        after = with_act(STATES[state], act(name), 5, 7)
         assert (after.state, after.by) == (expected, "bob")
         assert after.is_active == STATES[state].is_active
         assert (after.until_ns is not None) == (expected == "shelved")
@@ -79,7 +79,7 @@ def test_a_raise_forgets_who_acknowledged_the_last_one_and_a_shelf_has_an_end():
     back = with_condition(STATES["acknowledged"], is_active=False, time_ns=3)
     again = with_condition(back, is_active=True, time_ns=4)
     assert (again.acknowledged_ns, again.by, again.raised_ns, again.returned_ns) == (None, None, 4, None)
-    shelved = with_act(again, act("shelve", minutes=2.0), 1_000)
+    shelved = with_act(again, act("shelve", minutes=2.0), 1_000, 5)
     assert not is_shelf_over(shelved, 1_000 + 120 * NS_PER_S - 1)
     assert is_shelf_over(shelved, 1_000 + 120 * NS_PER_S)
 

@@ -4,7 +4,7 @@ from wetwell.sim2real.attribution.candidates import candidates_of
 
 
 def test_a_strength_that_is_neutral_by_the_guess_has_no_grid():
-    (sump,) = candidates_of(1, only=["sump_area_profile"])
+    (sump,) = candidates_of(1, 1, only=["sump_area_profile"])
     names = [free.name for free in sump.free]
     top = names.index("top_factor")
     moved = [grid[-1][top] != grid[0][top] for grid in sump.start_grids({})]
@@ -12,3 +12,9 @@ def test_a_strength_that_is_neutral_by_the_guess_has_no_grid():
     fixed = sump.start_grids({"top_factor": 1.0})
     assert len({float(point[top]) for grid in fixed for point in grid}) == 1
     assert len(fixed) > 1, "the other strength still has its grids"
+
+
+def test_the_mains_of_a_station_are_tried_together_and_one_by_one():
+    fixed = [candidate.fixed for candidate in candidates_of(4, 2, only=["friction_bias"])]
+    assert fixed == [(("main", 0),), (("main", 1),), (("main", 2),)]
+    assert [candidate.fixed for candidate in candidates_of(4, 1, only=["friction_bias"])] == [()]
