@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.alarm import Alarm, AlarmState
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
@@ -24,6 +24,8 @@ LONGEST_PAUSE_S = HOUR_S
 LATE_SAMPLES = 120
 """So many samples in a row that are older than the last one are no stragglers: the source has begun anew."""
 
+WAITING: frozenset[AlarmState] = frozenset({"unacknowledged", "returned", "latched_unacknowledged"})
+"""States of an alarm that wait for an acknowledgement."""
 RANKS: dict[str, int] = {
     "pump_and_system_fault": 7,
     "pump_fault": 6,
@@ -258,7 +260,7 @@ class StationView:
             "levels": self._levels[-1:],
             "floor": self._floor_m,
             "alarms": len(active),
-            "unacknowledged": sum(alarm.state in {"unacknowledged", "returned"} for alarm in active),
+            "unacknowledged": sum(alarm.state in WAITING for alarm in active),
         }
 
     @property

@@ -10,7 +10,7 @@ from wetwell.services.alarms.rules import RULES
 
 STATIC = files("wetwell.services") / "dashboard" / "static"
 LANGUAGES = ("de",)
-SERVICES_SAY = {*_ADVICE.values(), *_CURED, *(RULES[rule].advice for rule in ("pump_fault", "system_fault"))}
+SERVICES_SAY = {*_ADVICE.values(), *_CURED, *(rule.advice for rule in RULES.values())}
 
 
 def modules(folder):

@@ -13,7 +13,8 @@ const ACTS = {
   unacknowledged: ["acknowledge", "shelve"],
   acknowledged: ["shelve", "out_of_service"],
   returned: ["acknowledge", "shelve"],
-  latched: ["acknowledge"],
+  latched_unacknowledged: ["acknowledge"],
+  latched_acknowledged: ["reset"],
   shelved: ["unshelve"],
   out_of_service: ["in_service"],
 };

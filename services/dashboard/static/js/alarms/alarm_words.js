@@ -2,9 +2,9 @@
 
 import { t } from "../base/words.js";
 
-export const PRIORITIES = ["urgent", "high", "medium", "low"];
-export const SHAPES = { urgent: "pump_and_system_fault", high: "pump_fault", medium: "system_fault", low: "sensor_fault" };
-export const KINDS = { urgent: "urgent", high: "urgent", medium: "warn", low: "doubt" };
+export const PRIORITIES = ["urgent", "high", "medium", "low", "advisory"];
+export const SHAPES = { urgent: "pump_and_system_fault", high: "pump_fault", medium: "system_fault", low: "sensor_fault", advisory: "learning" };
+export const KINDS = { urgent: "urgent", high: "urgent", medium: "warn", low: "doubt", advisory: "calm" };
 
 const RULES = {
   pump_fault: t("pump fault"), system_fault: t("system fault"), pump_and_system_fault: t("pump and system fault"), sensor_fault: t("sensor fault"),
@@ -15,11 +15,12 @@ const RULES = {
 
 const STATES = {
   normal: t("normal"), unacknowledged: t("unacknowledged"), acknowledged: t("acknowledged"), returned: t("returned"), shelved: t("shelved"),
-  out_of_service: t("out of service"), latched: t("latched"), suppressed: t("suppressed"), suppressed_by_design: t("suppressed by design"),
+  out_of_service: t("out of service"), latched_unacknowledged: t("latched, unacknowledged"), latched_acknowledged: t("latched, acknowledged"), suppressed: t("suppressed by design"),
 };
 
 const ACTS = {
   acknowledge: t("acknowledge"), shelve: t("shelve"), unshelve: t("unshelve"), out_of_service: t("out of service"), in_service: t("in service"), reset: t("reset"),
+  maintenance: t("under maintenance"), stop: t("stopped"), resume: t("back in operation"),
 };
 
 const PRIORITY_WORDS = { urgent: t("urgent"), high: t("high"), medium: t("medium"), low: t("low"), advisory: t("advisory") };
@@ -31,9 +32,9 @@ export const actWord = (name) => ACTS[name] ?? t(name.replaceAll("_", " "));
 export const priorityWord = (name) => PRIORITY_WORDS[name] ?? name;
 
 /** Whether an alarm waits for somebody to acknowledge it. */
-export const isOpen = (alarm) => alarm.state === "unacknowledged" || alarm.state === "returned" || alarm.state === "latched";
+export const isOpen = (alarm) => alarm.state === "unacknowledged" || alarm.state === "returned" || alarm.state === "latched_unacknowledged";
 
-export const isPutAside = (alarm) => alarm.state === "shelved" || alarm.state === "out_of_service" || alarm.state.startsWith("suppressed");
+export const isPutAside = (alarm) => alarm.state === "shelved" || alarm.state === "out_of_service" || alarm.state === "suppressed";
 
 /** What the daemon says of it, after what kind of alarm it is, where that is not the same. */
 export function textOf(alarm) {

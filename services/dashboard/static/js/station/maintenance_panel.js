@@ -1,5 +1,7 @@
 // What crews did and found: a form, and the log with what the detector saw of it.
 
+import { askAct } from "../alarms/alarm_act.js";
+import { actWord } from "../alarms/alarm_words.js";
 import { html, panel, say } from "../base/dom.js";
 import { ZONE, millis, moment, words } from "../base/format.js";
 import { actsOf } from "../base/past.js";
@@ -25,7 +27,9 @@ export function maintenancePanel({ station }) {
     html("label", {}, t("When (empty: now)"), at), html("button", { type: "submit" }, t("enter the act")));
   const list = html("tbody");
   const log = html("table", { hidden: true }, html("thead", {}, html("tr", {}, ...[t("When"), t("What"), t("Done"), t("Found"), t("By"), t("Seen by the detector")].map((word) => html("th", { scope: "col" }, word)))), list);
-  const element = panel(t("Maintenance"), who.role === "viewer" ? html("p", { class: "note" }, t("You may look, not act.")) : form, told, html("div", { class: "scroll" }, log));
+  const modes = html("div", { class: "buttons", role: "group", "aria-label": t("Mode of the station") }, ...["maintenance", "stop", "resume"].map((name) =>
+    html("button", { type: "button", "data-mode": name, onclick: () => askAct([{ id: "station", station: station.name, text: station.name }], name, (reason) => say(told, reason)) }, actWord(name))));
+  const element = panel(t("Maintenance"), who.role === "viewer" ? html("p", { class: "note" }, t("You may look, not act.")) : html("div", {}, form, modes), told, html("div", { class: "scroll" }, log));
   element.classList.add("is-maintenance");
   let shown = "";
   let asked = -Infinity;

@@ -70,7 +70,7 @@ export function trendPanel({ station, range, past, chosen, choose }) {
       if (band.pump <= station.pumps) found.push({ ...band, lane: band.pump - 1, lanes: all, pen: own ? PENS[kindOf(own)] : ofMain ? "line" : PENS[kindOf({ state: band.state })] });
       if (ofMain) found.push({ ...band, lane: station.pumps + station.mainOf(band.pump), lanes: all, pen: PENS[kindOf(ofMain)] });
     }
-    for (const band of bandsOf().alarms) found.push({ ...band, lane: all - 1, lanes: all, pen: band.priority === "low" ? "doubt" : band.priority === "medium" ? "warn" : "urgent" });
+    for (const band of bandsOf().alarms) found.push({ ...band, lane: all - 1, lanes: all, pen: { low: "doubt", advisory: "steel", medium: "warn" }[band.priority] ?? "urgent" });
     return found;
   }
 
