@@ -72,7 +72,7 @@ def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(faulty, 
         rows = list(csv.DictReader(file))
     assert len(rows) == page.evaluate(f"{TRENDS}[1].data[0].length")
     assert {"level_m", "pump2_flow_m3h"} <= rows[0].keys()
-    page.get_by_role("button", name="Back").click()
+    page.get_by_role("button", name="Back", exact=True).click()
     expect(page).not_to_have_url(re.compile("from="))
     expect(page.get_by_role("button", name="24 h")).to_have_attribute("aria-pressed", "true")
 
@@ -100,7 +100,7 @@ def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(faulty
     page.wait_for_function(HAS_RED)
     page.get_by_text("Changes of state", exact=True).click()
     changes = page.get_by_role("list", name="Changes of state, newest first")
-    changes.get_by_role("button", name="Pump 2 pump fault").first.click()
+    changes.get_by_role("button", name="Pump 2 pump fault").last.click()
     expect(page).to_have_url(re.compile("at=2025-01-01T07"))
     expect(page.locator(".sentence")).to_contain_text("Pump 2 is at fault since 2025-01-01 07:")
     page.goto(f"{faulty.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T06:55:00Z")
@@ -130,7 +130,7 @@ def test_the_page_speaks_german_where_the_browser_does(faulty, open_page) -> Non
     page = open_page(f"{faulty.url}/station/alpha?pump=2", locale="de-DE")
     expect(page.locator("#station-state")).to_have_text("Pumpenfehler")
     expect(page.locator(".sentence")).to_contain_text("Pumpe 2 ist fehlerhaft seit")
-    expect(page.locator(".sentence")).to_contain_text(re.compile(r"Drehzahl \d+,\d %"))
+    expect(page.locator(".sentence")).to_contain_text(re.compile(r"\d+,\d %"))
     assert page.locator("html").get_attribute("lang") == "de"
     page.get_by_label("Sprache").select_option("en")
     expect(page.locator("#station-state")).to_have_text("pump fault")
