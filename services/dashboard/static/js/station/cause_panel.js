@@ -11,6 +11,12 @@ import { residualCharts } from "./residual_charts.js";
 import { severityPicture, severityWords } from "./severity.js";
 import { statisticsOf } from "./statistics.js";
 
+/** Growth by the day; what its interval does not tell from none is none. */
+function growthWords({ per_day: perDay, interval }) {
+  if (interval[0] > 0) return t("it grows by {value} a day", { value: figure(perDay, 2) });
+  return interval[1] < 0 ? t("it shrinks by {value} a day", { value: figure(-perDay, 2) }) : t("no growth is seen");
+}
+
 export function causePanel(view) {
   const { station, range, past, chosen, choose } = view;
   const away = absence("detector");
@@ -81,7 +87,7 @@ export function causePanel(view) {
     const parts = [t("{asset} is at fault since {time}", { asset: words_.charAt(0).toUpperCase() + words_.slice(1), time: moment(millis(fault.since)) })];
     if (fault.severity) parts.push(severityWords(fault.severity));
     const { trend } = fault;
-    if (trend) parts.push(t("it grows by {value} a day", { value: figure(trend.per_day, 2) }));
+    if (trend) parts.push(growthWords(trend));
     if (trend?.reaches_limit) parts.push(t("the limit is reached on {day}{interval}", { day: day(millis(trend.reaches_limit)), interval: trend.interval_at?.every(Boolean) ? ` (${day(millis(trend.interval_at[0]))} – ${day(millis(trend.interval_at[1]))})` : "" }));
     const stage = STAGES[fault.stage];
     return `${parts.join(", ")}.${stage ? ` ${stage.word.charAt(0).toUpperCase()}${stage.word.slice(1)}: ${stage.says}.` : ""}`;
