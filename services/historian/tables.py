@@ -9,6 +9,8 @@ _SHOWN = {
     "verdicts": ("time", "pump", "state"),
     "changes": ("time", "pump", "state", "asset", "stage"),
     "alarms": ("time", "id", "priority", "state", "by", "text"),
+    "episodes": ("asset", "state", "stage", "from", "to", "advice", "cost"),
+    "maintenance": ("time", "asset", "act", "found", "by", "result"),
     "stations": ("station", "first", "last"),
 }
 

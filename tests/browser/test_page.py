@@ -62,8 +62,8 @@ def test_a_blockage_turns_the_right_pump_red_and_tells_why(site, open_page, scre
     pump = page.locator('.pump[data-state="pump_fault"]')
     theme = (files("wetwell.services") / "reports" / "theme.css").read_text(encoding="utf-8")
     red = re.search(r"--urgent: light-dark\(#(\w{6})", theme)[1]
-    colour = pump.locator("circle").evaluate("node => getComputedStyle(node).stroke")
-    assert colour == f"rgb({int(red[:2], 16)}, {int(red[2:4], 16)}, {int(red[4:], 16)})"
+    rgb = f"rgb({int(red[:2], 16)}, {int(red[2:4], 16)}, {int(red[4:], 16)})"
+    expect(pump.locator("circle")).to_have_css("stroke", rgb)  # once the stage is "act"
     expect(pump.locator(".condition")).to_have_text("pump fault")
     expect(page.locator("#station-state")).to_have_attribute("data-state", "pump_fault")
     expect(page.locator(".curve.now.fault")).to_have_count(1)

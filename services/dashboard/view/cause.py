@@ -1,11 +1,11 @@
 """What is at fault, how far it has gone and what waiting costs: one line of the overview for each station."""
 
 from collections.abc import Iterable
-from typing import Any, get_args
+from typing import Any
 
-from wetwell.protocols.messages.verdict import AssetFault, Severity, Stage, Verdict
+from wetwell.detector.verdict.stage import STAGES
+from wetwell.protocols.messages.verdict import AssetFault, Severity, Verdict
 
-STAGES: tuple[Stage, ...] = get_args(Stage)
 FAULTS = ("sensor_fault", "system_fault", "pump_fault", "pump_and_system_fault")
 """States that name a fault, the gravest last."""
 _STATE_OF = {"pump": "pump_fault", "main": "system_fault", "sensor": "sensor_fault"}

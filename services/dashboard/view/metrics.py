@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from wetwell.detector.verdict.stage import STAGES
 from wetwell.protocols.quantities import PUMP_ANALOGUES
-from wetwell.services.dashboard.view.cause import STAGES, Cause, causes_of
+from wetwell.services.dashboard.view.cause import Cause, causes_of
 from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.dashboard.view.station_view import RANKS, StationView
 

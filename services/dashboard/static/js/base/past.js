@@ -24,12 +24,8 @@ export async function pastOf(station, kind, start, end, points) {
   return { times: told.time.map((stamp) => Date.parse(stamp)), columns: told.columns, messages: told.messages };
 }
 
-export async function episodesOf(station, from, to) {
-  const told = await asked(station, "episodes", { from, to });
-  return Array.isArray(told) ? told : told.episodes;
-}
+/** Episodes that reach into a span. */
+export const episodesOf = async (station, from, to) => (await asked(station, "episodes", { from, to })).episodes;
 
-export const actsOf = async (station) => {
-  const told = await asked(station, "maintenance", {});
-  return Array.isArray(told) ? told : (told.maintenance ?? told.acts ?? []);
-};
+/** Acts of maintenance, with what the detector saw of each. */
+export const actsOf = async (station) => (await asked(station, "maintenance", {})).maintenance;

@@ -61,14 +61,12 @@ export function episodePanel({ station, range, past, choose }) {
       if (range.isLive || first < from || last > to) range.between(first - 0.2 * (last - first) - 600_000, last + 0.2 * (last - first) + 600_000);
       else range.pick(last);
     };
-    const costs = costOf(episode.cost);
+    const costs = episode.cost == null ? "" : figure(episode.cost, 0);
     return html("tr", {},
       html("td", {}, html("button", { type: "button", class: `plain state is-${kindOf(episode)}`, onclick: look }, icon(episode.state, 14), html("span", {}, asset || state(episode.state).word))),
       html("td", {}, stage ? stage.word : state(episode.state).word), html("td", {}, moment(millis(episode.from))), html("td", {}, episode.to ? moment(millis(episode.to)) : t("still there")),
       html("td", {}, episode.severity ? severityWords(episode.severity) : ""), html("td", { class: "number" }, costs), html("td", { class: "note" }, episode.advice ? adviceWords(episode.advice) : ""));
   }
-
-  const costOf = (cost) => (typeof cost === "number" ? figure(cost, 0) : cost?.expected?.wait != null ? figure(cost.expected.wait, 0) : "");
 
   function exportShown() {
     const names = ["asset", "state", "stage", "from", "to", "quantity", "value", "limit", "advice"];

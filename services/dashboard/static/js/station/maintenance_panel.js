@@ -3,16 +3,21 @@
 import { askAct } from "../alarms/alarm_act.js";
 import { actWord } from "../alarms/alarm_words.js";
 import { html, panel, say } from "../base/dom.js";
-import { ZONE, millis, moment, words } from "../base/format.js";
+import { ZONE, millis, moment } from "../base/format.js";
 import { actsOf } from "../base/past.js";
 import { assetWords } from "../base/states.js";
 import { who } from "../base/who.js";
 import { t } from "../base/words.js";
+import { severityWords } from "./severity.js";
 
 const NAME = "operator";
 const AGAIN_MS = 30_000;
 const ACTS = { pump: [t("pulled"), t("cleaned"), t("impeller replaced"), t("wear ring replaced")], main: [t("flushed"), t("vented"), t("valve opened")], sensor: [t("calibrated"), t("replaced"), t("cleaned")] };
 const ENGLISH = { pump: ["pulled", "cleaned", "impeller replaced", "wear ring replaced"], main: ["flushed", "vented", "valve opened"], sensor: ["calibrated", "replaced", "cleaned"] };
+const RESULTS = {
+  pending: t("too few runs yet"), back: t("back to what it was"), better: t("better"), "no change": t("no change"),
+  "learning anew": t("is learnt anew"), refused: t("refused"),
+};
 const METERS = ["flow_m3h", "head_m", "power_kw"];
 
 export function maintenancePanel({ station }) {
@@ -74,7 +79,7 @@ export function maintenancePanel({ station }) {
       const acts = await actsOf(station.name);
       log.hidden = acts.length === 0;
       list.replaceChildren(...[...acts].reverse().map((each) => html("tr", {},
-        html("td", {}, moment(millis(each.at ?? each.time))), html("td", {}, assetWords(each.asset, (number) => station.called(number))), html("td", {}, words(each.act)), html("td", {}, each.found),
+        html("td", {}, moment(millis(each.time))), html("td", {}, assetWords(each.asset, (number) => station.called(number))), html("td", {}, t(each.act)), html("td", {}, each.found),
         html("td", {}, each.by), html("td", {}, resultWords(each)))));
     } catch (error) {
       log.hidden = true;
@@ -82,7 +87,10 @@ export function maintenancePanel({ station }) {
     }
   }
 
-  const resultWords = (each) => (each.result ?? each.outcome ?? each.seen ? words(String(each.result ?? each.outcome ?? each.seen)) : t("not yet"));
+  function resultWords({ result, before, after }) {
+    const sizes = before && after ? ` (${severityWords(before)} → ${severityWords(after)})` : "";
+    return `${RESULTS[result] ?? result}${sizes}`;
+  }
 
   return {
     element,

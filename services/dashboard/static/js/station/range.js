@@ -43,7 +43,8 @@ export function timeRange(endOf, changed) {
   function between(from, to) {
     const middle = (from + to) / 2;
     const half = Math.min(MOST_MS, Math.max(LEAST_MS, to - from)) / 2;
-    look({ from: Math.round(middle - half), to: Math.round(middle + half) });
+    const [begin, end] = [Math.round(middle - half), Math.round(middle + half)];
+    if (wanted.from !== begin || wanted.to !== end) look({ from: begin, to: end }); // each chart of a stack tells of the same drag
   }
 
   /** Looks at a moment of the range; null for its end. */
