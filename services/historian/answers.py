@@ -44,14 +44,15 @@ def _messages(store: Store, station: str, query: HistoryQuery) -> tuple[dict[str
     """Messages of a kind, oldest first."""
     if query.kind == "changes":
         return changes_of(store, station, query.start, query.end, query.points)
-    if query.kind == "episodes":
-        found = episodes_between(store, station, query.start, query.end)[-query.points :]
-        return tuple(one.model_dump(mode="json") for one in found)
-    payloads = store.events(query.kind, station, query.start, query.end, query.points)
-    messages = [json.loads(payload) for payload in payloads]
-    if query.kind == "maintenance":  # of each act the last that was told of it
-        messages = list({message["id"]: message for message in messages}.values())
-    return tuple(messages)
+    if query.kind in ("verdicts", "alarms", "maintenance"):
+        messages = [
+            json.loads(each) for each in store.events(query.kind, station, query.start, query.end, query.points)
+        ]
+        if query.kind == "maintenance":  # of each act the last that was told of it
+            messages = list({message["id"]: message for message in messages}.values())
+        return tuple(messages)
+    found = episodes_between(store, station, query.start, query.end)[-query.points :]
+    return tuple(one.model_dump(mode="json") for one in found)
 
 
 def _of_span(store: Store, span: StationSpan, query: HistoryQuery) -> History:
