@@ -21,7 +21,7 @@ from wetwell.services.dashboard.assets import Asset, Assets
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.login import Login, holder_in
-from wetwell.services.dashboard.past.client import act_on_alarm, enter_act, history, recording_pieces
+from wetwell.services.dashboard.past.client import act_on_alarm, enter_act, history, recording_pieces, set_plant_clock
 from wetwell.services.dashboard.past.journal import bands, is_kept, journal
 from wetwell.services.dashboard.past.trends import trends_text
 from wetwell.services.dashboard.refusal import RefusalError
@@ -83,6 +83,7 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
             Route("/api/stations/{station}/maintenance", answers.maintenance),
             Route("/api/stations/{station}/maintenance", answers.enter, methods=["POST"]),
             Route("/api/stations/{station}/alarm-act", answers.act, methods=["POST"]),
+            Route("/api/stations/{station}/plant-clock", answers.plant_clock, methods=["POST"]),
             Route("/api/who", login.who),
             Route("/api/login", login.enter, methods=["POST"]),
             Route("/api/alarms", answers.alarms),
@@ -183,6 +184,10 @@ class _Answers:
         by = None if holder is None else holder.name
         answer = await act_on_alarm(self._state.asked(), request.path_params["station"], await request.body(), by)
         return JSONResponse(answer)
+
+    async def plant_clock(self, request: Request) -> Response:
+        clock = await set_plant_clock(self._state.asked(), request.path_params["station"], await request.body())
+        return JSONResponse(clock)
 
     async def history(self, request: Request) -> Response:
         answer = await history(self._state.asked(), request.path_params["station"], request.query_params)

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 
-from wetwell.protocols.bus.interface import Bus, Request, Subscription
+from wetwell.protocols.bus.interface import ALL_KEPT, Bus, Request, Subscription
 from wetwell.protocols.bus.keys import (
     ROOT,
     SITE,
@@ -23,12 +23,11 @@ from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
 
-SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
 MAINTENANCE_HISTORY = 100
-CAPACITY = 1_000_000
-"""Most messages of one kind that wait to be taken: after a start a thousand publishers send what they hold."""
+CAPACITY = 200_000
+"""Most messages of one kind that wait to be taken; what publishers hold comes when there is room."""
 
 PAYLOADS_AT_ONCE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
@@ -64,8 +63,8 @@ def _finish(historian: Historian) -> None:
 async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: float, health_s: float) -> None:
     """Take, commit, maintain, answer and report for ever."""
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
-        "samples": bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
-        "blocks": bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
+        "samples": bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY),
+        "blocks": bus.subscribe(sample_block_key("*"), history=ALL_KEPT, capacity=CAPACITY),
         "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
         "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
         "maintenance": bus.subscribe(maintenance_key("*"), history=MAINTENANCE_HISTORY, capacity=CAPACITY),
@@ -74,7 +73,8 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
 
     def figures() -> dict[str, float]:
         dropped = sum(subscription.dropped for subscription in subscriptions.values())
-        return historian.figures(now_ns()) | {"dropped": float(dropped)}
+        missed = sum(subscription.missed for subscription in subscriptions.values())
+        return historian.figures(now_ns()) | {"dropped": float(dropped), "missed": float(missed)}
 
     async with asyncio.TaskGroup() as group:
         for kind, subscription in subscriptions.items():

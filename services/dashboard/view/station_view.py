@@ -21,6 +21,7 @@ VERDICTS = 60
 HOUR_S = 3600.0
 LONGEST_PAUSE_S = HOUR_S
 """Over a longer pause between two samples no energy is counted. [s]"""
+SIMULATOR = "simulator"
 LATE_SAMPLES = 120
 """So many samples in a row that are older than the last one are no stragglers: the source has begun anew."""
 
@@ -59,6 +60,7 @@ class StationView:
         self.seen_s = 0.0
         self.now_s = 0.0
         self.is_stale = True
+        self.is_held = False
         self.lost = 0
         self._rows: deque[str] = deque(maxlen=rows)
         self._late = 0
@@ -76,6 +78,7 @@ class StationView:
         self._statuses: dict[str, str] = {}
         self._alive: set[str] = set()
         self._site: list[str] = []
+        self._is_held = False
         self.energy_kwh: dict[int, float] = {}
 
     @property
@@ -91,8 +94,8 @@ class StationView:
         """Whether this is the last sample once more."""
         return self.sample is not None and (sample.time, sample.seq) == (self.sample.time, self.sample.seq)
 
-    def handle_sample(self, sample: Sample, now_s: float) -> bool:
-        """Take a sample that is not older than the last; whether it was one."""
+    def handle_sample(self, sample: Sample, now_s: float, passed_over: int = 0) -> bool:
+        """Take a sample that is not older than the last; whether it was one. Before it others were passed over."""
         self.seen_s = now_s
         if self.sample is not None and sample.time <= self.sample.time:
             self._late += 1
@@ -104,8 +107,8 @@ class StationView:
             self.first_ns = sample.time
         elif self.sample is None:
             self.first_ns = sample.time
-        elif sample.seq > self.sample.seq + 1:
-            self.lost += sample.seq - self.sample.seq - 1
+        else:
+            self.lost += max(0, sample.seq - self.sample.seq - 1 - passed_over)
         self._late = 0
         self._add_energy(sample)
         self.sample = sample
@@ -165,8 +168,12 @@ class StationView:
         self._fresh.setdefault("alarms", {})[alarm.id] = alarm.encode().decode()
 
     def handle_status(self, status: Status) -> None:
-        """Take the health figures of a service."""
+        """Take the health figures of a service; those of a simulator say whether its plant is held."""
+        if status.service == "simulator":
+            self.is_held = status.figures.get("held", 0.0) > 0.0
         self._statuses[status.service] = status.encode().decode()
+        if status.service == SIMULATOR:
+            self._is_held = status.figures.get("held", 0.0) > 0.0
         self._fresh.setdefault("statuses", {})[status.service] = self._statuses[status.service]
 
     def handle_presence(self, service: str, *, is_alive: bool) -> None:
@@ -187,7 +194,10 @@ class StationView:
 
     def settle(self, now_s: float, stale_s: float) -> bool:
         """Notice that samples have stopped or come again; whether either has happened."""
-        is_stale = self.sample is None or now_s - self.seen_s > stale_s
+        if self.is_held:
+            self.seen_s = now_s  # nothing is missed of a plant that stands
+        is_held = self._is_held and SIMULATOR in self._alive  # the time of the plant stands, and its samples with it
+        is_stale = self.sample is None or (now_s - self.seen_s > stale_s and not is_held)
         if is_stale == self.is_stale:
             return False
         self.is_stale = is_stale

@@ -14,6 +14,7 @@ import { kpiPanel } from "./kpi_panel.js";
 import { maintenancePanel } from "./maintenance_panel.js";
 import { pastStore } from "./past_store.js";
 import { planePanel } from "./plane_panel.js";
+import { plantClock } from "./plant_clock.js";
 import { qualityPanel } from "./quality_panel.js";
 import { timeRange } from "./range.js";
 import { StationState } from "./station_state.js";
@@ -38,7 +39,8 @@ export function stationPage(name, main, showLink) {
   const chip = html("span", { class: "state", id: "station-state" }, word);
   const time = html("span", { class: "note", id: "station-time" });
   const choice = html("div", { class: "buttons", role: "group", "aria-label": t("Pump") });
-  const head = html("div", { class: "tools station-head" }, html("h1", {}, name), chip, time, choice, range.element);
+  const clock = plantClock(station);
+  const head = html("div", { class: "tools station-head" }, html("h1", {}, name), chip, time, clock.element, choice, range.element);
   const unknown = html("div", { class: "absent", role: "alert", id: "unknown-station", hidden: true }, html("h1", {}, name),
     t("There is no station {name}: nothing was heard of it, and the historian does not know it.", { name }), " ", html("a", { href: "/" }, t("All stations")));
   const panels = PANELS.map((make) => make(view));
@@ -80,6 +82,7 @@ export function stationPage(name, main, showLink) {
     range.show();
     past.update();
     showChoice();
+    clock.update();
     for (const each of panels) each.update(changed);
   }
 
