@@ -12,7 +12,7 @@ from wetwell.services.dashboard.past.client import history
 
 STATIONS_AT_ONCE = 8
 """Most stations that the historian is asked about at a time."""
-MOST_CHANGES = 5000
+MOST_BANDS = 5000
 """Most changes of a station that are drawn."""
 MOST_LINES = 500
 """Most lines of the journal."""
@@ -30,8 +30,8 @@ async def bands(bus: Bus, station: str, query: Mapping[str, str]) -> dict[str, A
     """
     until_now = {name: value for name, value in query.items() if name == "start"}
     verdicts, alarms = await asyncio.gather(
-        history(bus, station, query, kind="changes", points=MOST_CHANGES),
-        history(bus, station, until_now, kind="alarms", points=MOST_CHANGES),
+        history(bus, station, query, kind="changes", points=MOST_BANDS),
+        history(bus, station, until_now, kind="alarms", points=MOST_BANDS),
     )
     return {
         "verdicts": verdict_bands(verdicts.messages),

@@ -11,8 +11,8 @@ from wetwell.services.dashboard.view.cause import Cause, causes_of
 from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.dashboard.view.station_view import RANKS, StationView
 
-_PUMP = ("station", "pump")
-_ASSET = ("station", "pump", "asset", "quantity")
+_OF_PUMP = ("station", "pump")
+_OF_ASSET = ("station", "pump", "asset", "quantity")
 
 
 class StationMetrics(Collector):
@@ -50,7 +50,7 @@ class StationMetrics(Collector):
 
 def _measured(stations: list[StationView]) -> Iterable[Metric]:
     for name in PUMP_ANALOGUES:
-        family = GaugeMetricFamily(f"wetwell_pump_{name}", f"{name.rpartition('_')[0]} of a pump.", labels=_PUMP)
+        family = GaugeMetricFamily(f"wetwell_pump_{name}", f"{name.rpartition('_')[0]} of a pump.", labels=_OF_PUMP)
         for station in stations:
             readings = station.sample.pumps if station.is_good and station.sample is not None else ()
             for pump, reading in enumerate(readings, start=1):
@@ -59,7 +59,7 @@ def _measured(stations: list[StationView]) -> Iterable[Metric]:
                     family.add_metric((station.name, str(pump)), value)
         yield family
     energy = CounterMetricFamily(
-        "wetwell_pump_energy_kwh", "Energy that a pump has taken since this process began. [kWh]", labels=_PUMP
+        "wetwell_pump_energy_kwh", "Energy that a pump has taken since this process began. [kWh]", labels=_OF_PUMP
     )
     for station in stations:
         for pump, energy_kwh in list(station.energy_kwh.items()):
@@ -68,11 +68,11 @@ def _measured(stations: list[StationView]) -> Iterable[Metric]:
 
 
 def _judged(stations: list[StationView]) -> Iterable[Metric]:
-    states = GaugeMetricFamily("wetwell_pump_state", "1 for the state of the verdict.", labels=(*_PUMP, "state"))
-    stage = GaugeMetricFamily("wetwell_pump_stage", "0 none, 1 watch, 2 plan, 3 act.", labels=_PUMP)
-    severity = GaugeMetricFamily("wetwell_severity", "How far a fault has gone, in its quantity.", labels=_ASSET)
-    limit = GaugeMetricFamily("wetwell_severity_limit", "Action limit of the quantity.", labels=_ASSET)
-    trend = GaugeMetricFamily("wetwell_severity_trend_per_day", "Growth of the severity in a day.", labels=_ASSET)
+    states = GaugeMetricFamily("wetwell_pump_state", "1 for the state of the verdict.", labels=(*_OF_PUMP, "state"))
+    stage = GaugeMetricFamily("wetwell_pump_stage", "0 none, 1 watch, 2 plan, 3 act.", labels=_OF_PUMP)
+    severity = GaugeMetricFamily("wetwell_severity", "How far a fault has gone, in its quantity.", labels=_OF_ASSET)
+    limit = GaugeMetricFamily("wetwell_severity_limit", "Action limit of the quantity.", labels=_OF_ASSET)
+    trend = GaugeMetricFamily("wetwell_severity_trend_per_day", "Growth of the severity in a day.", labels=_OF_ASSET)
     for station in stations:
         for pump, verdict in list(station.last_verdicts.items()):  # the loop adds to it meanwhile
             name = (station.name, str(pump))
