@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from wetwell.detector.verdict.stage import STAGES
-from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import AssetFault, Severity, State, Verdict
 
 NEWS_SHARE = 0.1

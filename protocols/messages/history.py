@@ -5,6 +5,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from wetwell.protocols.messages.message import Message, Number, Stamp
+from wetwell.protocols.messages.verdict import Severity, Stage, State, Trend
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 
 Kind = Literal["samples", "verdicts", "changes", "alarms", "episodes", "maintenance", "kpi", "stations"]
@@ -52,3 +53,24 @@ class History(Message):
     messages: tuple[dict[str, Any], ...] = ()
     more: bool = False
     error: str = ""
+
+
+class Episode(Message):
+    """A fault of one asset, as it was told until `time`; `to` is None while it stands.
+
+    `stage` and `severity` are the worst so far, `trend` is the last; `cost` is what it was expected to cost to wait
+    until the next visit, at the worst.
+    """
+
+    schema_name: Literal["wetwell.episode/1"] = Field("wetwell.episode/1", alias="schema")
+    time: Stamp
+    station: str
+    asset: str
+    state: State
+    stage: Stage
+    since: Stamp = Field(alias="from")
+    to: Stamp | None = None
+    severity: Severity | None = None
+    trend: Trend | None = None
+    advice: str = ""
+    cost: float | None = None

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from wetwell.protocols.messages.episode import Episode
-from wetwell.protocols.messages.history import LONGEST_NS
+from wetwell.protocols.messages.history import LONGEST_NS, Episode
 from wetwell.protocols.messages.maintenance import NOTHING, MaintenanceRecord
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.historian.episodes import episodes_between

@@ -13,7 +13,7 @@ from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import BLOCK_ROWS, blocks
 from wetwell.detector.verdict.episodes import EpisodeLog
 from wetwell.protocols.atomic_file import atomic_file
-from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording, recording_writer
 from wetwell.protocols.station.station_file import Station

@@ -5,7 +5,7 @@ import uuid
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import order_key, verdict_key
-from wetwell.protocols.messages.orders.detector_order import Order
+from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.client import ask_service
 from wetwell.services.runtime.clock import now_ns

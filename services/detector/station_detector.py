@@ -16,7 +16,7 @@ from wetwell.protocols.bus.keys import maintenance_key, verdict_key
 from wetwell.protocols.messages.decoding import SampleMessage, decoded
 from wetwell.protocols.messages.maintenance import MaintenanceAct, MaintenanceRecord
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.orders.detector_order import Order
+from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict

@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 
 from wetwell.detector.verdict.episodes import EpisodeLog, episodes_of
-from wetwell.protocols.messages.episode import Episode
-from wetwell.protocols.messages.history import LONGEST_NS
+from wetwell.protocols.messages.history import LONGEST_NS, Episode
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.historian.store.interface import EventRow, Store, StoreError
 

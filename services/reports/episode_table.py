@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from html import escape
 
-from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import Severity, Stage
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.charts import Section, page, paragraph, table

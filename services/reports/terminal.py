@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from wetwell.protocols.messages.orders.plant_clock import PlantClock
+from wetwell.protocols.messages.plant_clock import PlantClock
 from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.protocols.station.station_file import Station

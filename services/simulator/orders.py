@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from wetwell.protocols.bus.interface import Request, Subscription
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.orders.plant_clock import PlantClock, PlantClockOrder
+from wetwell.protocols.messages.plant_clock import PlantClock, PlantClockOrder
 from wetwell.services.simulator.pace import Pace
 
 

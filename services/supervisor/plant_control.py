@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import plant_clock_key
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.orders.plant_clock import PlantClock, PlantClockOrder
+from wetwell.protocols.messages.plant_clock import PlantClock, PlantClockOrder
 from wetwell.services.runtime.client import first_answer
 
 SPEEDS = (1.0, 10.0, 60.0, 600.0)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from wetwell.protocols.messages.orders.plant_clock import PlantClock
+from wetwell.protocols.messages.plant_clock import PlantClock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.reports.terminal import StateLines, begin_line, clock_line, story_lines
 from wetwell.services.supervisor.story import Story

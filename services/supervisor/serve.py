@@ -11,7 +11,7 @@ from typing import Protocol
 from wetwell.protocols.bus.interface import Bus, Presence, Subscription
 from wetwell.protocols.bus.keys import SITE, alive_key, status_key, verdict_key
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.orders.plant_clock import PlantClock
+from wetwell.protocols.messages.plant_clock import PlantClock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.connection import listen

@@ -17,7 +17,7 @@ from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.keys import SITE, alive_key, plant_clock_key
 from wetwell.protocols.bus.zenoh.link import connect_client
-from wetwell.protocols.messages.orders.plant_clock import PlantClockOrder
+from wetwell.protocols.messages.plant_clock import PlantClockOrder
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS

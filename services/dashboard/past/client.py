@@ -16,7 +16,7 @@ from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
 from wetwell.protocols.messages.maintenance import MaintenanceAct
 from wetwell.protocols.messages.message import MessageError, Number
-from wetwell.protocols.messages.orders.plant_clock import PlantClock, PlantClockOrder
+from wetwell.protocols.messages.plant_clock import PlantClock, PlantClockOrder
 from wetwell.protocols.messages.readings import row_values
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import columns_of

@@ -6,7 +6,7 @@ import pytest
 from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import order_key, sample_key
-from wetwell.protocols.messages.orders.detector_order import Order
+from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import LEARNING_S

@@ -2,8 +2,7 @@
 
 import contextlib
 
-from wetwell.protocols.messages.episode import Episode
-from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.history import Episode, History, HistoryQuery
 from wetwell.protocols.messages.maintenance import MaintenanceRecord
 from wetwell.protocols.messages.verdict import AssetFault, Severity, Verdict
 from wetwell.services.batch.crews import score_history

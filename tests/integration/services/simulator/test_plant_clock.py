@@ -9,7 +9,7 @@ from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import alive_key, plant_clock_key, sample_key, status_key
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.orders.plant_clock import PlantClockOrder
+from wetwell.protocols.messages.plant_clock import PlantClockOrder
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
 from wetwell.services.alarms.service import AlarmService

@@ -1,6 +1,6 @@
 """Episodes scored against what crews found."""
 
-from wetwell.protocols.messages.episode import Episode
+from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.maintenance import MaintenanceRecord
 from wetwell.services.batch.crews import score_acts
 

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.protocols.messages.orders.plant_clock import PlantClockOrder
+from wetwell.protocols.messages.plant_clock import PlantClockOrder
 from wetwell.services.simulator.orders import carry_out
 from wetwell.services.simulator.pace import LOOK_SPEED, MAX_CATCH_UP_S, Pace
 

@@ -1,1 +1,0 @@
-"""Orders of people: to the detector, and to the clock of a simulated plant."""
