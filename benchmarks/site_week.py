@@ -19,10 +19,11 @@ from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import Checkpoint
-from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.runtime.sample_sender import LEAST_KEPT
 from wetwell.services.runtime.settings import AlarmSettings
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
@@ -48,7 +49,7 @@ class Week:
             StationDetector(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
         ]
         self._intake = Intake(bus, self._judges)
-        self._publishers = [bus.publisher(sample_key(station.name), history=SAMPLE_HISTORY) for station in files]
+        self._publishers = [bus.publisher(sample_key(station.name), history=LEAST_KEPT) for station in files]
         self._samples, self._verdicts = bus.subscribe(sample_key("*")), bus.subscribe(verdict_key("*"))
         self._alarms = bus.subscribe(alarm_key("*"))
         self._kept = 0

@@ -36,6 +36,13 @@ class Simulation:
     start_ns : int
         Time of the first sample, where the scenario names none.
 
+    Attributes
+    ----------
+    station, scenario
+        As given.
+    start_ns : int
+        Time of the first sample.
+
     Raises
     ------
     ValueError
@@ -67,7 +74,7 @@ class Simulation:
         self.scenario = scenario
         self._inflow = scenario.inflow.stream(inflow_rng)
         self._plant = Plant(effective_parameters(station), scenario.initial_level_m)
-        self._start_ns = scenario.start_time if scenario.start_time is not None else start_ns
+        self.start_ns = scenario.start_time if scenario.start_time is not None else start_ns
 
     @property
     def seconds(self) -> int:
@@ -136,7 +143,7 @@ class Simulation:
         for fault in self.scenario.fault:
             fault.apply(forcing, time_s)
         measured, true = self._plant.advance(forcing, self._sensor_rng)
-        stamps_ns = self._start_ns + NS_PER_S * np.arange(begin, begin + seconds)
+        stamps_ns = self.start_ns + NS_PER_S * np.arange(begin, begin + seconds)
         return Recording(
             time_ns=stamps_ns,
             columns=_measured(measured, len(self.station.pump)),

@@ -12,6 +12,9 @@ T = TypeVar("T")
 Keyed = tuple[str, bytes]
 """A message with its key."""
 
+ALL_KEPT = 2**31
+"""As the history of a subscription: all that each publisher keeps, however long that is."""
+
 
 class Publisher(Protocol):
     """Sends the messages of one key, and answers a `get` on it with the last one."""
@@ -26,11 +29,13 @@ class Publisher(Protocol):
 class Subscription(Protocol[T]):
     """Messages of a key, waiting to be received by one event loop.
 
-    Characteristics: buffered: up to `capacity` · when full: drops the oldest and counts it in `dropped` ·
-    filled from any thread · a link that comes back goes on in the same subscription.
+    Characteristics: buffered: up to `capacity`, and a bound in bytes · when full: drops the oldest and counts it in
+    `dropped`; one that recovers what is lost leaves it to the publisher until there is room · filled from any
+    thread · a link that comes back goes on in the same subscription · `missed` counts what nobody has any more.
     """
 
     dropped: int
+    missed: int
 
     async def receive(self) -> list[T]:
         """Wait until a message is there, then return all that are, oldest first."""
@@ -69,7 +74,9 @@ class Bus(Protocol):
         publisher keeps. Without `recover`, and without `history`, it stays lost: for those who show the newest.
         """
 
-    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Subscription[Keyed]:
+    def collect(
+        self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000, recover: bool = True
+    ) -> Subscription[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
 
     def answer(self, key: str) -> Subscription[Request]:

@@ -35,6 +35,11 @@ def alive_key(station: str, service: str) -> str:
     return f"{ROOT}/{station}/alive/{service}"
 
 
+def plant_clock_key(station: str) -> str:
+    """Key of the orders to the clock of a simulated plant, which are questions."""
+    return f"{ROOT}/{station}/plant-clock"
+
+
 def model_key(station: str) -> str:
     """Key of the curves that the detector believes in."""
     return f"{ROOT}/{station}/model"

@@ -14,6 +14,8 @@ from wetwell.protocols.messages.message import Message
 SOURCE_BYTES = 8
 PAGE_BYTES = 65_536
 """Messages of one answer; one message at least."""
+KEPT_BYTES = 64 * 1024 * 1024
+"""Messages that one publisher keeps at most; one message at least."""
 
 _HEADER = struct.Struct(f">{SOURCE_BYTES}sQ")
 _PAGE = struct.Struct(f">{SOURCE_BYTES}sQQ")
@@ -77,7 +79,8 @@ class PublisherCache:
     Parameters
     ----------
     history : int
-        Most messages that are kept, >= 1; one that holds many things counts as many. The last one is always kept.
+        Most messages that are kept, >= 1, up to `KEPT_BYTES`; one that holds many things counts as many. The last one
+        is always kept.
     """
 
     def __init__(self, history: int) -> None:
@@ -86,7 +89,7 @@ class PublisherCache:
         self._history = history
         self._payloads: deque[bytes] = deque()
         self._weights: deque[int] = deque()
-        self._weight = 0
+        self._weight = self._bytes = 0
         self._lock = threading.Lock()
 
     def add(self, payload: bytes, weight: int = 1) -> bytes:
@@ -96,8 +99,9 @@ class PublisherCache:
             self._payloads.append(payload)
             self._weights.append(weight)
             self._weight += weight
-            while self._weight > self._history and len(self._payloads) > 1:
-                self._payloads.popleft()
+            self._bytes += len(payload)
+            while (self._weight > self._history or self._bytes > KEPT_BYTES) and len(self._payloads) > 1:
+                self._bytes -= len(self._payloads.popleft())
                 self._weight -= self._weights.popleft()
             self.end += 1
         return header

@@ -8,6 +8,8 @@ MOST_STREAMS = 8
 """Lives of publishers on one key that are remembered."""
 MOST_HELD = 10_000
 """Messages of one publisher that wait for one that is missing."""
+MOST_HELD_BYTES = 64 * 1024 * 1024
+"""Of all messages that wait for missing ones."""
 
 
 class SourceStream:
@@ -33,8 +35,9 @@ class SourceStream:
 class Sequencer:
     """Puts what comes in order. It knows no clock and no network: who uses it asks for what is `wanted`.
 
-    Characteristics: buffered: what waits for a message that is missing, up to `MOST_HELD` of each publisher · when
-    full: goes on without it · threads: one.
+    Characteristics: buffered: what waits for a message that is missing, up to `MOST_HELD` of each publisher and
+    `MOST_HELD_BYTES` of all · when full: what comes is let go, and asked for again when those before it are there ·
+    threads: one.
 
     Parameters
     ----------
@@ -56,6 +59,7 @@ class Sequencer:
         self.wanted: dict[bytes, SourceStream] = {}
         self.lost = 0
         self._history = history
+        self._held_bytes = 0
         self._streams: dict[bytes, SourceStream] = {}
         self._sources: dict[str, deque[bytes]] = {}
 
@@ -74,9 +78,18 @@ class Sequencer:
             stream.is_begun = True
             self.ready.append((key, payload))
         elif number >= stream.next:
-            stream.held[number] = payload
             stream.end = max(stream.end, number + 1)
+            self._hold(stream, number, payload)
             self._go_on(stream)
+
+    def let_go(self, key: str, header: bytes) -> bool:
+        """Want a message that is there, without taking it; whether its header says which it is."""
+        known = read_sequence_header(header)
+        if known is None:
+            return False
+        source, number = known
+        self._reaches(key, source, number + 1)
+        return True
 
     def handle_tail(self, key: str, header: bytes) -> None:
         """Take the number that the next message of a publisher will have."""
@@ -90,7 +103,8 @@ class Sequencer:
             self._skip(stream, page.first)
         for number, payload in enumerate(page.payloads, page.first):
             if number >= stream.next:
-                stream.held[number] = payload
+                self._hold(stream, number, payload)
+                self._go_on(stream)
         self._go_on(stream)
 
     def is_replaced(self, stream: SourceStream) -> bool:
@@ -120,16 +134,25 @@ class Sequencer:
         stream = self._streams[source] = SourceStream(key, source, begin)
         return stream
 
+    def _hold(self, stream: SourceStream, number: int, payload: bytes) -> None:
+        """Let a message wait for earlier ones, where there is room; the next one always has."""
+        is_full = len(stream.held) >= MOST_HELD or self._held_bytes + len(payload) > MOST_HELD_BYTES
+        if number not in stream.held and (number == stream.next or not is_full):
+            stream.held[number] = payload
+            self._held_bytes += len(payload)
+
+    def _release(self, stream: SourceStream, number: int) -> bytes:
+        payload = stream.held.pop(number)
+        self._held_bytes -= len(payload)
+        return payload
+
     def _go_on(self, stream: SourceStream) -> None:
         """Pass on what is complete; want what is not."""
-        held = stream.held
-        while stream.next in held:
-            self.ready.append((stream.key, held.pop(stream.next)))
+        while stream.next in stream.held:
+            self.ready.append((stream.key, self._release(stream, stream.next)))
             stream.next += 1
             stream.is_begun = True
-        if len(held) > MOST_HELD:
-            self.give_up(stream)
-        elif not stream.is_missing:
+        if not stream.is_missing:
             self.wanted.pop(stream.source, None)
         elif not stream.is_asked:
             self.wanted[stream.source] = stream
@@ -140,7 +163,7 @@ class Sequencer:
             return
         there = sorted(number for number in stream.held if number < to)
         for number in there:
-            self.ready.append((stream.key, stream.held.pop(number)))
+            self.ready.append((stream.key, self._release(stream, number)))
         if stream.is_begun:  # what was before the first one belongs to the history
             self.lost += to - stream.next - len(there)
         stream.next = to

@@ -21,7 +21,8 @@ class HistoryQuery(Message):
     the samples themselves, oldest first, up to `points`, with the columns `seq` and `quality` (0 good, 1 uncertain,
     2 bad); the answer then says whether there are `more`. Of `kpi` hours come, or if they are more than `points`
     days, and of these the last `points`. Of verdicts and alarms the last `points` come. `stations`, asked about the
-    station `_site`, gives a message for each station, with the times of its `first` and `last` sample.
+    station `_site`, gives a message for each station, with the times of its `first` and `last` sample; a stamp that
+    lies more than a day ahead of all others is not the last one until ten of that time are there.
     """
 
     schema_name: Literal["wetwell.history-query/1"] = Field("wetwell.history-query/1", alias="schema")

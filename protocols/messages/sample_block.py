@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.message import Message, Number, Stamp
 from wetwell.protocols.messages.readings import row_values
-from wetwell.protocols.messages.sample import PumpReading, Quality, Sample
+from wetwell.protocols.messages.sample import LevelSample, PumpReading, Quality, Sample
 from wetwell.protocols.quantities import (
     FIRST_PUMP,
     FLOW,
@@ -124,6 +124,33 @@ class SampleBlock(Message):
             if column:
                 values[:, place] = column
         return values
+
+
+class LevelBlock(Message):
+    """What a `SampleBlock` says of the wet well."""
+
+    schema_name: Literal["wetwell.samples/1"] = Field("wetwell.samples/1", alias="schema")
+    station: str
+    seq: tuple[Seq, ...] = Field(min_length=1, max_length=MOST_SAMPLES)
+    time: tuple[Stamp, ...]
+    level_m: Numbers = ()
+    quality: Quality = "good"
+
+    @model_validator(mode="after")
+    def _columns_are_as_long(self) -> Self:
+        if len(self.time) != len(self.seq) or len(self.level_m) not in {0, len(self.seq)}:
+            raise ValueError(f"time, level_m: must have {len(self.seq)} values as seq, or level_m none")
+        return self
+
+    def samples(self) -> list[LevelSample]:
+        """The samples one by one."""
+        levels_m = self.level_m or (None,) * len(self.seq)
+        return [
+            LevelSample.model_construct(
+                station=self.station, seq=seq, time=time, level_m=level_m, quality=self.quality
+            )
+            for seq, time, level_m in zip(self.seq, self.time, levels_m, strict=True)
+        ]
 
 
 def _column(values: tuple[T | None, ...]) -> tuple[T | None, ...]:

@@ -5,7 +5,7 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from wetwell.protocols.bus.interface import Bus, Request, Subscription
+from wetwell.protocols.bus.interface import Bus, Keyed, Request, Subscription
 from wetwell.protocols.bus.keys import (
     SITE,
     alarm_act_key,
@@ -17,7 +17,7 @@ from wetwell.protocols.bus.keys import (
     verdict_key,
 )
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.alarms.service import AlarmService
+from wetwell.services.alarms.service import SOURCES, AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
@@ -67,23 +67,27 @@ async def keep(bus: Bus, service: AlarmService, health_period_s: float) -> None:
     samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
     sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
     verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY)
-    statuses = bus.subscribe(status_key("*", "gateway"), history=1)
+    statuses = bus.collect([status_key("*", source) for source in sorted(SOURCES)], history=1)
     presences = bus.watch(alive_key("*", "*"))
     acts, reports = bus.answer(alarm_act_key("*")), bus.answer(alarm_report_key())
     service.publish_all()
 
     def figures() -> dict[str, float]:
-        dropped = samples.dropped + sample_blocks.dropped + verdicts.dropped + statuses.dropped
-        return service.figures() | {"dropped": float(dropped)}
+        heard = (samples, sample_blocks, verdicts, statuses)
+        dropped, missed = sum(one.dropped for one in heard), sum(one.missed for one in heard)
+        return service.figures() | {"dropped": float(dropped), "missed": float(missed)}
 
     def answer_report(request: Request) -> None:
         request.reply(service.report().encode())
+
+    def handle_status(message: Keyed) -> None:
+        service.handle_status(message[1])
 
     async with asyncio.TaskGroup() as group:
         group.create_task(_feed(samples, service.handle_sample, service), name="alarms.samples")
         group.create_task(_feed(sample_blocks, service.handle_sample_block, service), name="alarms.sample_blocks")
         group.create_task(_feed(verdicts, service.handle_verdict, service), name="alarms.verdicts")
-        group.create_task(_feed(statuses, service.handle_status, service), name="alarms.statuses")
+        group.create_task(_feed(statuses, handle_status, service), name="alarms.statuses")
         group.create_task(_feed(presences, service.handle_presence, service), name="alarms.presences")
         group.create_task(_feed(acts, service.handle_act, service), name="alarms.acts")
         group.create_task(_feed(reports, answer_report, service), name="alarms.reports")

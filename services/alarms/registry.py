@@ -110,6 +110,8 @@ class AlarmRegistry:
 
     def carry_on(self, station: str, time_ns: int, now_ns: int) -> None:
         """Let the time of a station pass for the conditions that wait for their delay."""
+        if not self._pending:
+            return
         for name in [name for name in self._pending if name[0] == station]:
             record = self.records[name]
             wanted = not record.delay.is_active
@@ -157,6 +159,10 @@ class AlarmRegistry:
         self.records[record.station, record.id] = record
         self._names.setdefault(record.station, set()).add(record.id)
         return record
+
+    def is_known(self, station: str, rule: RuleName) -> bool:
+        """Whether there ever was such an alarm of a station."""
+        return (station, rule) in self.records
 
     def is_wanted(self, station: str, rule: RuleName, pump: int | None = None) -> bool:
         """Whether the condition of an alarm counts as there; for deadbands."""

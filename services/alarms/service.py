@@ -18,10 +18,10 @@ from wetwell.protocols.messages.alarm import (
     AlarmState,
     Mode,
 )
-from wetwell.protocols.messages.decoding import M, SampleMessage, decoded, samples_of
+from wetwell.protocols.messages.decoding import M, decoded
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.sample import Sample
-from wetwell.protocols.messages.sample_block import SampleBlock
+from wetwell.protocols.messages.sample import LevelSample
+from wetwell.protocols.messages.sample_block import LevelBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
@@ -36,6 +36,8 @@ from wetwell.services.runtime.settings import AlarmSettings
 
 log = logging.getLogger(__name__)
 
+SOURCES = frozenset({"gateway", "simulator"})
+"""Services whose health figures say why samples do not come."""
 MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
 
@@ -63,6 +65,7 @@ class AlarmService:
         self._lost_s: float | None = None
         self._audit = Audit(settings.state_dir)
         self._file = StateFile(settings.state_dir)
+        self._no_limits = limits_of(settings, None)
         self._limits = {station.name: limits_of(settings, station) for station in stations}
         rules = {name: change.model_dump(exclude_none=True) for name, change in settings.rules.items()}
         self.registry = AlarmRegistry(changed_rules(rules))
@@ -74,18 +77,22 @@ class AlarmService:
 
     def handle_sample(self, payload: bytes) -> None:
         """Look at a sample."""
-        self._handle_samples(self._decoded(Sample, payload))
+        sample = self._decoded(LevelSample, payload)
+        if sample is not None:
+            self._handle_samples(sample.station, [sample])
 
     def handle_sample_block(self, payload: bytes) -> None:
         """Look at many samples of a station."""
-        self._handle_samples(self._decoded(SampleBlock, payload))
+        block = self._decoded(LevelBlock, payload)
+        if block is not None:
+            self._handle_samples(block.station, block.samples())
 
-    def _handle_samples(self, message: SampleMessage | None) -> None:
-        if message is None or (watch := self._named(message.station)) is None:
+    def _handle_samples(self, station: str, samples: Sequence[LevelSample]) -> None:
+        if (watch := self._named(station)) is None:
             return
-        limits = self._limits.get(message.station) or limits_of(self._settings, None)
-        for sample in samples_of(message):
-            is_new = watch.handle_sample(sample, self._now(), self.registry, limits)
+        now, limits = self._now(), self._limits.get(station) or self._no_limits
+        for sample in samples:
+            is_new = watch.handle_sample(sample, now, self.registry, limits)
             self._counts["samples" if is_new else "doubled"] += 1
 
     def handle_verdict(self, payload: bytes) -> None:
@@ -100,9 +107,9 @@ class AlarmService:
         self._counts["verdicts" if is_new else "doubled"] += 1
 
     def handle_status(self, payload: bytes) -> None:
-        """Look at the health figures of a gateway."""
+        """Look at the health figures of a source of samples."""
         status = self._decoded(Status, payload)
-        if status is not None and status.service == "gateway" and (watch := self._named(status.station)) is not None:
+        if status is not None and status.service in SOURCES and (watch := self._named(status.station)) is not None:
             watch.handle_status(status, self._now(), self.registry, self._settings.heartbeat_after_s)
 
     def handle_presence(self, presence: Presence) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import RuleName
-from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.sample import LevelSample
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
@@ -86,6 +86,8 @@ class StationWatch:
     seq: int = -1
     older: int = 0
     has_samples: bool = False
+    is_held: bool = False
+    """Whether it is a simulated plant that stands until it is let go: then no samples are missed."""
     verdicts: dict[int, PumpVerdicts] = field(default_factory=dict)
     gone_s: dict[str, float | None] = field(default_factory=dict)
 
@@ -95,7 +97,7 @@ class StationWatch:
             return now.wall_ns
         return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
 
-    def handle_sample(self, sample: Sample, now: Now, registry: AlarmRegistry, limits: Limits) -> bool:
+    def handle_sample(self, sample: LevelSample, now: Now, registry: AlarmRegistry, limits: Limits) -> bool:
         """Look at a sample; whether it was new."""
         if self.time_ns is not None and sample.time <= self.time_ns and sample.seq <= self.seq:
             self.older += 1
@@ -122,9 +124,12 @@ class StationWatch:
     ) -> None:
         if limit_m is None or self.time_ns is None:
             return
+        if level_m < limit_m - deadband_m and not registry.is_known(self.name, rule):
+            return  # almost every sample
         least_m = limit_m - deadband_m if registry.is_wanted(self.name, rule) else limit_m
-        text = f"{registry.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m"
-        registry.observe(self.name, rule, level_m >= least_m, self.time_ns, now.wall_ns, text=text)
+        is_there = level_m >= least_m
+        text = f"{registry.rules[rule].text}: {level_m:.2f} m, limit {limit_m:.2f} m" if is_there else ""
+        registry.observe(self.name, rule, is_there, self.time_ns, now.wall_ns, text=text)
 
     def handle_verdict(self, verdict: Verdict, now: Now, registry: AlarmRegistry) -> bool:
         """Look at a verdict; whether it was new.
@@ -173,7 +178,13 @@ class StationWatch:
         return SITE_SERVICES if self.name == SITE else STATION_SERVICES
 
     def handle_status(self, status: Status, now: Now, registry: AlarmRegistry, heartbeat_after_s: float) -> None:
-        """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs."""
+        """Look whether the gateway reaches the PLC ("waiting": it does not), and whether the PLC's program runs.
+
+        Of a simulated plant whether it is held.
+        """
+        if status.service == "simulator":
+            self.is_held = status.figures.get("held", 0.0) > 0.0
+            return
         time_ns, age_s = self.clock_ns(now), status.figures.get("heartbeat_age_s")
         registry.observe(self.name, "plc_lost", status.state == "waiting", time_ns, now.wall_ns)
         if age_s is not None and status.state == "running":
@@ -189,6 +200,8 @@ class StationWatch:
     def look(self, now: Now, registry: AlarmRegistry, stale_after_s: float, silent_after_s: float) -> None:
         """Look for what does not come any more."""
         time_ns = self.clock_ns(now)
+        if self.is_held:
+            self.missed_s = now.steady_s
         if self.has_samples:
             self.gone_s.setdefault("detector", now.steady_s)
             age_s = now.steady_s - self.missed_s

@@ -1,5 +1,6 @@
 """Services that run until they are stopped."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,6 +36,7 @@ from wetwell.services.commands.options import (
 
 if TYPE_CHECKING:
     from wetwell.services.runtime.settings import Settings
+    from wetwell.services.simulator.daemon import PlantStart
 
 app = typer.Typer()
 
@@ -57,6 +59,12 @@ def up(
         Path | None,
         typer.Option("--data", metavar="DIR", help="Where all is kept; default: gone at the end."),
     ] = None,
+    steady: Annotated[
+        bool,
+        typer.Option(
+            "--steady", help="Run at one speed: do not slow down at changes of state, or stand at the scenario's end."
+        ),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
     """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
@@ -68,37 +76,39 @@ def up(
     if settings.log == LogSettings():
         settings = settings.model_copy(update={"log": LogSettings(level="WARNING")})  # the verdicts are the news here
     limit_s = None if limit is None else parse_duration_s(limit)
+    is_shown = speed is None and not steady
     plant, speed = live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
-    from wetwell.services.reports.terminal import banner, line_printer
-    from wetwell.services.supervisor import serve_all
+    from wetwell.services.reports.terminal import banner
+    from wetwell.services.supervisor.runs import RunRecord, take_folder
+    from wetwell.services.supervisor.screens import JsonScreen, TerminalScreen
+    from wetwell.services.supervisor.serve import Screen, UpPlan, serve_all
 
-    live = [
-        "--station",
-        station,
-        "--scenario",
-        scenario,
-        "--seed",
-        str(seed),
-        "--speed",
-        str(speed),
-        "--modbus-server",
-    ]
+    is_shown = is_shown and speed > 1.0
+    begin_s, words = 0, ""
+    if data is not None:
+        taken = take_folder(data, RunRecord.of(plant, seed, is_life=speed == 1.0))
+        data, begin_s, words = taken.path, taken.begin_s, taken.words
+    live = ["--station", station, "--scenario", scenario, "--seed", str(seed), "--speed", str(speed)]
+    live += ["--modbus-server", "--held", "--begin", str(begin_s)]
     commands = {
         "historian": ["historian"],
         "dashboard": ["dashboard"],
         "detector": ["detector", "--station", station],
         "alarms": ["alarms", "--station", station],
-        "simulator": ["simulator", *live],
+        "simulator": ["simulator", *live, *(["--stand-at-end"] if is_shown else [])],
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
         settings = with_data(settings, data, Path(folder))
-        show = line_printer(plant.station.pump_labels, as_json=as_json)
+        text = banner(settings, plant.station, plant.scenario.name, speed) + (f"\nData in {words}\n" if words else "")
+        screen: Screen = JsonScreen(_say) if as_json else TerminalScreen(_say, text, plant.station.pump_labels)
+        story_s = plant.scenario.duration_s
+        plan = UpPlan(plant.station.name, commands, is_shown=is_shown, story_s=story_s, limit_s=limit_s)
+        run(settings, serve_all(settings, plan, screen))
 
-        def greet() -> None:
-            if not as_json:
-                typer.echo(banner(settings, plant.station, plant.scenario.name, speed))
 
-        run(settings, serve_all(settings, plant.station.name, commands, show, limit_s, greet))
+def _say(text: str, ends: bool) -> None:
+    typer.echo(text, nl=ends)
+    sys.stdout.flush()
 
 
 @app.command(cls=about("--station"), rich_help_panel=RUN)
@@ -110,12 +120,21 @@ def simulator(
     modbus_server: Annotated[
         bool, typer.Option("--modbus-server", help="Also serve the same plant on Modbus TCP.")
     ] = False,
+    held: Annotated[bool, typer.Option("--held", help="Let the plant stand until an order lets it go.")] = False,
+    begin: Annotated[
+        int, typer.Option(min=0, metavar="SECONDS", help="So many seconds were told before: begin behind them.")
+    ] = 0,
+    stand_at_end: Annotated[
+        bool, typer.Option("--stand-at-end", help="Let the plant stand where its scenario ends.")
+    ] = False,
     zenoh: ZenohOption = None,
     modbus: ModbusOption = None,
     word_order: WordOrderOption = None,
     config: ConfigOption = None,
 ) -> None:
     """Simulate a station live and publish its samples on Zenoh."""
+    from wetwell.services.simulator.daemon import PlantStart
+
     _serve_plant(
         settings_of(config, zenoh, modbus, word_order),
         station,
@@ -124,6 +143,7 @@ def simulator(
         speed,
         zenoh=True,
         modbus=modbus_server,
+        start=PlantStart(begin, is_held=held, stands_at_end=stand_at_end),
     )
 
 
@@ -234,9 +254,17 @@ def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
 
 
 def _serve_plant(
-    settings: "Settings", station: str, scenario: str, seed: int, speed: float | None, *, zenoh: bool, modbus: bool
+    settings: "Settings",
+    station: str,
+    scenario: str,
+    seed: int,
+    speed: float | None,
+    *,
+    zenoh: bool,
+    modbus: bool,
+    start: "PlantStart | None" = None,
 ) -> None:
     plant, speed = live_plant(station, scenario, seed, speed)
-    from wetwell.services.simulator.daemon import serve_simulator
+    from wetwell.services.simulator.daemon import PlantStart, serve_simulator
 
-    run(settings, serve_simulator(settings, plant, speed, zenoh=zenoh, modbus=modbus))
+    run(settings, serve_simulator(settings, plant, speed, start or PlantStart(), zenoh=zenoh, modbus=modbus))

@@ -15,7 +15,7 @@ from starlette.routing import Route
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.services.dashboard.assets import Asset, Assets
-from wetwell.services.dashboard.client import RefusalError, act_on_alarm, history, recording_pieces
+from wetwell.services.dashboard.client import RefusalError, act_on_alarm, history, recording_pieces, set_plant_clock
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.login import Login, holder_in
@@ -63,6 +63,7 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
             Route("/api/stations/{station}/history", answers.history),
             Route("/api/stations/{station}/recording.csv", answers.recording),
             Route("/api/stations/{station}/alarm-act", answers.act, methods=["POST"]),
+            Route("/api/stations/{station}/plant-clock", answers.plant_clock, methods=["POST"]),
             Route("/api/who", login.who),
             Route("/api/login", login.enter, methods=["POST"]),
             Route("/api/alarms", answers.alarms),
@@ -126,6 +127,10 @@ class _Answers:
         by = None if holder is None else holder.name
         answer = await act_on_alarm(self._state.asked(), request.path_params["station"], await request.body(), by)
         return JSONResponse(answer)
+
+    async def plant_clock(self, request: Request) -> Response:
+        clock = await set_plant_clock(self._state.asked(), request.path_params["station"], await request.body())
+        return JSONResponse(clock)
 
     async def history(self, request: Request) -> Response:
         answer = await history(self._state.asked(), request.path_params["station"], request.query_params)

@@ -7,11 +7,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from wetwell.protocols.bus.interface import Bus
-from wetwell.protocols.bus.keys import alarm_act_key, history_key
+from wetwell.protocols.bus.keys import alarm_act_key, history_key, plant_clock_key
 from wetwell.protocols.errors import WetwellError, first_fault
 from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
 from wetwell.protocols.messages.message import MessageError, Number
+from wetwell.protocols.messages.plant_clock import PlantClock, PlantClockOrder
 from wetwell.protocols.messages.readings import row_values
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import columns_of
@@ -55,6 +56,29 @@ async def act_on_alarm(bus: Bus, station: str, body: bytes, by: str | None = Non
             raise RefusalError(502, str(error)) from error
         return answer
     raise RefusalError(504, "the alarm service does not answer")
+
+
+async def set_plant_clock(bus: Bus, station: str, body: bytes) -> dict[str, Any]:
+    """How the clock of a simulated plant stands after an order: a `PlantClockOrder` in JSON.
+
+    Raises
+    ------
+    RefusalError
+        If the body is no order, or nobody answers.
+    """
+    try:
+        order = PlantClockOrder.model_validate_json(body)
+    except ValidationError as error:
+        raise RefusalError(400, first_fault(error)) from error
+    for payload in await bus.ask(plant_clock_key(station), order.encode(), timeout_s=ANSWER_S):
+        try:
+            clock = PlantClock.decode(payload)
+        except MessageError as error:
+            raise RefusalError(502, str(error)) from error
+        if clock.error:
+            raise RefusalError(400, clock.error)
+        return clock.model_dump(mode="json")
+    raise RefusalError(504, f"station '{station}' has no simulated plant")
 
 
 async def history(bus: Bus, station: str, query: Mapping[str, str], **more: Any) -> History:

@@ -26,6 +26,8 @@ FRAME_S = 0.25
 FRAMES_A_SECOND = 4
 SHOWN_VERDICTS = 60
 FIRST_S = 2.0
+SAMPLES = 20_000
+"""Messages that wait to be shown; the newest count, and others are told as lost on the way to the page."""
 
 T = TypeVar("T")
 
@@ -45,9 +47,9 @@ class Feed:
         self._streams = streams
         self._bus = bus
         self._backfill = ChartBackfill(bus, view, streams)
+        keys = [sample_key("*"), sample_block_key("*")]
+        self._samples = bus.collect(keys, capacity=SAMPLES, recover=False)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
-            (bus.subscribe(sample_key("*"), capacity=100_000, recover=False), view.handle_sample),
-            (bus.subscribe(sample_block_key("*"), capacity=100_000, recover=False), view.handle_sample_block),
             (bus.subscribe(verdict_key("*"), history=SHOWN_VERDICTS), view.handle_verdict),
             (bus.subscribe(model_key("*"), history=1), view.handle_model),
             (bus.subscribe(alarm_key("*"), history=1), view.handle_alarm),
@@ -67,8 +69,23 @@ class Feed:
         async with asyncio.TaskGroup() as group:
             for subscription, handle in self._messages:
                 group.create_task(_each(subscription, handle))
+            group.create_task(self._show_samples())
             group.create_task(_each(self._presence, self._view.handle_presence))
             group.create_task(self._send(group))
+
+    async def _show_samples(self) -> None:
+        """Give each station what has come of it since the last time: so only what is drawn has to be decoded."""
+        while True:
+            batches: dict[str, list[bytes]] = {}
+            for key, payload in await self._samples.receive():
+                batches.setdefault(key, []).append(payload)
+            for key, payloads in batches.items():
+                if key.endswith("/sample"):
+                    self._view.handle_samples(payloads)
+                else:
+                    for payload in payloads:
+                        self._view.handle_sample_block(payload)
+            await asyncio.sleep(FRAME_S / 2.0)
 
     async def _send(self, group: asyncio.TaskGroup) -> None:
         number = 0
@@ -90,7 +107,8 @@ class Feed:
             "stations": float(len(self._view.stations)),
             "clients": float(self._streams.clients),
             "malformed": float(self._view.counts["malformed"]),
-            "dropped": float(sum(subscription.dropped for subscription, _ in self._messages)),
+            "dropped": float(self._samples.dropped + sum(heard.dropped for heard, _ in self._messages)),
+            "missed": float(self._samples.missed + sum(heard.missed for heard, _ in self._messages)),
         }
 
 

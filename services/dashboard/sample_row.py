@@ -1,6 +1,7 @@
 """A sample as a line of JSON that is short: what charts and overview are made of."""
 
 import math
+from collections.abc import Sequence
 
 from wetwell.protocols.messages.history import History
 from wetwell.protocols.messages.message import Number
@@ -72,6 +73,17 @@ def is_running(sample: Sample, pump: int) -> bool:
 
 def thinned(samples: list[Sample], most: int) -> list[Sample]:
     """At most so many of the samples, evenly spaced, with the last one."""
-    if len(samples) <= most:
-        return samples
-    return [samples[-1 - (place * len(samples)) // most] for place in range(most)][::-1]
+    return [samples[place] for place in spaced(len(samples), most)]
+
+
+def spaced(count: int, most: int) -> Sequence[int]:
+    """At most so many of the places from 0 on, evenly spaced, with the last one.
+
+    Examples
+    --------
+    >>> list(spaced(3, 8)), spaced(10, 3), list(spaced(0, 3))
+    ([0, 1, 2], [3, 6, 9], [])
+    """
+    if count <= most:
+        return range(count)
+    return [count - 1 - place * count // most for place in range(most)][::-1]

@@ -3,6 +3,7 @@
 import json
 import logging
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from wetwell.protocols.bus.interface import Presence
@@ -14,12 +15,15 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.services.dashboard.station_view import StationView
+from wetwell.services.dashboard.sample_row import spaced
+from wetwell.services.dashboard.station_view import ROWS_A_FRAME, StationView
 
 log = logging.getLogger(__name__)
 
 ROWS = ((100, 1200), (1000, 200))
 FEWEST_ROWS = 60
+MOST_STATIONS = 10_000
+"""Further names on the bus are passed over: somebody makes them up."""
 """Samples of each station that are kept for charts: with up to so many stations, and beyond."""
 
 
@@ -50,6 +54,15 @@ class SiteView:
         if sample is not None:
             self._handle_samples(sample.station, [sample])
 
+    def handle_samples(self, payloads: Sequence[bytes]) -> None:
+        """Take samples of one station, oldest first; of many those that are drawn, evenly spaced, with the last."""
+        before = -1
+        for place in spaced(len(payloads), ROWS_A_FRAME):
+            sample = self._decoded(Sample, payloads[place])
+            if sample is not None:
+                self._handle_samples(sample.station, [sample], place - before - 1)
+                before = place
+
     def handle_sample_block(self, payload: bytes) -> None:
         """Take many samples of a station; the block that came last is left out."""
         block = self._decoded(SampleBlock, payload)
@@ -59,9 +72,9 @@ class SiteView:
         if not self._station(block.station).is_last(samples[-1]):
             self._handle_samples(block.station, samples)
 
-    def _handle_samples(self, name: str, samples: list[Sample]) -> None:
+    def _handle_samples(self, name: str, samples: list[Sample], passed_over: int = 0) -> None:
         station = self._station(name)
-        new = [sample for sample in samples if station.handle_sample(sample, self._now_s)]
+        new = [sample for sample in samples if station.handle_sample(sample, self._now_s, passed_over)]
         if new:
             self._with_news[name] = self._with_live[name] = station
 
@@ -97,6 +110,8 @@ class SiteView:
     def handle_presence(self, presence: Presence) -> None:
         """Take that a service has come or gone."""
         _, station, _, service = presence.key.split("/")
+        if not self._is_named(station):
+            return
         self._service(station, service)["is_alive"] = presence.is_alive
         if station != SITE:
             self._news(station).handle_presence(service, is_alive=presence.is_alive)
@@ -146,7 +161,14 @@ class SiteView:
         return f'{{"id":{self.frame_id},"live":[{",".join(live)}],"stations":{json.dumps(summaries)}}}'
 
     def _decoded(self, kind: type[M], payload: bytes) -> M | None:
-        return decoded(kind, payload, self.counts, log)
+        message = decoded(kind, payload, self.counts, log)
+        if message is None or self._is_named(getattr(message, "station", SITE)):
+            return message
+        self.counts["foreign"] += 1
+        return None
+
+    def _is_named(self, station: str) -> bool:
+        return station == SITE or station in self.stations or len(self.stations) < MOST_STATIONS
 
     def _news(self, name: str) -> StationView:
         station = self._station(name)

@@ -50,6 +50,7 @@ class StationView:
         self.first_ns = 0
         self.seen_s = 0.0
         self.is_stale = True
+        self.is_held = False
         self.lost = 0
         self._rows: deque[str] = deque(maxlen=rows)
         self._late = 0
@@ -80,8 +81,8 @@ class StationView:
         """Whether this is the last sample once more."""
         return self.sample is not None and (sample.time, sample.seq) == (self.sample.time, self.sample.seq)
 
-    def handle_sample(self, sample: Sample, now_s: float) -> bool:
-        """Take a sample that is not older than the last; whether it was one."""
+    def handle_sample(self, sample: Sample, now_s: float, passed_over: int = 0) -> bool:
+        """Take a sample that is not older than the last; whether it was one. Before it others were passed over."""
         self.seen_s = now_s
         if self.sample is not None and sample.time <= self.sample.time:
             self._late += 1
@@ -93,8 +94,8 @@ class StationView:
             self.first_ns = sample.time
         elif self.sample is None:
             self.first_ns = sample.time
-        elif sample.seq > self.sample.seq + 1:
-            self.lost += sample.seq - self.sample.seq - 1
+        else:
+            self.lost += max(0, sample.seq - self.sample.seq - 1 - passed_over)
         self._late = 0
         self.sample = sample
         self._fresh_samples.append(sample)
@@ -136,7 +137,9 @@ class StationView:
         self._fresh.setdefault("alarms", {})[alarm.id] = alarm.encode().decode()
 
     def handle_status(self, status: Status) -> None:
-        """Take the health figures of a service."""
+        """Take the health figures of a service; those of a simulator say whether its plant is held."""
+        if status.service == "simulator":
+            self.is_held = status.figures.get("held", 0.0) > 0.0
         self._statuses[status.service] = status.encode().decode()
         self._fresh.setdefault("statuses", {})[status.service] = self._statuses[status.service]
 
@@ -147,6 +150,8 @@ class StationView:
 
     def settle(self, now_s: float, stale_s: float) -> bool:
         """Notice that samples have stopped or come again; whether either has happened."""
+        if self.is_held:
+            self.seen_s = now_s  # nothing is missed of a plant that stands
         is_stale = self.sample is None or now_s - self.seen_s > stale_s
         if is_stale == self.is_stale:
             return False

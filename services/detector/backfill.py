@@ -1,5 +1,6 @@
 """Samples that a detector has missed while it was away, as far as the historian has them."""
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from typing import get_args
@@ -17,6 +18,9 @@ log = logging.getLogger(__name__)
 
 PAGE = 3_600
 ANSWER_S = 10.0
+ASK_AGAIN_S = 0.5
+PATIENCE_S = 30.0
+"""So long a historian that does not answer is asked again: where a machine has started anew, it starts too. [s]"""
 
 
 async def missed_samples(bus: Bus, station: str, since_ns: int, until_ns: int) -> AsyncIterator[list[Sample]]:
@@ -50,15 +54,21 @@ def samples_of(page: History) -> list[Sample]:
 
 
 async def _answer(bus: Bus, station: str, query: HistoryQuery) -> History | None:
-    """First good answer; None with a line in the log if there is none."""
-    for payload in await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S):
-        try:
-            history = History.decode(payload)
-        except MessageError as error:
-            log.warning("station '%s': %s", station, error)
-            continue
-        if not history.error:
-            return history
-        log.warning("station '%s': the historian says: %s", station, history.error)
-    log.info("station '%s': no historian has answered; what the bus keeps must do", station)
-    return None
+    """First good answer, within `PATIENCE_S`; None with a line in the log if there is none."""
+    clock = asyncio.get_running_loop().time
+    end_s = clock() + PATIENCE_S
+    while True:
+        payloads = await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S)
+        for payload in payloads:
+            try:
+                history = History.decode(payload)
+            except MessageError as error:
+                log.warning("station '%s': %s", station, error)
+                continue
+            if not history.error:
+                return history
+            log.warning("station '%s': the historian says: %s", station, history.error)
+        if payloads or clock() > end_s:
+            log.info("station '%s': no historian has told; what the bus keeps must do", station)
+            return None
+        await asyncio.sleep(ASK_AGAIN_S)

@@ -13,6 +13,7 @@ from wetwell.protocols.messages.status import Status
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint
 from wetwell.services.detector.intake import Intake
+from wetwell.services.detector.kernels import load_kernels
 from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.clock import now_ns
@@ -29,6 +30,7 @@ async def serve_detector(settings: Settings, stations: Sequence[Station]) -> Non
 
 
 async def _run(settings: Settings, stations: Sequence[Station]) -> None:
+    await asyncio.to_thread(load_kernels)  # before it shows that it is there: samples come then
     with await connect(settings) as bus:
         await judge_all(settings, bus, stations, "detector")
 

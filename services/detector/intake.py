@@ -5,7 +5,7 @@ import contextlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
-from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.interface import ALL_KEPT, Bus
 from wetwell.protocols.bus.keys import order_key, sample_block_key, sample_key
 from wetwell.protocols.messages.decoding import SampleMessage, samples_of
 from wetwell.protocols.messages.history import LONGEST_NS
@@ -15,11 +15,10 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.detector.backfill import missed_samples
 from wetwell.services.detector.station_detector import StationDetector
 
-SAMPLE_HISTORY = 600
-CAPACITY = 1_000_000
-"""Messages that wait to be judged: after a start a thousand publishers send what they keep."""
-BEHIND = 10_000
-"""Messages of one station that wait while it catches up."""
+CAPACITY = 200_000
+"""Messages that wait to be judged; what publishers keep comes when there is room."""
+BEHIND_BYTES = 512 * 1024 * 1024
+"""Messages that wait while their stations catch up: what a thousand publishers keep."""
 KEPT_S = 2.0
 """Time in which what publishers keep comes, even if some of it is lost on the way once."""
 BACKFILLS_AT_ONCE = 8
@@ -28,19 +27,41 @@ SAMPLES_AT_ONCE = 500
 """Samples that are judged before the other tasks have their turn."""
 
 
-class Waiting:
-    """Messages of a station that wait while it catches up, as they came, for they are smaller so."""
+class Room:
+    """Bytes that all stations that catch up may hold together."""
 
-    def __init__(self) -> None:
+    def __init__(self, most_bytes: int = BEHIND_BYTES) -> None:
+        self.free_bytes = most_bytes
+
+
+class Waiting:
+    """Messages of a station that wait while it catches up, as they came, for they are smaller so.
+
+    Parameters
+    ----------
+    room : Room
+        What it shares with the others.
+    """
+
+    def __init__(self, room: Room) -> None:
         self.messages: deque[tuple[bytes, type[SampleMessage]]] = deque()
         self.dropped = 0
+        self._room = room
 
     def extend(self, payloads: Sequence[bytes], kind: type[SampleMessage]) -> None:
-        """Add messages; beyond `BEHIND` the oldest go."""
-        self.messages.extend((payload, kind) for payload in payloads)
-        while len(self.messages) > BEHIND:
-            self.messages.popleft()
+        """Add messages; where there is no room the oldest of this station go."""
+        for payload in payloads:
+            self.messages.append((payload, kind))
+            self._room.free_bytes -= len(payload)
+        while self._room.free_bytes < 0 and len(self.messages) > 1:
+            self.pop()
             self.dropped += 1
+
+    def pop(self) -> tuple[bytes, type[SampleMessage]]:
+        """Take the oldest message."""
+        payload, kind = self.messages.popleft()
+        self._room.free_bytes += len(payload)
+        return payload, kind
 
     def samples(self) -> Iterator[Sample]:
         """The samples in them, which go on waiting."""
@@ -66,9 +87,10 @@ class Intake:
             for key, kind in ((sample_key, Sample), (sample_block_key, SampleBlock))
         }
         self._obeying = {order_key(judge.station): judge for judge in judges}
-        self._behind = {judge: Waiting() for judge in judges if judge.is_restored}
+        room = Room()
+        self._behind = {judge: Waiting(room) for judge in judges if judge.is_restored}
         self._passed_over = 0
-        self._samples = bus.collect(list(self._judges), history=SAMPLE_HISTORY, capacity=CAPACITY)
+        self._samples = bus.collect(list(self._judges), history=ALL_KEPT, capacity=CAPACITY)
         self._orders = bus.collect(list(self._obeying))
 
     @property
@@ -116,12 +138,14 @@ class Intake:
         last = judge.detector.last_heard
         await asyncio.sleep(KEPT_S)
         async with turn:
-            until_ns = min(next((sample.time for sample in waiting.samples()), LONGEST_NS), LONGEST_NS)
-            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
-                if _place(last, waiting.samples()):
-                    break
-                await judge.judge_in_turns(samples)
-                last = samples[-1].time, samples[-1].seq
+            first = next(waiting.samples(), None)
+            until_ns = LONGEST_NS if first is None else min(first.time, LONGEST_NS)
+            if first is None or not _follows(first, last):
+                async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
+                    if _place(last, waiting.samples()):
+                        break
+                    await judge.judge_in_turns(samples)
+                    last = samples[-1].time, samples[-1].seq
             await _drain(judge, waiting, _place(last, waiting.samples()))
             self._passed_over += self._behind.pop(judge).dropped
 
@@ -130,7 +154,7 @@ async def _drain(judge: StationDetector, waiting: Waiting, place: int) -> None:
     """Judge what waits from a place on, and what comes meanwhile, until nothing waits."""
     judged = 0
     while waiting.messages:
-        message = judge.decoded(*waiting.messages.popleft())
+        message = judge.decoded(*waiting.pop())
         samples = [] if message is None else samples_of(message)
         judge.judge(samples[place:])
         place = max(place - len(samples), 0)
@@ -138,6 +162,11 @@ async def _drain(judge: StationDetector, waiting: Waiting, place: int) -> None:
         if judged >= SAMPLES_AT_ONCE and waiting.messages:
             judged = 0
             await asyncio.sleep(0)
+
+
+def _follows(first: Sample, last: tuple[int, int]) -> bool:
+    """Whether nothing lies between the last sample that was heard and the first that waits."""
+    return first.time > last[0] and first.seq == last[1] + 1
 
 
 def _place(last: tuple[int, int], samples: Iterable[Sample]) -> int:

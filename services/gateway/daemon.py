@@ -35,7 +35,7 @@ async def poll_all(
     bus: Bus, plcs: Sequence[Plc], health_s: float, longest_wait_s: float, gather_s: float = 0.0
 ) -> None:
     """Poll PLCs for ever, one task each; they begin spread over a second, so that not all are asked at once."""
-    senders = [SampleSender(bus, plc.station, gather_s) for plc in plcs]
+    senders = [SampleSender(bus, plc.station, gather_s, 1.0 / plc.device.period_s) for plc in plcs]
     pollers = [PlcPoller(plc, sender.put, longest_wait_s) for plc, sender in zip(plcs, senders, strict=True)]
     with contextlib.ExitStack() as stack:
         for sender in senders:

@@ -29,7 +29,9 @@ def answer(store: Store, station: str, payload: bytes) -> History:
 def _answer(store: Store, station: str, query: HistoryQuery) -> History:
     spans = {span.station: span for span in store.stations()}
     if query.kind == "stations":
-        return History(station=SITE, kind="stations", messages=tuple(map(_of_station, spans.values())))
+        return History(
+            station=SITE, kind="stations", messages=tuple(_of_station(store, span) for span in spans.values())
+        )
     if station not in spans:
         return History(station=station, kind=query.kind, error=f"station '{station}' is not known")
     if query.kind in ("verdicts", "alarms"):
@@ -43,12 +45,13 @@ def _answer(store: Store, station: str, query: HistoryQuery) -> History:
     return of_kind(store, station, start_ns, end_ns, query.points)
 
 
-def _of_station(span: StationSpan) -> dict[str, str | None]:
+def _of_station(store: Store, span: StationSpan) -> dict[str, str | None]:
     has_samples = span.last_ns >= span.first_ns
+    newest_ns = store.newest_ns(span.station)
     return {
         "station": span.station,
         "first": to_iso(span.first_ns) if has_samples else None,
-        "last": to_iso(span.last_ns) if has_samples else None,
+        "last": to_iso(span.last_ns if newest_ns is None else newest_ns) if has_samples else None,
     }
 
 

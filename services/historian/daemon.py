@@ -3,7 +3,7 @@
 import asyncio
 import logging
 
-from wetwell.protocols.bus.interface import Bus, Request, Subscription
+from wetwell.protocols.bus.interface import ALL_KEPT, Bus, Request, Subscription
 from wetwell.protocols.bus.keys import ROOT, SITE, alarm_key, history_key, sample_block_key, sample_key, verdict_key
 from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
@@ -14,11 +14,10 @@ from wetwell.services.runtime.settings import Settings
 
 log = logging.getLogger(__name__)
 
-SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
-CAPACITY = 1_000_000
-"""Most messages of one kind that wait to be taken: after a start a thousand publishers send what they hold."""
+CAPACITY = 200_000
+"""Most messages of one kind that wait to be taken; what publishers hold comes when there is room."""
 
 PAYLOADS_AT_ONCE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
@@ -54,8 +53,8 @@ def _finish(historian: Historian) -> None:
 async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: float, health_s: float) -> None:
     """Take, commit, maintain, answer and report for ever."""
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
-        "samples": bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
-        "blocks": bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=CAPACITY),
+        "samples": bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY),
+        "blocks": bus.subscribe(sample_block_key("*"), history=ALL_KEPT, capacity=CAPACITY),
         "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
         "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
     }
@@ -63,7 +62,8 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
 
     def figures() -> dict[str, float]:
         dropped = sum(subscription.dropped for subscription in subscriptions.values())
-        return historian.figures(now_ns()) | {"dropped": float(dropped)}
+        missed = sum(subscription.missed for subscription in subscriptions.values())
+        return historian.figures(now_ns()) | {"dropped": float(dropped), "missed": float(missed)}
 
     async with asyncio.TaskGroup() as group:
         for kind, subscription in subscriptions.items():

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections.abc import Sequence
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.recordings.recording import Recording
@@ -25,15 +26,23 @@ async def serve_replay(settings: Settings, recording: Recording, station: str, s
 
 async def _run(settings: Settings, recording: Recording, station: str, speed: float) -> None:
     with await connect(settings) as bus:
-        sender = SampleSender(bus, station, settings.zenoh.gather_s)
+        due_s = _schedule_s(recording)
+        rate_hz = speed * len(due_s) / max(due_s[-1], 1.0) if due_s else speed
+        sender = SampleSender(bus, station, settings.zenoh.gather_s, rate_hz)
         try:
-            await _publish(settings, bus, sender, recording, station, speed)
+            await _publish(settings, bus, sender, recording, station, speed, due_s)
         finally:
             sender.flush()
 
 
 async def _publish(
-    settings: Settings, bus: Bus, sender: SampleSender, recording: Recording, station: str, speed: float
+    settings: Settings,
+    bus: Bus,
+    sender: SampleSender,
+    recording: Recording,
+    station: str,
+    speed: float,
+    due_s: Sequence[float],
 ) -> None:
     published = 0
     health = asyncio.create_task(
@@ -43,7 +52,6 @@ async def _publish(
         name="replay.health",
     )
     log.info("station '%s': %d rows at speed %g", station, len(recording), speed)
-    due_s = _schedule_s(recording)
     samples = recording.samples(station)
     never = asyncio.Event()
     async for elapsed_s in ticks(tick_period_s(speed), never):

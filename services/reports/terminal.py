@@ -1,11 +1,12 @@
-"""What `wetwell up` prints: where to look, then each change of state."""
+"""What `wetwell up` prints: where to look, each change of state, what was seen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
+from wetwell.protocols.messages.plant_clock import PlantClock
 from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.protocols.station.station_file import Station
-from wetwell.protocols.timestamps import to_iso
+from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.services.runtime.settings import Settings
 
 WORDS: dict[State, str] = {
@@ -42,33 +43,65 @@ Zenoh        {settings.zenoh.endpoint}
   config.insert_json5("connect/endpoints", '["{settings.zenoh.endpoint}"]')
   with zenoh.open(config) as bus, bus.declare_subscriber("wetwell/{station.name}/**") as messages:
       for message in messages: print(message.key_expr, message.payload.to_string())
-
-Ctrl-C stops. Verdicts, in the station's time:
 """
 
 
-def line_printer(names: Sequence[str], *, as_json: bool) -> Callable[[Verdict], None]:
-    """Printer of verdicts: every one as JSON, or a line for people where a state changes or learning goes on.
+def begin_line(*, has_keys: bool) -> str:
+    """What stands before the first verdict."""
+    keys = "space holds the plant, + and - change its speed, q ends; so does Ctrl-C" if has_keys else "Ctrl-C stops"
+    return f"All parts are ready, the plant begins. {keys}. Verdicts, in the station's time:\n"
+
+
+def clock_line(clock: PlantClock) -> str:
+    """How the clock of the plant stands.
+
+    Examples
+    --------
+    >>> clock_line(PlantClock(station="alpha", seconds=30_000, speed=60, full_speed=600, is_held=False))
+    '-- 60 times as fast as life'
+    >>> clock_line(PlantClock(station="alpha", seconds=30_000, speed=60, full_speed=600, is_held=True))
+    '-- the plant stands after 8.3 h of its time; space lets it go on'
+    """
+    if clock.is_held:
+        return f"-- the plant stands after {clock.seconds / 3600.0:.1f} h of its time; space lets it go on"
+    return f"-- {clock.speed:g} times as fast as life"
+
+
+class StateLines:
+    """Lines for people on the verdicts of a station: one where a state changes, or where learning goes on.
 
     Parameters
     ----------
     names : sequence of str
         What people call the pumps.
-    as_json : bool
     """
-    told: dict[int, tuple[State, str]] = {}
 
-    def show(verdict: Verdict) -> None:
-        if as_json:
-            print(verdict.encode().decode(), flush=True)  # noqa: T201 - this is what the command prints
-            return
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = names
+        self._told: dict[int, tuple[State, str]] = {}
+
+    def line(self, verdict: Verdict) -> str | None:
+        """Line on a verdict; None where it says nothing new."""
         reason = str(verdict.evidence.get("reason", ""))
         news = (verdict.state, reason.split(".", 1)[0] if verdict.state == "learning" else "")
-        if told.get(verdict.pump) != news:
-            print(verdict_line(verdict, names), flush=True)  # noqa: T201 - this is what the command prints
-        told[verdict.pump] = news
+        is_news = self._told.get(verdict.pump) != news
+        self._told[verdict.pump] = news
+        return verdict_line(verdict, self._names) if is_news else None
 
-    return show
+
+def story_lines(changes: Sequence[Verdict], hours: float, names: Sequence[str]) -> str:
+    """What a run has shown: each change of state, and of faults when they began and what to do."""
+    lines = [f"What was seen in {hours:.1f} h of the station's time:"]
+    for verdict in changes:
+        if verdict.state == "learning":
+            continue
+        lines.append(f"  {verdict_line(verdict, names)}")
+        said = [] if verdict.onset is None else [f"began about {to_iso(verdict.onset // NS_PER_S * NS_PER_S)}"]
+        advice = verdict.evidence.get("advice")
+        said += [str(advice)] if advice and verdict.state != "normal" else []
+        if said:
+            lines.append(f"    {'; '.join(said)}")
+    return "\n".join(lines)
 
 
 def verdict_line(verdict: Verdict, names: Sequence[str] = ()) -> str:

@@ -1,11 +1,8 @@
-"""The wall clock, and which seconds of a station are due on it."""
+"""The wall clock, and how often a station that runs on it is looked at."""
 
 import time
 
 from wetwell.protocols.timestamps import NS_PER_S
-
-MAX_CATCH_UP_S = 3600
-"""Most seconds of a station that one tick brings; what is due beyond them comes with the next ticks."""
 
 
 def now_ns() -> int:
@@ -27,14 +24,3 @@ def tick_period_s(speed: float) -> float:
     (1.0, 0.2, 0.05)
     """
     return min(1.0, max(0.05, 1.0 / speed))
-
-
-def due_seconds(elapsed_s: float, speed: float, done: int) -> int:
-    """Seconds of the station that are due: the first one at once, then one each 1/speed.
-
-    Examples
-    --------
-    >>> due_seconds(0.0, 1.0, 0), due_seconds(2.0, 1.0, 1), due_seconds(0.05, 600.0, 1)
-    (1, 2, 30)
-    """
-    return min(int(elapsed_s * speed + 1e-6) + 1 - done, MAX_CATCH_UP_S)

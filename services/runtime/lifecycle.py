@@ -100,15 +100,32 @@ async def report_health(
     figures: Callable[[], dict[str, float]],
     condition: Callable[[], tuple[ServiceState, str]] = _running,
     lead_s: float = 0.0,
+    news: asyncio.Event | None = None,
 ) -> None:
-    """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`."""
+    """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`.
+
+    That is once a period, and at once where `news` is set.
+    """
     bus.announce(alive_key(station, service))
     publisher = bus.publisher(status_key(station, service))
     never = asyncio.Event()
-    async for _ in ticks(period_s, never, lead_s):
+
+    def tell() -> None:
         state, reason = condition()
         status = Status(
             time=now_ns(), station=station, service=service, state=state, figures=figures(), reason=reason
         )
         BOARD.report(station, service, period_s, status.figures)
         publisher.put(status.encode())
+
+    async with asyncio.TaskGroup() as group:
+        if news is not None:
+            group.create_task(_at_news(news, tell), name=f"{service}.news")
+        async for _ in ticks(period_s, never, lead_s):
+            tell()
+
+
+async def _at_news(news: asyncio.Event, tell: Callable[[], None]) -> None:
+    while await news.wait():
+        news.clear()
+        tell()

@@ -1,14 +1,17 @@
 """Samples of one station onto the bus: each by itself, or gathered into messages of many."""
 
 import asyncio
+import math
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import sample_block_key, sample_key
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
 
-HISTORY = 600
+LEAST_KEPT = 600
 """Samples that the bus keeps for late joiners: ten minutes at one a second."""
+LEAST_KEPT_S = 120.0
+"""Time on the wall for which it keeps them at least, however fast the station runs: a process is back by then. [s]"""
 
 
 class SampleSender:
@@ -20,18 +23,20 @@ class SampleSender:
     station : str
     gather_s : float
         So long samples are gathered into one message; with 0 each is sent at once, by itself. [s]
+    rate_hz : float
+        Samples a second on the wall, at most: by it the bus keeps as many as it takes. [Hz]
 
     Notes
     -----
     To be used within one event loop. What is gathered is lost if the process is killed; call `flush` before it ends.
     """
 
-    def __init__(self, bus: Bus, station: str, gather_s: float) -> None:
+    def __init__(self, bus: Bus, station: str, gather_s: float, rate_hz: float = 1.0) -> None:
         self._gather_s = gather_s
         self._gathered: list[Sample] = []
         self._timer: asyncio.TimerHandle | None = None
         key = sample_block_key(station) if gather_s else sample_key(station)
-        self._publisher = bus.publisher(key, history=HISTORY)
+        self._publisher = bus.publisher(key, history=max(LEAST_KEPT, math.ceil(LEAST_KEPT_S * rate_hz)))
 
     def put(self, sample: Sample) -> None:
         """Send a sample, or gather it."""

@@ -23,8 +23,9 @@ from wetwell.protocols.bus.keys import sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.services.detector.intake import SAMPLE_HISTORY, Intake
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
+from wetwell.services.runtime.sample_sender import LEAST_KEPT
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -35,7 +36,7 @@ PART = 300
 """Samples between two looks; fewer than publishers keep."""
 PARTS = 12
 
-assert PART < SAMPLE_HISTORY
+assert PART < LEAST_KEPT
 
 
 class Cable:
@@ -161,7 +162,7 @@ async def through_accidents(stations, samples: dict[str, list[Sample]]) -> tuple
         }
         bus: ZenohBus = stack.enter_context(await connect_client(f"tcp/{root.address}"))
         verdicts = bus.subscribe(verdict_key("*"), history=100, capacity=100_000)
-        publishers = {name: bus.publisher(sample_key(name), history=SAMPLE_HISTORY) for name in samples}
+        publishers = {name: bus.publisher(sample_key(name), history=LEAST_KEPT) for name in samples}
         places = dict(zip(samples, (left, right, right), strict=True))
         judges = [await stack.enter_async_context(judged(places[name].address, stations[name])) for name in samples]
         sent = 0

@@ -110,7 +110,14 @@ class MemoryBus:
             self._begin(key, history, lambda _, payload: mailbox.put(payload))
         return mailbox
 
-    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
+    def collect(
+        self,
+        keys: Sequence[str],
+        *,
+        history: int = 0,
+        capacity: int = 10_000,
+        recover: bool = True,  # noqa: ARG002 - nothing is lost here
+    ) -> Mailbox[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity)
         with self._lock:

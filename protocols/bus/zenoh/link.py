@@ -6,8 +6,8 @@ import contextlib
 import logging
 import random
 import threading
-from collections.abc import Sequence
-from typing import Self
+from collections.abc import Callable, Sequence
+from typing import Any, Self
 
 import zenoh
 
@@ -45,11 +45,12 @@ class ZenohRequest:
 class ZenohBus:
     """A `Bus` over a Zenoh session. Close it, or use it in a `with`: else the process never ends.
 
-    Characteristics: buffered: in each subscription, and in each publisher its last `history` messages · when full:
-    the oldest is dropped and counted; on the way to a slow subscriber messages are dropped and asked for again from
-    the publisher's history · threads: any may publish; one of the bus's own fetches what has come, each 10 ms ·
-    reconnect: a client comes back by itself, usually within 0.5 s of the router; its publishers, subscriptions and
-    what it announced are then as before.
+    Characteristics: buffered: in each subscription, and in each publisher its last `history` messages, both with a
+    bound in bytes · when full: a subscription that recovers lets messages go, as a slow way to it does, and asks for
+    them again from the publisher's history when there is room; one that does not drops the oldest and counts it ·
+    threads: any may publish; one of the bus's own fetches what has come, each 10 ms · reconnect: a client comes back
+    by itself, usually within 0.5 s of the router; its publishers, subscriptions and what it announced are then as
+    before.
 
     The messages of one publisher come in their order, each once. What was lost, or sent while a router was away,
     comes afterwards as far as the publisher keeps it; later messages of it wait until then, about a minute where
@@ -113,23 +114,34 @@ class ZenohBus:
 
         Without `recover`, and without `history`, what is lost on the way stays lost.
         """
-        mailbox: Mailbox[bytes] = Mailbox(capacity)
+        mailbox: Mailbox[bytes] = Mailbox(capacity, len)
 
         def deliver(messages: list[Keyed]) -> None:
             mailbox.extend([payload for _, payload in messages])
 
-        with refusal("subscribe to", key):
-            self._worker.add_subscription(ZenohSubscription(self._session, [key], history, deliver, recover=recover))
+        self._subscribe([key], history, mailbox, deliver, recover=recover)
         return mailbox
 
-    def collect(self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000) -> Mailbox[Keyed]:
+    def collect(
+        self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000, recover: bool = True
+    ) -> Mailbox[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
-        mailbox: Mailbox[Keyed] = Mailbox(capacity)
-        with refusal("subscribe to", ", ".join(keys[:3])):
-            self._worker.add_subscription(
-                ZenohSubscription(self._session, keys, history, mailbox.extend, recover=True)
-            )
+        mailbox: Mailbox[Keyed] = Mailbox(capacity, _size_bytes)
+        self._subscribe(keys, history, mailbox, mailbox.extend, recover=recover)
         return mailbox
+
+    def _subscribe(
+        self,
+        keys: Sequence[str],
+        history: int,
+        mailbox: Mailbox[Any],
+        deliver: Callable[[list[Keyed]], None],
+        *,
+        recover: bool,
+    ) -> None:
+        with refusal("subscribe to", ", ".join(keys[:3])):
+            subscription = ZenohSubscription(self._session, keys, history, mailbox, deliver, recover=recover)
+            self._worker.add_subscription(subscription)
 
     def answer(self, key: str) -> Mailbox[Request]:
         """Questions that are asked on a key from now on; each is to be answered."""
@@ -189,6 +201,10 @@ class ZenohBus:
             if self._session.is_closed():
                 return False
             return self._is_router or bool(self._session.info.routers_zid())
+
+
+def _size_bytes(message: Keyed) -> int:
+    return len(message[1])
 
 
 def open_router(endpoint: str, access: ZenohAccess = OPEN, upstream: Sequence[str] = ()) -> ZenohBus:

@@ -3,18 +3,25 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
+from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import Page
 from wetwell.protocols.bus.sequencer import Sequencer, SourceStream
 from wetwell.protocols.bus.zenoh.publisher import at_once
 
 logger = logging.getLogger(__name__)
 
-CHANNEL = 100_000
-"""Messages that Zenoh's threads may put into a channel while Python is busy; then they wait, and routers drop."""
+CHANNEL = 4_096
+"""Messages that Zenoh's threads may put into the channels of a subscription while Python is busy; then they wait, and
+routers drop. Each can hold on to a buffer of 64 kB in which it came, so that 100,000 of them were 6 GB."""
+LEAST_CHANNEL = 64
+"""Of each of many channels: a minute of samples."""
+MOST_READY = 100_000
+"""Messages that wait for room; beyond them the oldest go, as of publishers that keep nothing."""
 TURN = 5_000
 """Messages that are fetched from one channel before the others have their turn."""
 
@@ -27,6 +34,7 @@ class ZenohSubscription:
         session: zenoh.Session,
         keys: Sequence[str],
         history: int,
+        mailbox: Mailbox[Any],
         deliver: Callable[[list[tuple[str, bytes]]], None],
         *,
         recover: bool,
@@ -35,13 +43,14 @@ class ZenohSubscription:
         self.history = history
         self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
+        self._mailbox = mailbox
         self._deliver = deliver
         self._tails: deque[tuple[str, bytes]] = deque()
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         self._channels: list[Callable[[], zenoh.Sample | None]] = []
-        self._told = 0
         for key in keys:
-            subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(CHANNEL))
+            room = max(CHANNEL // len(keys), LEAST_CHANNEL)
+            subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
             self._declared.append(subscriber)
             self._channels.append(subscriber.handler.try_recv)
             if self.recovers:
@@ -51,9 +60,15 @@ class ZenohSubscription:
         if sample.attachment is not None:
             self._tails.append((str(sample.key_expr).rpartition("/")[0], sample.attachment.to_bytes()))
 
+    @property
+    def is_crowded(self) -> bool:
+        """Whether so much waits that what its publishers keep is better left with them."""
+        return self.recovers and (self._mailbox.is_crowded or bool(self.sequencer.ready))
+
     def fetch(self) -> None:
-        """Take what has come, in order, and pass it on."""
+        """Take what has come, in order, and pass it on; where it is crowded only note what there is to ask for."""
         sequencer, put = self.sequencer, zenoh.SampleKind.PUT
+        is_crowded = self.is_crowded
         for try_recv in self._channels:
             for _ in range(TURN):
                 sample = try_recv()
@@ -61,19 +76,26 @@ class ZenohSubscription:
                     break
                 if sample.kind != put:
                     continue
-                header = sample.attachment if self.recovers else None
-                sequencer.handle_message(
-                    str(sample.key_expr), None if header is None else header.to_bytes(), sample.payload.to_bytes()
-                )
+                attached = sample.attachment if self.recovers else None
+                key, header = str(sample.key_expr), None if attached is None else attached.to_bytes()
+                is_crowded = is_crowded or len(sequencer.ready) >= self._mailbox.half
+                if is_crowded and header is not None and sequencer.let_go(key, header):
+                    continue
+                sequencer.handle_message(key, header, sample.payload.to_bytes())
         while self._tails:
             sequencer.handle_tail(*self._tails.popleft())
         self.pass_on()
 
     def pass_on(self) -> None:
-        """Hand over what is in order."""
-        if self.sequencer.ready:
-            ready, self.sequencer.ready = self.sequencer.ready, []
+        """Hand over what is in order; where it can wait, no more than there is room for."""
+        ready = self.sequencer.ready
+        if not self.recovers or len(ready) > MOST_READY:
             self._deliver(ready)
+            self.sequencer.ready = []
+            return
+        while ready and not self._mailbox.is_crowded:
+            self._deliver(ready[: self._mailbox.half])
+            del ready[: self._mailbox.half]
 
     def handle_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
         """Take an answer; what its publisher does not keep any more is told."""
@@ -87,6 +109,7 @@ class ZenohSubscription:
         self._tell_lost(stream.key)
 
     def _tell_lost(self, key: str) -> None:
-        if self.sequencer.lost > self._told:
-            logger.warning("%s: %d messages are lost, nobody has them", key, self.sequencer.lost - self._told)
-            self._told = self.sequencer.lost
+        lost = self.sequencer.lost - self._mailbox.missed
+        if lost > 0:
+            logger.warning("%s: %d messages are lost, nobody has them", key, lost)
+            self._mailbox.missed = self.sequencer.lost

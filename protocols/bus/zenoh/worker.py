@@ -17,7 +17,7 @@ import zenoh
 from wetwell.protocols.bus.publisher_cache import CacheQuery, Page
 from wetwell.protocols.bus.sequencer import SourceStream
 from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher, at_once
-from wetwell.protocols.bus.zenoh.subscription import CHANNEL, ZenohSubscription
+from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.messages.message import JSON_ENCODING
 
 logger = logging.getLogger(__name__)
@@ -31,6 +31,8 @@ TOLD_AT_ONCE = 10
 ASKED = 32
 """Questions for missing messages that are on the way at the same time."""
 ANSWER_S = 2.0
+REPLIES = 10_000
+"""Answers to one question that may wait: one of each publisher on its keys."""
 TRIES = 5
 PATIENT_TRIES = 20
 """Of messages whose publisher may be behind a link between routers that is away: about a minute."""
@@ -216,7 +218,7 @@ class ZenohWorker(threading.Thread):
             if len(self._asked) >= ASKED:
                 return
             query = self._due.popleft()
-            if query.due_s > now_s:
+            if query.due_s > now_s or query.subscription.is_crowded:
                 self._due.append(query)
                 continue
             self._send(query)
@@ -231,7 +233,7 @@ class ZenohWorker(threading.Thread):
         query.is_refused = False
         query.replies = self._session.get(
             query.key,
-            zenoh.handlers.FifoChannel(CHANNEL),
+            zenoh.handlers.FifoChannel(REPLIES),
             payload=payload,
             encoding=JSON_ENCODING,
             target=zenoh.QueryTarget.ALL,

@@ -22,6 +22,7 @@ from wetwell.services.historian.store.interface import (
     maintain_one,
 )
 from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
 log = logging.getLogger(__name__)
@@ -98,6 +99,12 @@ class FolderStore:
         """All stations, by name."""
         return self.live.stations()
 
+    def newest_ns(self, station: str) -> int | None:
+        """Where the history of a station ends; a day in a file counts as one that is believed."""
+        filed_ns = {*self.archive.days_ns("samples", station), *self.archive.days_ns("minutes", station)}
+        of_files = [(day_ns, day_ns + DAY_NS - 1, LEAST_SAMPLES) for day_ns in sorted(filed_ns, reverse=True)]
+        return end_of_stretch_ns([*self.live.rows_from_newest(station, MOST_LOOKED_AT), *of_files])
+
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span."""
         live_ns = self.live.days_ns(station, start_ns, end_ns)  # before the files: rows go from here to there
@@ -167,7 +174,7 @@ class FolderStore:
 
     def maintain(self, now_ns: int) -> str | None:
         """Turn one day into a file, or one old file into minutes, or delete one that is too old."""
-        return maintain_one(self.stations(), now_ns, (self._roll, self._downsample, self._delete_old))
+        return maintain_one(self, now_ns, (self._roll, self._downsample, self._delete_old))
 
     def figures(self) -> dict[str, float]:
         """Size of the database, and what is free on its disk."""

@@ -1,7 +1,7 @@
 """What a store of the historian is: it keeps batches whole, and gives back what it has kept."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
@@ -80,6 +80,9 @@ class Store(Protocol):
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
 
+    def newest_ns(self, station: str) -> int | None:
+        """Where the history of a station ends, whatever stamp may lie far ahead of it; None if it has no samples."""
+
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples from `start_ns` until before `end_ns`, in order."""
 
@@ -117,12 +120,11 @@ def blocks(store: Store, station: str, start_ns: int, end_ns: int) -> Iterator[S
         yield store.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS))
 
 
-def maintain_one(
-    spans: Iterable[StationSpan], now_ns: int, steps: Sequence[Callable[[str, int], str | None]]
-) -> str | None:
+def maintain_one(store: Store, now_ns: int, steps: Sequence[Callable[[str, int], str | None]]) -> str | None:
     """Take the first step that has something to do; it gets a station and the beginning of its newest day."""
-    for span in spans:
-        newest_ns = day_of(min(span.last_ns, now_ns))
+    for span in store.stations():
+        end_ns = store.newest_ns(span.station)
+        newest_ns = day_of(min(span.last_ns if end_ns is None else end_ns, now_ns))
         for step in steps:
             done = step(span.station, newest_ns)
             if done is not None:

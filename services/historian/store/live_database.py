@@ -161,6 +161,14 @@ class LiveDatabase:
         times_ns = times_ns[times_ns >= start_ns]
         return min([*times_ns[:1].tolist(), *([] if time_ns is None else [int(time_ns)])], default=None)
 
+    def rows_from_newest(self, station: str, most: int) -> list[tuple[int, int, int]]:
+        """First time, last time and number of samples of the newest rows, the newest first."""
+        with self._reading() as database:
+            return database.execute(
+                f"SELECT time_ns, {_LAST}, size {_OF_STATION} ORDER BY time_ns DESC LIMIT :most",
+                {"station": station, "most": most},
+            ).fetchall()
+
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span, in order."""
         days_ns = []

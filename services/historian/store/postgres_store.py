@@ -20,6 +20,7 @@ from wetwell.services.historian.store.interface import (
     maintain_one,
     span_of,
 )
+from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.store.postgres_connection import PostgresConnection
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
 
@@ -96,6 +97,20 @@ class PostgresStore:
             "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM wetwell.station ORDER BY 1"
         )
         return [StationSpan(*row) for row in rows]
+
+    def newest_ns(self, station: str) -> int | None:
+        """Where the history of a station ends; what has become minutes is believed."""
+        rows = self._connection.read(
+            "SELECT time_ns, time_ns, 1 FROM wetwell.sample "
+            "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) ORDER BY time_ns DESC LIMIT %s",
+            (station, MOST_LOOKED_AT),
+        )
+        minutes = self._connection.read(
+            "SELECT time_ns, time_ns, %s FROM wetwell.minute "
+            "WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) ORDER BY time_ns DESC LIMIT 1",
+            (LEAST_SAMPLES, station),
+        )
+        return end_of_stretch_ns([*rows, *minutes])
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span."""
@@ -186,7 +201,7 @@ class PostgresStore:
 
     def maintain(self, now_ns: int) -> str | None:
         """Sum up one complete day, or turn one old day into minutes, or delete what is too old."""
-        return maintain_one(self.stations(), now_ns, (self._sum_up, self._downsample, self._delete_old))
+        return maintain_one(self, now_ns, (self._sum_up, self._downsample, self._delete_old))
 
     def figures(self) -> dict[str, float]:
         """Whether it is connected."""

@@ -174,6 +174,50 @@ def test_subscription_without_history_misses_nothing_of_a_known_publisher(endpoi
     assert asyncio.run(receive()) == [b"0", b"1", b"2", b"3"]
 
 
+def test_a_reader_that_is_far_too_slow_loses_nothing_that_publishers_keep(endpoint):
+    """Its mailbox has room for 200; the rest stays with the publisher until it reads."""
+    want = [b"%05d" % number for number in range(5_000)]
+
+    async def read_late() -> tuple[list[bytes], int]:
+        messages = follower.subscribe("wetwell/alpha/sample", capacity=200)
+        publisher.put(b"first")
+        assert await next_batch(messages) == [b"first"]
+        for payload in want:
+            publisher.put(payload)
+        await asyncio.to_thread(wait_until, lambda: messages.is_crowded)
+        got: list[bytes] = []
+        async with asyncio.timeout(LIMIT_S):
+            while got[-1:] != want[-1:]:
+                got += await messages.receive()
+        return got, messages.dropped + messages.missed
+
+    with open_router(endpoint), open_client(endpoint) as source, open_client(endpoint) as follower:
+        publisher = source.publisher("wetwell/alpha/sample", history=len(want))
+        assert asyncio.run(read_late()) == (want, 0)
+
+
+def test_what_nobody_has_any_more_is_counted_and_told(endpoint, caplog):
+    async def read_late() -> int:
+        messages = follower.subscribe("wetwell/alpha/sample", capacity=200)
+        publisher.put(b"first")
+        assert await next_batch(messages) == [b"first"]
+        for number in range(5_000):
+            publisher.put(b"%05d" % number)
+        await asyncio.to_thread(wait_until, lambda: messages.is_crowded)
+        got: list[bytes] = []
+        async with asyncio.timeout(LIMIT_S):
+            while got[-1:] != [b"04999"]:
+                got += await messages.receive()
+        assert len(got) + messages.missed == 5_000
+        return messages.missed
+
+    with open_router(endpoint), open_client(endpoint) as source, open_client(endpoint) as follower:
+        publisher = source.publisher("wetwell/alpha/sample", history=50)
+        missed = asyncio.run(read_late())
+    assert missed > 1_000
+    assert "messages are lost, nobody has them" in caplog.text
+
+
 def test_what_is_declared_without_router_works_afterwards(endpoint):
     async def receive() -> list[bytes]:
         with open_router(endpoint) as router, open_client(endpoint) as sender, open_client(endpoint) as reader:

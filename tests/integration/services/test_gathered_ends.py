@@ -16,7 +16,7 @@ from wetwell.services.gateway.daemon import poll_all
 from wetwell.services.replay.daemon import serve_replay
 from wetwell.services.runtime.sample_sender import SampleSender
 from wetwell.services.runtime.settings import Settings
-from wetwell.services.simulator.daemon import serve_simulator
+from wetwell.services.simulator.daemon import PlantStart, serve_simulator
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -58,7 +58,9 @@ def test_a_simulator_that_is_stopped_sends_what_it_has_gathered(alpha, bus):
     simulation = Simulation(alpha, Scenario(name="plain"), 1)
 
     async def run():
-        serving = asyncio.create_task(serve_simulator(SETTINGS, simulation, 20.0, zenoh=True, modbus=False))
+        serving = asyncio.create_task(
+            serve_simulator(SETTINGS, simulation, 20.0, PlantStart(), zenoh=True, modbus=False)
+        )
         async with asyncio.timeout(20.0):
             while simulation.seconds < 3:  # noqa: ASYNC110 - nothing else tells it
                 await asyncio.sleep(0.01)

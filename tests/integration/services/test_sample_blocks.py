@@ -6,6 +6,7 @@ import json
 import pytest
 from memory_bus import MemoryBus
 
+from wetwell.protocols.bus.interface import ALL_KEPT
 from wetwell.protocols.bus.keys import sample_block_key, sample_key, verdict_key
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
@@ -13,7 +14,7 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.dashboard.site_view import SiteView
-from wetwell.services.detector.intake import Intake, Waiting
+from wetwell.services.detector.intake import Intake, Room, Waiting
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.daemon import keep
 from wetwell.services.historian.service import Historian
@@ -83,6 +84,18 @@ def test_a_late_joiner_gets_the_last_600_samples_whatever_number_of_messages_the
     assert len(asyncio.run(kept(["good"] * 1_800))) == 600
 
 
+@pytest.mark.parametrize(("rate_hz", "kept"), [(1.0, 600), (5.0, 600), (10.0, 1_200)])
+def test_two_minutes_on_the_wall_are_kept_however_fast_the_station_runs(samples, rate_hz, kept):
+    async def there() -> int:
+        with MemoryBus() as bus:
+            sender = SampleSender(bus, "alpha", 0.0, rate_hz)
+            for sample in samples[:2_000]:
+                sender.put(sample)
+            return len(await bus.subscribe(sample_key("alpha"), history=ALL_KEPT).receive())
+
+    assert asyncio.run(there()) == kept
+
+
 def test_a_historian_takes_all_that_a_source_of_small_blocks_has_kept(samples, tmp_path):
     async def taken() -> float:
         with MemoryBus() as bus:
@@ -102,11 +115,11 @@ def test_a_historian_takes_all_that_a_source_of_small_blocks_has_kept(samples, t
     assert asyncio.run(taken()) == 300.0
 
 
-def test_what_waits_while_a_station_catches_up_is_bounded_and_what_goes_is_counted(samples, monkeypatch):
-    monkeypatch.setattr("wetwell.services.detector.intake.BEHIND", 5)
-    waiting = Waiting()
-    waiting.extend([sample.encode() for sample in samples[:4]], Sample)
-    waiting.extend([*payloads(samples[4:24], 10), b"{}"], SampleBlock)
+def test_what_waits_while_a_station_catches_up_is_bounded_and_what_goes_is_counted(samples):
+    singles, blocks = [sample.encode() for sample in samples[:4]], [*payloads(samples[4:24], 10), b"{}"]
+    waiting = Waiting(Room(sum(map(len, [*singles[2:], *blocks]))))
+    waiting.extend(singles, Sample)
+    waiting.extend(blocks, SampleBlock)
     assert waiting.dropped == 2
     assert [sample.seq for sample in waiting.samples()] == list(range(2, 24))
 

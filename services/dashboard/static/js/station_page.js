@@ -8,6 +8,7 @@ import { historyPanel } from "./history_panel.js";
 import { kpiPanel } from "./kpi_panel.js";
 import { livePanel } from "./live_panel.js";
 import { planePanel } from "./plane_panel.js";
+import { plantClock } from "./plant_clock.js";
 import { qualityPanel } from "./quality_panel.js";
 import { residualPanel } from "./residual_panel.js";
 import { StationState } from "./station_state.js";
@@ -25,8 +26,9 @@ export function stationPage(name, main, showLink) {
   const chip = html("span", { class: "state", id: "station-state" }, word);
   const time = html("span", { class: "note", id: "station-time" });
   const choice = html("div", { class: "buttons", role: "group", "aria-label": "Pump" });
+  const clock = plantClock(station);
   const head = html("div", { class: "tools" },
-    html("h1", {}, name), chip, time, choice);
+    html("h1", {}, name), chip, time, clock.element, choice);
   const panels = [wellPanel, planePanel, alarmPanel, livePanel, verdictPanel, residualPanel, kpiPanel, historyPanel, qualityPanel]
     .map((make) => make(station, () => pump, choose));
   main.append(head, html("div", { class: "station" }, ...panels.map((each) => each.element)));
@@ -61,6 +63,7 @@ export function stationPage(name, main, showLink) {
     }
     say(time, station.time ? `${moment(station.time)} UTC${station.stale ? ", no samples now" : ""}` : "no sample yet");
     showChoice();
+    clock.update();
     for (const each of panels) each.update(changed);
   }
 

@@ -17,7 +17,7 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.detector.checkpoint import Checkpoint
-from wetwell.services.detector.intake import Intake
+from wetwell.services.detector.intake import Intake, Room, Waiting
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
@@ -131,6 +131,53 @@ def test_nor_does_a_kill_after_the_clock_of_the_station_was_set_back_change_them
     ]
     told = asyncio.run(verdicts_of_killed(alpha, stepped, tmp_path, [cut], 50))
     assert sorted(told, key=key) == sorted(judged(alpha, stepped), key=key)
+
+
+def test_a_historian_that_comes_back_later_than_the_detector_is_waited_for(
+    alpha, samples, undisturbed, tmp_path, monkeypatch
+):
+    """As after a restart of the machine: what publishers keep no more is taken from it as soon as it answers."""
+    monkeypatch.setattr("wetwell.services.detector.backfill.ASK_AGAIN_S", 0.001)
+    cut, back = 20_000, 24_000
+
+    async def live() -> list[Verdict]:
+        with MemoryBus() as bus:
+            verdicts = bus.subscribe(verdict_key("alpha"), capacity=100_000)
+            store = FolderStore(tmp_path / "history", keep_live_days=1)
+            historian = Historian(store)
+            send = source(bus, historian, samples, 1)
+            judge = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            judge.judge(samples[:cut])
+            judge.keep()
+            for number in range(back):
+                send(number)
+            judge = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            running = asyncio.create_task(Intake(bus, [judge]).run())
+            await asyncio.sleep(0.05)
+            assert judge.detector.seen_until_ns == samples[cut - 1].time, "nothing is passed over meanwhile"
+            answering = asyncio.create_task(answer(bus.answer(history_key("*")), historian))
+            for number in range(back, len(samples)):
+                send(number)
+            while judge.detector.seen_until_ns < samples[-1].time:  # noqa: ASYNC110 - it ends its work
+                await asyncio.sleep(0.001)
+            for task in (running, answering):
+                task.cancel()
+            store.close()
+            return list({payload: Verdict.decode(payload) for payload in await verdicts.receive()}.values())
+
+    assert sorted(asyncio.run(live()), key=key) == sorted(undisturbed, key=key)
+
+
+def test_messages_that_wait_share_one_bound_in_bytes():
+    room = Room(most_bytes=100)
+    first, second = Waiting(room), Waiting(room)
+    first.extend([b"x" * 40] * 2, Sample)
+    second.extend([b"y" * 30, b"z" * 10], Sample)
+    assert (len(first.messages), first.dropped) == (2, 0)
+    assert ([payload for payload, _ in second.messages], second.dropped) == ([b"z" * 10], 1)
+    first.pop()
+    second.extend([b"y" * 30], Sample)
+    assert second.dropped == 1
 
 
 def key(verdict: Verdict) -> tuple[int, int, str]:

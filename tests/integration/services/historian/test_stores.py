@@ -11,7 +11,7 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.history import History, HistoryQuery
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, Batch, Store, StoreError
@@ -148,6 +148,39 @@ def test_old_days_become_minutes_and_older_ones_go_while_figures_stay(
     assert ask(historian, kind="samples", raw=True).time[0] == DAY + 3 * DAY_NS
     told = ask(historian, kind="verdicts").messages
     assert [message["time"] for message in told] == [verdict(day).model_dump()["time"] for day in range(1, 6)]
+
+
+@pytest.mark.parametrize("name", ["folder", "postgres"])
+def test_a_stamp_far_in_the_future_does_not_move_the_end_of_the_history(
+    name: str, make_store: Callable[..., Store]
+) -> None:
+    """Neither what "the last 12 h" are, nor which days are complete."""
+    store = make_store(name)
+    historian = Historian(store)
+
+    def handle(times_ns: list[int]) -> None:
+        for seq, time_ns in enumerate(times_ns):
+            historian.handle("samples", Sample(station="a", seq=seq, time=time_ns, level_m=1.0, pumps=()).encode())
+        historian.commit(NOW_NS)
+
+    def told() -> str:
+        answer = History.decode(historian.answer("_site", HistoryQuery(kind="stations").encode()))
+        return str(answer.messages[0]["last"])
+
+    seconds = [DAY + second * NS_PER_S for second in range(20)]
+    ahead_ns = DAY + 40 * DAY_NS
+    handle([ahead_ns, *seconds[:5]])
+    assert told() == to_iso(seconds[4]), "even if it comes first"
+    handle(seconds[5:])
+    assert told() == to_iso(seconds[-1])
+    while historian.maintain(NOW_NS):
+        pass
+    assert len(store.samples("a", DAY, DAY + DAY_NS)) == len(seconds)
+    if isinstance(store, FolderStore):
+        assert store.live.next_time_ns("a", DAY) == DAY, "today is no complete day"
+    assert len(store.samples("a", ahead_ns, ahead_ns + 1)) == 1, "it is kept all the same"
+    handle([ahead_ns + second * NS_PER_S for second in range(1, 10)])
+    assert told() == to_iso(ahead_ns + 9 * NS_PER_S), "ten that agree are followed"
 
 
 @pytest.mark.parametrize("name", ["folder", "postgres"])

@@ -24,7 +24,7 @@ from wetwell.protocols.messages.status import Status
 from wetwell.services.runtime.health.board import HealthBoard
 from wetwell.services.runtime.health.page import health_page
 from wetwell.services.runtime.settings import HealthSettings
-from wetwell.services.supervisor import _show_health
+from wetwell.services.supervisor.serve import show_health
 from wetwell.services.systemd.notify import notify, watched_by_systemd
 
 UNITS = Path(__file__).parents[4] / "services" / "systemd"
@@ -146,7 +146,7 @@ def test_up_serves_the_figures_of_its_children(clock):
         with MemoryBus() as bus:
             statuses = bus.subscribe("wetwell/*/status/*")
             board = HealthBoard(clock)
-            running = asyncio.create_task(_show_health(statuses, board, 10.0))
+            running = asyncio.create_task(show_health(statuses, board, 10.0, lambda _: None))
             status = Status(
                 time=0, station="alpha", service="detector", state="running", figures={"sample_age_s": 99.0}
             )

@@ -31,6 +31,27 @@ def test_full_mailbox_drops_the_oldest_and_counts():
     assert mailbox.dropped == 3
 
 
+def test_bytes_have_a_bound_too_but_the_newest_message_always_has_room():
+    mailbox = Mailbox(100, len, most_bytes=10)
+    mailbox.extend([b"1234", b"5678", b"90ab"])
+    assert mailbox.dropped == 1
+    mailbox.put(b"x" * 50)
+    assert asyncio.run(mailbox.receive()) == [b"x" * 50]
+    assert mailbox.dropped == 3
+    mailbox.put(b"1234")
+    assert mailbox.dropped == 3, "what was received takes no room"
+
+
+@pytest.mark.parametrize(("capacity", "most_bytes"), [(4, 1_000), (1_000, 40)])
+def test_it_is_crowded_when_half_of_the_room_is_taken(capacity, most_bytes):
+    mailbox = Mailbox(capacity, len, most_bytes)
+    crowded = []
+    for _ in range(4):
+        mailbox.put(b"x" * 10)
+        crowded.append(mailbox.is_crowded)
+    assert crowded == [False, False, True, True]
+
+
 def test_capacity_below_one_is_refused():
     with pytest.raises(ValueError, match="capacity must be at least 1, got 0"):
         Mailbox(capacity=0)

@@ -1,7 +1,12 @@
 import random
+from unittest import mock
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from wetwell.protocols.bus import publisher_cache
+from wetwell.protocols.bus import sequencer as sequencer_module
 from wetwell.protocols.bus.publisher_cache import PAGE_BYTES, CacheQuery, Page, PublisherCache, read_sequence_header
 from wetwell.protocols.bus.sequencer import MOST_HELD, MOST_STREAMS, Sequencer
 
@@ -111,10 +116,33 @@ def test_messages_that_wait_do_not_pile_up():
     publisher, sequencer = PublisherCache(1), Sequencer(0)
     sequencer.handle_message(KEY, publisher.add(b"0"), b"0")
     publisher.add(b"lost")
-    for _ in range(MOST_HELD + 1):
+    for _ in range(MOST_HELD + 5):
         sequencer.handle_message(KEY, publisher.add(b"x"), b"x")
-    assert len(passed_on(sequencer)) == MOST_HELD + 2
-    assert (sequencer.lost, sequencer.wanted) == (1, {})
+    assert passed_on(sequencer) == [b"0"]
+    (stream,) = sequencer.wanted.values()
+    assert len(stream.held) == MOST_HELD
+    sequencer.give_up(stream)
+    assert len(passed_on(sequencer)) == MOST_HELD
+    assert sequencer.lost == 1
+    assert stream.is_missing, "what was let go for want of room is asked for"
+
+
+@given(gaps=st.sets(st.integers(1, 60)), most_bytes=st.integers(1, 200))
+def test_what_was_let_go_for_want_of_room_comes_from_the_publisher(gaps, most_bytes):
+    publisher, sequencer = PublisherCache(100), Sequencer(0)
+    want = [b"%d" % number for number in range(64)]
+    with mock.patch.object(sequencer_module, "MOST_HELD_BYTES", most_bytes):
+        for number, payload in enumerate(want):
+            header = publisher.add(payload)
+            if number in gaps and number % 2:
+                assert sequencer.let_go(KEY, header)
+            elif number not in gaps:
+                sequencer.handle_message(KEY, header, payload)
+        sequencer.handle_tail(KEY, publisher.next_header)
+        ask_for_all(sequencer, {KEY: publisher})
+    assert passed_on(sequencer) == want
+    assert sequencer.lost == 0
+    assert sequencer._held_bytes == 0
 
 
 def test_a_message_without_a_mark_is_passed_on_at_once():
@@ -137,6 +165,17 @@ def test_an_answer_has_bounded_size_and_at_least_one_message():
     assert sizes == [[10], [PAGE_BYTES], [10, 10], [], []]
     assert kept.page(CacheQuery(source="00" * 8)) is None
     assert read_sequence_header(kept.next_header) == (kept.source, 4)
+
+
+def test_what_a_publisher_keeps_has_a_bound_in_bytes_whatever_its_history():
+    with mock.patch.object(publisher_cache, "KEPT_BYTES", 25):
+        kept = PublisherCache(1_000)
+        for number in range(10):
+            kept.add(b"%010d" % number)
+        page = kept.page(CacheQuery(source=kept.source.hex(), begin=0))
+        assert (page.first, page.end, len(page.payloads)) == (8, 10, 2)
+        kept.add(b"x" * 1_000)
+        assert kept.last == b"x" * 1_000, "the last one is always kept"
 
 
 @pytest.mark.parametrize("damage", [slice(-1), slice(-4), slice(0)])

@@ -57,6 +57,38 @@ def view():
     return site
 
 
+def test_of_many_samples_only_those_that_are_drawn_are_read_and_none_counts_as_lost(view):
+    payloads = [sample(second).encode() for second in range(1, 301)]
+    payloads[5] = b"this one is never read"
+    view.handle_samples(payloads[:150])
+    view.handle_samples(payloads[150:])
+    frame = frame_of(view, 0.25)
+    assert len(frame["rows"]) == 2 * ROWS_A_FRAME
+    assert frame["rows"][-1][0] == 300_000
+    assert (frame["lost"], view.counts["malformed"]) == (0, 0)
+    view.handle_samples([sample(second).encode() for second in range(311, 315)])
+    assert frame_of(view, 0.5)["lost"] == 10
+
+
+def test_names_that_somebody_makes_up_have_a_bound(view, monkeypatch):
+    monkeypatch.setattr("wetwell.services.dashboard.site_view.MOST_STATIONS", 3)
+    for number in range(10):
+        view.handle_sample(sample(1, f"s{number}").encode())
+        view.handle_presence(Presence(f"wetwell/p{number}/alive/detector", is_alive=True))
+    assert sorted(view.stations) == ["p0", "s0", "s1"]
+    view.handle_sample(sample(2, "s1").encode())
+    assert view.stations["s1"].sample.seq == 2
+
+
+def test_a_plant_that_is_held_has_not_lost_its_samples(view):
+    status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+    view.handle_sample(sample(1).encode())
+    view.handle_status(Status(**status, figures={"held": 1.0}).encode())
+    assert frame_of(view, 100.0)["stale"] is False
+    view.handle_status(Status(**status, figures={"held": 0.0}).encode())
+    assert frame_of(view, 120.0)["stale"] is True
+
+
 def frame_of(view, now_s, station="alpha"):
     return json.loads(view.advance(now_s)[station])
 

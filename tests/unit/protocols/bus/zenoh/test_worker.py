@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 import zenoh
 
+from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
@@ -62,7 +63,12 @@ class Bench:
         self.session = Session()
         self.got: list[bytes] = []
         self.subscription = ZenohSubscription(
-            self.session, [KEY], 0, lambda ready: self.got.extend(each for _, each in ready), recover=True
+            self.session,
+            [KEY],
+            0,
+            Mailbox(100),
+            lambda ready: self.got.extend(each for _, each in ready),
+            recover=True,
         )
         self.worker = ZenohWorker(self.session, is_router=False)
         self.worker._subscriptions.append(self.subscription)
