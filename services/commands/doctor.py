@@ -17,6 +17,13 @@ def doctor(
         typer.Option("--station", metavar="FILE", help="Station that must be there; may be given again."),
     ] = None,
     seconds: Annotated[float, typer.Option("--seconds", help="How long to listen.")] = 5.0,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Check by checksums that what is kept here is what was written; needs no bus.",
+        ),
+    ] = False,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -28,7 +35,13 @@ def doctor(
     from wetwell.services.doctor.examine import examine
     from wetwell.services.doctor.finding import exit_code, finding_lines
 
-    findings = asyncio.run(examine(config, zenoh, station or [], positive(seconds, "--seconds")))
+    if verify:
+        from wetwell.services.commands.options import settings_of
+        from wetwell.services.doctor.verify import verify_kept
+
+        findings = verify_kept(settings_of(config))
+    else:
+        findings = asyncio.run(examine(config, zenoh, station or [], positive(seconds, "--seconds")))
     if as_json:
         print_result({"findings": [asdict(finding) for finding in findings]}, as_json=True)
     else:
