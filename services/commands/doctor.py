@@ -1,5 +1,6 @@
 """A look at a running site."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -24,6 +25,10 @@ def doctor(
             help="Check by checksums that what is kept here is what was written; needs no bus.",
         ),
     ] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="DIR", help="With --verify: folder of wetwell up, not those of the settings."),
+    ] = None,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -36,10 +41,11 @@ def doctor(
     from wetwell.services.doctor.finding import exit_code, finding_lines
 
     if verify:
-        from wetwell.services.commands.options import settings_of
+        from wetwell.services.commands.options import settings_of, with_data
         from wetwell.services.doctor.verify import verify_kept
 
-        findings = verify_kept(settings_of(config))
+        settings = settings_of(config)
+        findings = verify_kept(settings if data is None else with_data(settings, data, data))
     else:
         findings = asyncio.run(examine(config, zenoh, station or [], positive(seconds, "--seconds")))
     if as_json:
