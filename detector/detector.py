@@ -16,7 +16,8 @@ from wetwell.detector.stream.loop import Stop
 from wetwell.detector.verdict.asset_faults import StageRules
 from wetwell.detector.verdict.evidence import rolling_evidence
 from wetwell.protocols.messages.readings import Readings
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.verdict import Severity, Verdict
+from wetwell.protocols.quantities import STATION_QUANTITIES, pump_of
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
 
@@ -145,6 +146,21 @@ class Detector:
         reference = self._judges[pump].memory.reference
         self._runs.set_lacking_head(pump, lacks_head=reference is not None and reference.baseline.lacks_head)
         return self._told(pump, now_ns, "baseline taken back by an operator")
+
+    def severity(self, asset: str) -> Severity | None:
+        """Severity of a pump or a main as it is now; None of other assets, and before the first run."""
+        told = (judge.severity(asset, self._system(pump)) for pump, judge in enumerate(self._judges))
+        return next((severity for severity in told if severity is not None), None)
+
+    def pumps_of(self, asset: str) -> list[int]:
+        """Pumps (from 0) that an asset concerns: itself, those of a main or of a meter; none if it is not here."""
+        name = asset.partition(":")[2]
+        return [
+            pump
+            for pump, judge in enumerate(self._judges)
+            if asset in (judge.name, judge.main_name)
+            or (asset.startswith("sensor:") and (name in STATION_QUANTITIES or pump_of(name) == pump + 1))
+        ]
 
     def _judged(self, stop: int) -> list[Verdict]:
         """Verdicts where the loop over the samples has stopped."""

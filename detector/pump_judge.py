@@ -34,7 +34,7 @@ from wetwell.detector.verdict.asset_faults import AssetFaults, StageRules
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.detector.verdict.severity import severity
-from wetwell.protocols.messages.verdict import AssetFault, State
+from wetwell.protocols.messages.verdict import AssetFault, Severity, State
 from wetwell.protocols.station.costs import Costs
 
 EARLY_PROBABILITY = 0.999
@@ -89,6 +89,20 @@ class PumpJudge:
     def faults(self, system: SystemPrior) -> tuple[AssetFault, ...]:
         """Faults of the pump, its main and its meters that stand, the worst first."""
         return self._faults.told(self.memory.prior.asset, system.asset, self.memory.wrong_meters)
+
+    @property
+    def name(self) -> str:
+        """The pump as an asset."""
+        return self._faults.pump_name
+
+    @property
+    def main_name(self) -> str:
+        """Its main as an asset."""
+        return self._faults.main_name
+
+    def severity(self, asset: str, system: SystemPrior) -> Severity | None:
+        """Severity of the pump or its main as it is now; None of other assets, and before the first run."""
+        return self._faults.severity(asset, self.memory.prior.asset, system.asset)
 
     def tell(self, time_ns: int, reason: str) -> Judgement:
         """What was told last, with the reason why it is told again."""

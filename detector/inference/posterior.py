@@ -156,10 +156,13 @@ def _ways(
     log_share = table.log_share
     offset, spread = np.zeros((len(new), 4)), np.zeros((len(new), 4, 4))
     tau_p, tau_s = scales.pump_m**2, scales.system_m**2
-    spread[:, PUMP, PUMP] = moves[:, 0] * new[:, 0] * tau_p + moves[:, 1] * (
-        v_p + new[:, 1] * tau_s * observation.system_in_pump**2
+    slopes = moves[:, ::-1] | table.is_old  # what is carried was seen at another flow
+    spread[:, PUMP, PUMP] = (
+        moves[:, 0] * new[:, 0] * tau_p
+        + moves[:, 1] * new[:, 1] * tau_s * observation.system_in_pump**2
+        + slopes[:, 0] * v_p
     )
-    spread[:, SYSTEM, SYSTEM] = moves[:, 1] * new[:, 1] * tau_s + moves[:, 0] * v_s
+    spread[:, SYSTEM, SYSTEM] = moves[:, 1] * new[:, 1] * tau_s + slopes[:, 1] * v_s
     for meter, variance, way in (
         (table.flow, FLOW_METER_ERROR**2, observation.flow_meter),
         (table.head, scales.head_m**2, observation.head_sensor),

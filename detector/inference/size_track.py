@@ -9,14 +9,14 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.timestamps import NS_PER_DAY
 
 SIZE, RATE, DISTURBANCE = range(3)
-RATE_CHANGES = np.array([0.001, 0.01, 0.1, 1.0, 10.0])
+RATE_CHANGES = np.array([0.001, 0.003, 0.01, 0.03, 0.1, 1.0, 10.0])
 """How fast a rate of growth changes, as a bank of filters: standard deviation, in sizes of usual faults a day, after
 a day. From wear over years to a blockage within hours."""
 FIRST_RATE_DAYS = 10.0
 """The rate of what has just begun may be what this time makes of its changes. [d]"""
 DISTURBANCE_DAYS = 0.25
 """Time after which what disturbs runs is forgotten: that of a daily wave, a quarter of its period. [d]"""
-WEIGHT_DAYS = 2.0
+WEIGHT_DAYS = 4.0
 """Time after which what the filters of the bank have been worth is forgotten. [d]"""
 JUMP_SCALES = (1.0, 0.02)
 """Variances of faults that appear at once, as shares of that of the usual size: large, and just begun."""

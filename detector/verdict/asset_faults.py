@@ -93,6 +93,15 @@ class AssetFaults:
         found += [self._meter_fault(name, meter) for name, meter in sorted(meters.items())]
         return tuple(fault for _, fault in sorted(found, key=_rank, reverse=True))
 
+    def severity(self, name: str, pump: AssetBelief, main: AssetBelief) -> Severity | None:
+        """Severity of the pump or the main as it is now, whether it stands at fault or not; None of others."""
+        if name == self.pump_name and pump.track.time_ns is not None:
+            quantities = pump_quantities(self._curve, pump.flow_m3h, self._limits)
+            return severity_of(*pump.track.size, min(quantities, key=lambda quantity: quantity.size_at_limit))
+        if name == self.main_name and main.track.time_ns is not None:
+            return severity_of(*main.track.size, main_quantity(main, self._limits))
+        return None
+
     def _fault(
         self, name: str, asset: AssetBelief, quantity: Quantity, crew: float | None, what: str
     ) -> tuple[float, AssetFault]:

@@ -25,6 +25,16 @@ def order_key(station: str) -> str:
     return f"{ROOT}/{station}/order/detector"
 
 
+def maintenance_act_key(station: str) -> str:
+    """Key of acts of maintenance that were entered, for the detector of a station."""
+    return f"{ROOT}/{station}/order/maintenance"
+
+
+def maintenance_key(station: str) -> str:
+    """Key of the log of maintenance of a station, with what the detector saw of each act."""
+    return f"{ROOT}/{station}/maintenance"
+
+
 def status_key(station: str, service: str) -> str:
     """Key of the health figures of one service of a station."""
     return f"{ROOT}/{station}/status/{service}"

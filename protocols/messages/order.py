@@ -1,10 +1,11 @@
-"""Order: an act of an operator on a detector."""
+"""Orders: of an operator to a detector, and of the controller of a fleet to a shard."""
 
 from typing import Literal
 
 from pydantic import Field
 
 from wetwell.protocols.messages.message import Message, Stamp
+from wetwell.protocols.station.station_file import Station
 
 
 class Order(Message):
@@ -17,3 +18,13 @@ class Order(Message):
     pump: int = Field(ge=1)
     act: Literal["rebaseline", "revert"]
     by: str = Field(min_length=1, max_length=64)
+
+
+class Plan(Message):
+    """Stations of a shard; the shard works while `epoch` is its own, and ends when a later one goes elsewhere."""
+
+    schema_name: Literal["wetwell.plan/1"] = Field("wetwell.plan/1", alias="schema")
+    time: Stamp
+    shard: int = Field(ge=0)
+    epoch: int = Field(ge=0)
+    stations: tuple[Station, ...]

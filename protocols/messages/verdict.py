@@ -1,5 +1,6 @@
 """Verdict: what the detector says of one pump, and of what is at fault."""
 
+import re
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -88,6 +89,23 @@ class Verdict(Message):
         """The asset that is the main of the pump."""
         name = self.evidence.get("main")
         return f"main:{name}" if isinstance(name, str) and name else "main"
+
+    def speaks_of(self, asset: str) -> bool:
+        """Whether it says whether a fault of this asset stands: of its pump, its main, and no meter of another pump.
+
+        Examples
+        --------
+        >>> verdict = Verdict(time=0, station="s", pump=2, state="normal", probability={}, evidence={}, window=(0, 0))
+        >>> [verdict.speaks_of(asset) for asset in ("pump:2", "pump:1", "main", "main:b", "sensor:pump21_flow_m3h")]
+        [True, False, True, False, False]
+        """
+        kind, _, name = asset.partition(":")
+        if kind == "pump":
+            return name == str(self.pump)
+        if kind == "main":
+            return asset == self.main
+        of_pump = re.match(r"pump(\d+)", name)
+        return of_pump is None or int(of_pump[1]) == self.pump
 
     def standing(self) -> tuple[AssetFault, ...] | None:
         """Faults that stand of the pump, its main and its meters; None where the verdict says nothing of them.

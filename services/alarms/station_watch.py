@@ -1,7 +1,6 @@
 """What is heard of one station: its clock, its samples, verdicts and services, turned into conditions of alarms."""
 
 import math
-import re
 from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
@@ -221,9 +220,4 @@ def _speaks_of(verdict: Verdict, record: AlarmRecord) -> bool:
     """Whether a verdict says whether an alarm stands; those of other versions were one a pump and state."""
     if record.rule not in VERDICT_RULES:
         return False
-    if record.asset is None or record.rule == "pump_fault":
-        return record.pump == verdict.pump
-    if record.rule == "system_fault":
-        return record.asset == verdict.main
-    of_pump = re.match(r"sensor:pump(\d+)", record.asset)
-    return of_pump is None or int(of_pump[1]) == verdict.pump
+    return record.pump == verdict.pump if record.asset is None else verdict.speaks_of(record.asset)

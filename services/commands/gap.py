@@ -32,10 +32,13 @@ def gap_trial(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")],
     seed: SeedOption = 1,
     cases: Annotated[int, typer.Option(min=1, help="Number of sealed cases.")] = 50,
-    plant: Annotated[Literal["fine", "swmm", "both"], typer.Option(help="What stands for reality.")] = "fine",
+    plant: Annotated[
+        Literal["fine", "swmm", "elastic", "both", "all"],
+        typer.Option(help="What stands for reality; both: fine and swmm."),
+    ] = "fine",
     kinds: Annotated[
-        str, typer.Option(help="Of single, pair, none, open, leave_one_out; with commas.")
-    ] = "single,pair,none,open,leave_one_out",
+        str, typer.Option(help="Of single, pair, none, open, leave_one_out, triple; with commas.")
+    ] = "single,pair,none,open,leave_one_out,triple",
     days: Annotated[
         float | None,
         typer.Option(help="Length of each recording; default 1, or 14 with rows further apart than a minute."),
@@ -58,6 +61,9 @@ def gap_trial(
     unseen: Annotated[
         bool, typer.Option("--unseen", help="Measure the shrinkage on recordings that no diagnosis has seen.")
     ] = False,
+    looked_at: Annotated[
+        bool, typer.Option("--looked-at", help="Take a seed whose cases were looked at; no headline figure.")
+    ] = False,
     diagnoser: Annotated[
         str | None, typer.Option("--diagnoser", metavar="COMMAND", help="In place of wetwell gap diagnose.")
     ] = None,
@@ -67,12 +73,15 @@ def gap_trial(
     import shlex
 
     from wetwell.services.batch.executors import check_scheduler
+    from wetwell.services.trial.looked_at import check_seed
     from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds, parse_rates, parse_values
     from wetwell.services.trial.result import brief
     from wetwell.services.trial.run import run_trial
     from wetwell.sim2real.trial.cases import StoragePlan
+    from wetwell.sim2real.trial.families import PLANTS
 
     check_scheduler(scheduler)
+    check_seed(seed, is_looked_at=looked_at)
     rates_s = parse_rates(every)
     if days is None:
         days = 1.0 if max(rates_s) <= 60 else 14.0
@@ -80,7 +89,7 @@ def gap_trial(
         seed=seed,
         count=cases,
         kinds=parse_kinds(kinds),
-        plants=("fine", "swmm") if plant == "both" else (plant,),
+        plants=PLANTS if plant == "all" else ("fine", "swmm") if plant == "both" else (plant,),
         seconds=round(positive(days, "--days") * 86_400.0),
         storage=StoragePlan(
             rates_s=rates_s,
@@ -94,6 +103,21 @@ def gap_trial(
     )
     result = run_trial(plan, out, workers, scheduler)
     print_batch(result if as_json else brief(result, out), as_json=as_json)
+
+
+@app.command("families")
+def gap_families(
+    trials: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of trials that are scored.")],
+    learnt_on: Annotated[
+        str, typer.Option("--learnt-on", help="Families that constants were learnt on; with commas.")
+    ] = "",
+    as_json: JsonOption = False,
+) -> None:
+    """Put trials of several families side by side: what each scores that was left out of the learning."""
+    from wetwell.services.trial.families import families_table
+
+    named = [part.strip() for part in learnt_on.split(",") if part.strip()]
+    print_result(families_table(trials, named), as_json=as_json)
 
 
 @app.command("diagnose", cls=about("--recording"))

@@ -1,4 +1,4 @@
-"""History: the daemon that keeps it, questions to it, recordings out of it and into it."""
+"""History: the daemon that keeps it, questions to it, recordings out of it and into it, and the log of crews."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -50,7 +50,9 @@ def historian(data: DataOption = None, zenoh: ZenohOption = None, config: Config
 @app.command(cls=about("--station"), rich_help_panel=OPERATE)
 def history(
     station: StationNameOption = "alpha",
-    kind: Annotated[Literal["samples", "verdicts", "alarms", "kpi", "stations"], typer.Option()] = "kpi",
+    kind: Annotated[
+        Literal["samples", "verdicts", "alarms", "episodes", "maintenance", "kpi", "stations"], typer.Option()
+    ] = "kpi",
     last: Annotated[
         str | None, typer.Option(metavar="TIME", help="So long before the newest sample: 90s, 10m, 2h.")
     ] = None,
@@ -62,7 +64,7 @@ def history(
     config: ConfigOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Ask a running historian for samples, verdicts, alarms or figures; `--kind stations` lists what it knows."""
+    """Ask a running historian for what it keeps of a station; `--kind stations` lists the stations."""
     import asyncio
 
     if last is not None and (start is not None or end is not None):
@@ -135,6 +137,79 @@ def import_(
     if read.value != "instant":
         typer.echo(f"{recording}: the history keeps values as instants, these are '{read.value}'", err=True)
     print_result({"station": name, "rows": rows, "new": new, "doubled": rows - new}, as_json=as_json)
+
+
+maintenance_app = typer.Typer(
+    no_args_is_help=True, help="Log what crews did and found, and what the detector saw of it."
+)
+app.add_typer(maintenance_app, name="maintenance", rich_help_panel=OPERATE)
+
+
+@maintenance_app.command(cls=about("--station"))
+def add(
+    station: StationNameOption,
+    asset: Annotated[str, typer.Option("--asset", help="Such as pump:2, main, sensor:pump2_flow_m3h.")],
+    act: Annotated[str, typer.Option("--act", help="Such as pulled, flushed, calibrated, impeller replaced.")],
+    by: Annotated[str, typer.Option("--by", help="Who did it.")],
+    found: Annotated[str, typer.Option("--found", help="Such as rags; nothing, if all was well.")] = "",
+    at: Annotated[str | None, typer.Option("--at", metavar="TIME", help="ISO 8601; default: just now.")] = None,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Enter what a crew did and found; the detector checks it by the runs that follow."""
+    import asyncio
+    import uuid
+
+    from pydantic import ValidationError
+
+    from wetwell.protocols.errors import first_fault
+    from wetwell.protocols.messages.maintenance import MaintenanceAct
+    from wetwell.services.runtime.client import ask_service
+    from wetwell.services.runtime.maintenance import ANSWER_S, entered
+
+    name = station_name(station)
+    fields = {"station": name, "asset": asset, "act": act, "found": found, "by": by, "time": at}
+    try:
+        order = MaintenanceAct.model_validate({"id": uuid.uuid4().hex, **fields})
+    except ValidationError as error:
+        raise ConfigError(f"maintenance: {first_fault(error)}") from error
+    silence = f"station '{name}': no detector"
+    record = asyncio.run(ask_service(settings_of(config, zenoh), lambda bus: entered(bus, order), silence, ANSWER_S))
+    if record.refused:
+        raise ConfigError(record.refused)
+    print_result(record.model_dump(mode="json", exclude_defaults=True), as_json=as_json)
+
+
+@maintenance_app.command("list", cls=about("--station"))
+def list_maintenance(
+    station: StationNameOption,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List what crews did and found, and what the detector saw of it."""
+    import asyncio
+
+    from wetwell.protocols.messages.history import LONGEST_NS
+    from wetwell.services.historian.client import ask_history
+    from wetwell.services.historian.tables import history_table
+
+    span = (-LONGEST_NS, LONGEST_NS)
+    asking = ask_history(
+        settings_of(config, zenoh),
+        station_name(station),
+        "maintenance",
+        last_s=None,
+        span=span,
+        points=1000,
+        raw=False,
+    )
+    answer = asyncio.run(asking)
+    if as_json:
+        print_result({"maintenance": list(answer.messages)}, as_json=True)
+    else:
+        print_result(history_table(answer) if answer.messages else {"maintenance": "none"}, as_json=False)
 
 
 def _span(start: str | None, end: str | None) -> tuple[int, int]:

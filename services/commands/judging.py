@@ -21,6 +21,9 @@ from wetwell.services.commands.options import (
     print_batch,
     print_result,
     reading_of,
+    settings_of,
+    station_name,
+    with_history,
 )
 
 app = typer.Typer()
@@ -31,11 +34,14 @@ def detect(
     recording: RecordingOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Verdicts, one JSON object a line.")],
     station: StationOption,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Page with the episodes that is written.")
+    ] = None,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge a recording with the streaming detector."""
+    """Judge a recording with the streaming detector, and print the faults from their beginning to their end."""
     from wetwell.services.stations import find_station
 
     plant = find_station(station)
@@ -44,7 +50,14 @@ def detect(
 
     for name in rows.ignored:
         typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
-    print_result(judge(plant, rows, out), as_json=as_json)
+    from wetwell.services.reports.episode_table import episode_rows
+
+    told = judge(plant, rows, out, html)
+    found = told["episodes"]
+    shown = (
+        [one.model_dump(mode="json", exclude={"schema_name"}) for one in found] if as_json else episode_rows(found)
+    )
+    print_result(told | {"episodes": shown if as_json or shown else "none"}, as_json=as_json)
 
 
 @app.command(cls=about("--recording"), rich_help_panel=JUDGE)
@@ -68,6 +81,10 @@ def backtest(
     days: Annotated[float | None, typer.Option(help="Length of each; default: the scenario's.")] = None,
     dataset: Annotated[
         Path | None, typer.Option("--dataset", metavar="DIR", help="Folder that `wetwell dataset` has made.")
+    ] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option("--history", metavar="DIR", help="Score a history by what crews found; with --station NAME."),
     ] = None,
     detectors: Annotated[
         str, typer.Option(metavar="NAMES", help="With commas between; `all` for every one.")
@@ -93,6 +110,11 @@ def backtest(
     from wetwell.services.batch.executors import check_scheduler
     from wetwell.services.stations import find_scenario, find_station
 
+    if history is not None:
+        if station is None or recording or scenario or dataset:
+            raise ConfigError("backtest: give --history DIR with --station NAME, and nothing else to score")
+        print_result(_by_crews(history, station_name(station), out), as_json=as_json)
+        return
     check_scheduler(scheduler)
     names = detector_names(detectors)
     length_s = None if days is None else max(round(positive(days, "--days") * 86_400.0), 1)
@@ -111,3 +133,19 @@ def backtest(
     processes = min(workers or cores(), len(sources))
     result = write_backtest(sources, names, out, processes, learning_h * 3600.0, scheduler)
     print_batch(result if as_json else overview(result), as_json=as_json)
+
+
+def _by_crews(folder: Path, station: str, out: Path) -> dict[str, object]:
+    """Score of a history, also as a file."""
+    import json
+
+    from wetwell.protocols.atomic_file import atomic_file
+    from wetwell.services.batch.crews import score_history
+    from wetwell.services.historian.store.opening import open_store
+
+    with open_store(with_history(settings_of(None), folder).historian, alone=False, must_exist=True) as store:
+        score = score_history(store, station)
+    out.mkdir(parents=True, exist_ok=True)
+    with atomic_file(out / "crews.json") as file:
+        file.write((json.dumps(score, indent=2) + "\n").encode())
+    return score

@@ -15,7 +15,14 @@ from starlette.routing import Route
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.services.dashboard.assets import Asset, Assets
-from wetwell.services.dashboard.client import RefusalError, act_on_alarm, history, recording_pieces, set_plant_clock
+from wetwell.services.dashboard.client import (
+    RefusalError,
+    act_on_alarm,
+    enter_act,
+    history,
+    recording_pieces,
+    set_plant_clock,
+)
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.login import Login, holder_in
@@ -62,6 +69,9 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
             Route("/api/stations/{station}", answers.station),
             Route("/api/stations/{station}/history", answers.history),
             Route("/api/stations/{station}/recording.csv", answers.recording),
+            Route("/api/stations/{station}/episodes", answers.episodes),
+            Route("/api/stations/{station}/maintenance", answers.maintenance),
+            Route("/api/stations/{station}/maintenance", answers.enter, methods=["POST"]),
             Route("/api/stations/{station}/alarm-act", answers.act, methods=["POST"]),
             Route("/api/stations/{station}/plant-clock", answers.plant_clock, methods=["POST"]),
             Route("/api/who", login.who),
@@ -135,6 +145,26 @@ class _Answers:
     async def history(self, request: Request) -> Response:
         answer = await history(self._state.asked(), request.path_params["station"], request.query_params)
         return _json(request, answer.encode().decode())
+
+    async def episodes(self, request: Request) -> Response:
+        return await self._messages(request, "episodes")
+
+    async def maintenance(self, request: Request) -> Response:
+        return await self._messages(request, "maintenance")
+
+    async def _messages(self, request: Request, kind: str) -> Response:
+        """What the historian keeps of a kind, by `from` and `to` where they are given, as a list under its name."""
+        names = {"from": "start", "to": "end", "points": "points"}
+        query = {names[name]: value for name, value in request.query_params.items() if name in names}
+        answer = await history(self._state.asked(), request.path_params["station"], query, kind=kind)
+        told = {"station": answer.station, kind: answer.messages} | ({"error": answer.error} if answer.error else {})
+        return _json(request, json.dumps(told))
+
+    async def enter(self, request: Request) -> Response:
+        holder = holder_in(request)
+        by = None if holder is None else holder.name
+        answer = await enter_act(self._state.asked(), request.path_params["station"], await request.body(), by)
+        return JSONResponse(answer)
 
     async def recording(self, request: Request) -> Response:
         name = request.path_params["station"]

@@ -1,5 +1,8 @@
 """What a browser asks of the other services of the site: history, recordings, acts on alarms."""
 
+import asyncio
+import json
+import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
@@ -11,6 +14,7 @@ from wetwell.protocols.bus.keys import alarm_act_key, history_key, plant_clock_k
 from wetwell.protocols.errors import WetwellError, first_fault
 from wetwell.protocols.messages.alarm import AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.maintenance import MaintenanceAct
 from wetwell.protocols.messages.message import MessageError, Number
 from wetwell.protocols.messages.plant_clock import PlantClock, PlantClockOrder
 from wetwell.protocols.messages.readings import row_values
@@ -18,6 +22,7 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.quantities import columns_of
 from wetwell.protocols.recordings.origin import Origin
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.runtime.maintenance import entered
 
 ANSWER_S = 10.0
 ROWS_A_QUESTION = 10_000
@@ -79,6 +84,34 @@ async def set_plant_clock(bus: Bus, station: str, body: bytes) -> dict[str, Any]
             raise RefusalError(400, clock.error)
         return clock.model_dump(mode="json")
     raise RefusalError(504, f"station '{station}' has no simulated plant")
+
+
+async def enter_act(bus: Bus, station: str, body: bytes, by: str | None = None) -> dict[str, Any]:
+    """Record of an act of maintenance: {"asset", "act", "found", "by", "at"} in JSON, by whom it says or who asks.
+
+    Raises
+    ------
+    RefusalError
+        If the body is no act, or the detector does not know the asset, or nobody answers.
+    """
+    try:
+        fields = json.loads(body)
+        if not isinstance(fields, dict):
+            raise RefusalError(400, f"act: got {type(fields).__name__}, must be an object")
+        named = {name: fields[name] for name in ("asset", "act", "found", "by") if name in fields}
+        named |= {"id": uuid.uuid4().hex, "station": station, "time": fields.get("at")}
+        act = MaintenanceAct.model_validate(named if by is None else named | {"by": by})
+    except ValidationError as error:
+        raise RefusalError(400, first_fault(error)) from error
+    except ValueError as error:
+        raise RefusalError(400, f"act: is no JSON: {error}") from error
+    try:
+        record = await asyncio.wait_for(entered(bus, act), ANSWER_S)
+    except TimeoutError:
+        raise RefusalError(504, "the detector does not answer") from None
+    if record.refused:
+        raise RefusalError(400, record.refused)
+    return record.model_dump(mode="json")
 
 
 async def history(bus: Bus, station: str, query: Mapping[str, str], **more: Any) -> History:

@@ -12,6 +12,7 @@ from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SnapshotError
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.messages.maintenance import MaintenanceRecord
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.state_file import put_aside, read_kept
 
@@ -22,10 +23,11 @@ CHECKPOINT_SCHEMA = "wetwell.detector-checkpoint/1"
 
 @dataclass(frozen=True)
 class Told:
-    """What was told: answers to the orders that were carried out, by their ids, and the last verdict of each pump."""
+    """What was told: answers to orders that were carried out, by their ids, last verdicts, acts of maintenance."""
 
     answers: Mapping[str, Verdict]
     verdicts: Sequence[Verdict] = ()
+    acts: Sequence[MaintenanceRecord] = ()
 
 
 class Checkpoint:
@@ -76,6 +78,7 @@ class Checkpoint:
             "schema": CHECKPOINT_SCHEMA,
             "answers": {name: answer.model_dump(mode="json") for name, answer in told.answers.items()},
             "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
+            "acts": [record.model_dump(mode="json") for record in told.acts],
         }
         return self._encoded, json.dumps(head).encode() + b"\n" + detector.snapshot()
 
@@ -100,7 +103,9 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         if not isinstance(header, dict) or header.get("schema") != CHECKPOINT_SCHEMA:
             return Told({}), data
         answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
-        return Told(answers, [Verdict.model_validate(verdict) for verdict in header["verdicts"]]), rest
+        verdicts = [Verdict.model_validate(verdict) for verdict in header["verdicts"]]
+        acts = [MaintenanceRecord.model_validate(record) for record in header.get("acts", [])]
+        return Told(answers, verdicts, acts), rest
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
 

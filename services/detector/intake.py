@@ -3,10 +3,10 @@
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from wetwell.protocols.bus.interface import ALL_KEPT, Bus
-from wetwell.protocols.bus.keys import order_key, sample_block_key, sample_key
+from wetwell.protocols.bus.keys import maintenance_act_key, order_key, sample_block_key, sample_key
 from wetwell.protocols.messages.decoding import SampleMessage, samples_of
 from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.protocols.messages.message import MessageError
@@ -86,7 +86,10 @@ class Intake:
             for judge in judges
             for key, kind in ((sample_key, Sample), (sample_block_key, SampleBlock))
         }
-        self._obeying = {order_key(judge.station): judge for judge in judges}
+        self._obeying: dict[str, Callable[[bytes], None]] = {}
+        for judge in judges:
+            self._obeying[order_key(judge.station)] = judge.handle_order
+            self._obeying[maintenance_act_key(judge.station)] = judge.handle_maintenance
         room = Room()
         self._behind = {judge: Waiting(room) for judge in judges if judge.is_restored}
         self._passed_over = 0
@@ -126,7 +129,7 @@ class Intake:
     async def _obey(self) -> None:
         while True:
             for key, payload in await self._orders.receive():
-                self._obeying[key].handle_order(payload)
+                self._obeying[key](payload)
 
     async def _backfill(self, judge: StationDetector, turn: asyncio.Semaphore) -> None:
         """Take what was missed, then what came meanwhile.

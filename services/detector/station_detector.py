@@ -12,8 +12,9 @@ import numpy as np
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import Block
 from wetwell.protocols.bus.interface import Bus
-from wetwell.protocols.bus.keys import verdict_key
+from wetwell.protocols.bus.keys import maintenance_key, verdict_key
 from wetwell.protocols.messages.decoding import SampleMessage, decoded
+from wetwell.protocols.messages.maintenance import MaintenanceAct, MaintenanceRecord
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.sample import Sample
@@ -22,12 +23,14 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint, Told
+from wetwell.services.detector.maintenance_log import MaintenanceLog
 from wetwell.services.detector.model_publisher import ModelPublisher
 from wetwell.services.detector.quarantine import Quarantine
 
 log = logging.getLogger(__name__)
 
 VERDICT_HISTORY = 100
+ACT_HISTORY = 100
 ORDERS = 100
 """Orders that are remembered with their answers, so that one that is sent again is not carried out twice."""
 
@@ -73,6 +76,10 @@ class StationDetector:
         self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
         self._heard_s = time.monotonic()
+        self._acts_publisher = bus.publisher(maintenance_key(station.name), history=ACT_HISTORY)
+        self._maintenance = MaintenanceLog(
+            station.name, self.detector, self._publish_act, () if told is None else told.acts
+        )
         if told is not None:
             log.info("station '%s': goes on from its checkpoint", self.station)
             self._answers.update(told.answers)
@@ -119,7 +126,7 @@ class StationDetector:
             await asyncio.to_thread(self._checkpoint.write, *self._checkpoint.encode(self.detector, self._told()))
 
     def _told(self) -> Told:
-        return Told(self._answers, list(self._last.values()))
+        return Told(self._answers, list(self._last.values()), list(self._maintenance.records.values()))
 
     def figures(self) -> dict[str, float]:
         """Health figures."""
@@ -195,6 +202,26 @@ class StationDetector:
         self.keep()  # what was answered must be true after a kill
         self._publish(self._answers[order.id])
 
+    def handle_maintenance(self, payload: bytes) -> None:
+        """Enter an act of a crew, once; one that is none is counted and left out."""
+        try:
+            act = MaintenanceAct.decode(payload)
+        except MessageError as error:
+            self._counts["malformed_acts"] += 1
+            log.warning("station '%s': %s", self.station, error)
+            return
+        if act.station != self.station:
+            self._counts["foreign_acts"] += 1
+            log.warning("station '%s': act on station '%s' refused", self.station, act.station)
+            return
+        for verdict in self._maintenance.enter(act):
+            self._publish(verdict)
+        self.keep()  # what was entered must be known after a kill
+
+    def _publish_act(self, record: MaintenanceRecord) -> None:
+        log.info("station '%s': %s %s by %s: %s", self.station, record.asset, record.act, record.by, record.result)
+        self._acts_publisher.put(record.encode())
+
     def _publish(self, verdict: Verdict) -> None:
         self._counts["verdicts"] += 1
         self._publishers[verdict.pump - 1].put(verdict.encode())
@@ -203,6 +230,7 @@ class StationDetector:
         if last is None or last.state != verdict.state:
             log.info("station '%s' pump %d: %s", self.station, verdict.pump, verdict.state)
         self._last[verdict.pump] = verdict
+        self._maintenance.follow(verdict)
 
 
 def behind(last: tuple[int, int], samples: list[Sample]) -> list[Sample]:

@@ -14,7 +14,7 @@ from distributed import Client, Future, LocalCluster, fire_and_forget
 from wetwell.protocols.bus.interface import Bus, Publisher
 from wetwell.protocols.bus.keys import SITE, plan_key
 from wetwell.protocols.errors import LinkError
-from wetwell.protocols.messages.fleet import Plan
+from wetwell.protocols.messages.order import Plan
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.fleet.inventory import Inventory
 from wetwell.services.fleet.placement import moves, shard_of

@@ -7,8 +7,8 @@ from distributed import secede
 
 from wetwell.protocols.bus.interface import Bus, Subscription
 from wetwell.protocols.bus.keys import SITE, plan_key
-from wetwell.protocols.messages.fleet import Plan
 from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.order import Plan
 from wetwell.services.detector.daemon import judge_all
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.lifecycle import report_health

@@ -8,6 +8,7 @@ from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.history import History, HistoryQuery, Kind
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.historian.episodes import episodes_between
 from wetwell.services.historian.hours import Hours, joined_hours
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
@@ -34,9 +35,15 @@ def _answer(store: Store, station: str, query: HistoryQuery) -> History:
         )
     if station not in spans:
         return History(station=station, kind=query.kind, error=f"station '{station}' is not known")
-    if query.kind in ("verdicts", "alarms"):
+    if query.kind == "episodes":
+        found = episodes_between(store, station, query.start, query.end)[-query.points :]
+        return History(station=station, kind="episodes", messages=tuple(one.model_dump(mode="json") for one in found))
+    if query.kind in ("verdicts", "alarms", "maintenance"):
         payloads = store.events(query.kind, station, query.start, query.end, query.points)
-        return History(station=station, kind=query.kind, messages=tuple(map(json.loads, payloads)))
+        messages = [json.loads(payload) for payload in payloads]
+        if query.kind == "maintenance":  # of each act the last that was told of it
+            messages = list({message["id"]: message for message in messages}.values())
+        return History(station=station, kind=query.kind, messages=tuple(messages))
     span = spans[station]
     start_ns, end_ns = max(query.start, span.first_ns), min(query.end, span.last_ns + 1)
     if start_ns >= end_ns:

@@ -4,7 +4,16 @@ import asyncio
 import logging
 
 from wetwell.protocols.bus.interface import ALL_KEPT, Bus, Request, Subscription
-from wetwell.protocols.bus.keys import ROOT, SITE, alarm_key, history_key, sample_block_key, sample_key, verdict_key
+from wetwell.protocols.bus.keys import (
+    ROOT,
+    SITE,
+    alarm_key,
+    history_key,
+    maintenance_key,
+    sample_block_key,
+    sample_key,
+    verdict_key,
+)
 from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
@@ -16,6 +25,7 @@ log = logging.getLogger(__name__)
 
 VERDICT_HISTORY = 100
 ALARM_HISTORY = 1
+MAINTENANCE_HISTORY = 100
 CAPACITY = 200_000
 """Most messages of one kind that wait to be taken; what publishers hold comes when there is room."""
 
@@ -57,6 +67,7 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
         "blocks": bus.subscribe(sample_block_key("*"), history=ALL_KEPT, capacity=CAPACITY),
         "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
         "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
+        "maintenance": bus.subscribe(maintenance_key("*"), history=MAINTENANCE_HISTORY, capacity=CAPACITY),
     }
     questions = bus.answer(history_key("*"))
 

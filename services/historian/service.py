@@ -4,12 +4,13 @@ import logging
 import re
 import threading
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.history import LONGEST_NS
+from wetwell.protocols.messages.maintenance import MaintenanceRecord
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
@@ -17,6 +18,7 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.answers import answer
+from wetwell.services.historian.episodes import EpisodeKeeper
 from wetwell.services.historian.rows import SampleRow, pack, pack_block
 from wetwell.services.historian.spool import Row, Spool, size_of
 from wetwell.services.historian.store.interface import Batch, EventRow, Store, StoreError
@@ -27,8 +29,15 @@ MAX_NAME = 64
 MAX_BATCH = 20_000
 """Samples, verdicts and alarms of one transaction."""
 
-PayloadKind = Literal["samples", "blocks", "verdicts", "alarms"]
+PayloadKind = Literal["samples", "blocks", "verdicts", "alarms", "maintenance"]
 """`samples` come one in a payload, `blocks` are many samples of a station in one."""
+
+
+_EVENTS: Mapping[str, type[Verdict | Alarm | MaintenanceRecord]] = {
+    "verdicts": Verdict,
+    "alarms": Alarm,
+    "maintenance": MaintenanceRecord,
+}
 
 
 class Historian:
@@ -51,6 +60,7 @@ class Historian:
 
     def __init__(self, store: Store, *, spool_rows: int = 500_000) -> None:
         self._store = store
+        self._episodes = EpisodeKeeper(store)
         self._spool_rows = spool_rows
         self._spool = Spool(spool_rows)
         self._counts: Counter[str] = Counter(
@@ -64,13 +74,28 @@ class Historian:
     def handle(self, kind: PayloadKind, payload: bytes) -> None:
         """Handle one payload; what is not of its kind is counted as `malformed` and left out."""
         try:
-            rows = _rows(kind, payload)
+            rows = self._rows(kind, payload)
         except MessageError as error:
             self._counts["malformed"] += 1
             log.warning("%s", error)
             return
         self._counts["taken"] += size_of(rows)
         self._spool.put(rows)
+
+    def _rows(self, kind: PayloadKind, payload: bytes) -> Sequence[Row]:
+        """Rows of a payload; a verdict also brings those of the episodes that it changes.
+
+        Raises
+        ------
+        MessageError
+            If it is not what its key promises.
+        """
+        if kind == "samples" or kind == "blocks":  # noqa: PLR1714 - so its type is that of an event behind
+            return _of_samples(kind, payload)
+        event = _EVENTS[kind].decode(payload)
+        _check(event.station, event.time)
+        row = EventRow(kind, event.station, event.time, payload)
+        return [row, *(self._episodes.rows(event) if isinstance(event, Verdict) else ())]
 
     def commit(self, now_ns: int) -> int:
         """Give what waits to the store, and return how many samples, verdicts and alarms are now acknowledged.
@@ -143,25 +168,21 @@ class Historian:
         self._is_failing = True
 
 
-def _rows(kind: PayloadKind, payload: bytes) -> Sequence[Row]:
-    """Rows of a payload.
+def _of_samples(kind: PayloadKind, payload: bytes) -> Sequence[Row]:
+    """Rows of samples.
 
     Raises
     ------
     MessageError
-        If it is not what its key promises.
+        If the payload is not what its key promises.
     """
     if kind == "samples":
         sample = Sample.decode(payload)
         _check(sample.station, sample.time)
         return (pack(sample.station, sample),)
-    if kind == "blocks":
-        block = SampleBlock.decode(payload)
-        _check(block.station, max(block.time, key=abs))
-        return pack_block(block)
-    event = Verdict.decode(payload) if kind == "verdicts" else Alarm.decode(payload)
-    _check(event.station, event.time)
-    return (EventRow(kind, event.station, event.time, payload),)
+    block = SampleBlock.decode(payload)
+    _check(block.station, max(block.time, key=abs))
+    return pack_block(block)
 
 
 def _check(station: str, time_ns: int) -> None:

@@ -8,6 +8,8 @@ from wetwell.protocols.timestamps import to_iso
 _SHOWN = {
     "verdicts": ("time", "pump", "state"),
     "alarms": ("time", "id", "priority", "state", "by", "text"),
+    "episodes": ("asset", "state", "stage", "from", "to", "advice", "cost"),
+    "maintenance": ("time", "asset", "act", "found", "by", "result"),
     "stations": ("station", "first", "last"),
 }
 

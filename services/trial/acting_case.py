@@ -6,11 +6,10 @@ import numpy as np
 
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.recordings.recording import Recording
-from wetwell.services.trial.swmm_plant import run_swmm
-from wetwell.sim2real.trial.cases import PlantName, TrialCase
-from wetwell.sim2real.truth import truth_plant
+from wetwell.services.trial.plants import passage_of
+from wetwell.sim2real.trial.cases import TrialCase
+from wetwell.sim2real.trial.families import FAMILIES, PlantName
 from wetwell.sim2real.truth.case import TruthCase
-from wetwell.sim2real.truth.deviations import DEVIATIONS
 from wetwell.sim2real.truth.storage import EVERY_SECOND, stored
 
 ATTEMPTS = 8
@@ -45,13 +44,13 @@ def acting_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
 
 def recording_of(truth: TruthCase, plant: PlantName) -> Recording:
     """What a plant records of a truth."""
-    return (truth_plant.run if plant == "fine" else run_swmm)(truth, truth=False)
+    return passage_of(truth, plant).recording(truth=False)
 
 
 def idle_name(truth: TruthCase, plant: PlantName, recording: Recording) -> str:
     """First deviation without which the plant records the same, value by value; empty if all act."""
     for deviation in truth.deviations:
-        if DEVIATIONS[deviation.name].may_never_act:
+        if FAMILIES[plant].kinds[deviation.name].may_never_act:
             others = tuple(other for other in truth.deviations if other is not deviation)
             if _is_same(recording, recording_of(replace(truth, deviations=others), plant)):
                 return deviation.name

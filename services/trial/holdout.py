@@ -13,12 +13,11 @@ import numpy as np
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.services.batch.executors import let_interrupts
+from wetwell.services.trial.plants import passage_of
 from wetwell.services.trial.sealed_case import RECORDING_FILE, STATION_FILE
-from wetwell.services.trial.swmm_plant import swmm_passage_of
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.holdout import gap, shrinkage, whitened
 from wetwell.sim2real.trial.regressor import corrected
-from wetwell.sim2real.truth.truth_plant import passage_of
 
 HOLDOUT_FILE = "held_out.json"
 _TIMEOUT_S = 600.0
@@ -42,7 +41,7 @@ def measure_holdout(case: TrialCase, published: Path, reports: Path, command: Se
         return
     truth = case.truth()
     holdout_truth = replace(truth, seed=truth.seed + 1)
-    passage = (passage_of if case.plant == "fine" else swmm_passage_of)(holdout_truth)
+    passage = passage_of(holdout_truth, case.plant)
     recorded, oracle = passage.recording(truth=False), passage.oracle()
     with tempfile.TemporaryDirectory(prefix="held-out-") as room:
         holdout = Path(room) / "unseen.parquet"

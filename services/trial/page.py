@@ -3,9 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wetwell.services.reports.charts import Section, bar_chart, heat_map, page, paragraph, table
+from wetwell.services.reports.charts import Section, Series, bar_chart, heat_map, line_chart, page, paragraph, table
 
-SHARES = ("verdict_right", "top_1", "top_2", "component_right", "false_attribution", "interval_coverage")
+SHARES = (
+    "verdict_right",
+    "exact_set",
+    "top_1",
+    "top_2",
+    "component_right",
+    "false_attribution",
+    "interval_coverage",
+)
 
 
 def trial_page(result: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) -> str:
@@ -23,6 +31,10 @@ def trial_page(result: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) ->
         f"{' and '.join(result['plants'])}; wetwell {result['version']}, {result['date']}. The diagnosis saw station "
         "file and recording only; the labels were sealed before and opened after it."
     )
+    if result["looked_at"]:
+        intro += (
+            f" The cases of this seed were looked at, so that these are no headline figures: {result['looked_at']}."
+        )
     kinds = result["kinds_scored"] | {"all": result["all"]}
     return page(
         f"Trial of seed {result['seed']}",
@@ -30,6 +42,11 @@ def trial_page(result: Mapping[str, Any], cases: Sequence[Mapping[str, Any]]) ->
             Section("What was tried", paragraph(intro)),
             Section("Shares", _bars(kinds) + _share_table("kind", kinds)),
             Section("By plant", _share_table("plant", result["plants_scored"])),
+            *(
+                [Section("Probabilities", _reliability(result["reliability"]))]
+                if result["reliability"]["all"]
+                else []
+            ),
             *(Section(f"By {name}", _split(name, groups)) for name, groups in result["splits"].items()),
             Section("Truth against answer", _confusion("all cases", result["confusion"])),
             Section("Single effects", _share_table("effect", result["effects_scored"])),
@@ -59,7 +76,7 @@ def _confusion(which: str, matrix: Mapping[str, Any]) -> str:
 
 
 def _bars(groups: Mapping[str, Mapping[str, Any]]) -> str:
-    shown = SHARES[:4]
+    shown = SHARES[:5]
     heights = {name: [_value(scores[name]) for scores in groups.values()] for name in shown}
     return bar_chart("Share of right answers", list(groups), heights, y_label="1")
 
@@ -79,6 +96,40 @@ def _share_table(title: str, groups: Mapping[str, Mapping[str, Any]]) -> str:
     ]
     columns = [title, "cases", "failed", "not tested", *SHARES, "median shrinkage", "median parameter error"]
     return table([column.replace("_", " ") for column in columns], rows)
+
+
+def _reliability(groups: Mapping[str, Any]) -> str:
+    """Diagram of what was said and how often it was right, and the error of each group."""
+    bins = groups["all"]["bins"]
+    diagram = line_chart(
+        "Share right against the probability that was told: a calibrated one lies on the line",
+        [
+            Series("right", [one["said"] for one in bins], [one["right"] for one in bins]),
+            Series("calibrated", [0.0, 1.0], [0.0, 1.0]),
+        ],
+        x_label="probability of the answer given most",
+        y_label="share right",
+    )
+    rows = [
+        [f"{one['from']:.1f} to {one['to']:.1f}", one["cases"], f"{one['said']:.2f}", f"{one['right']:.2f}"]
+        for one in bins
+    ]
+    errors = [
+        [
+            group,
+            found["cases"],
+            f"{found['calibration_error']:.3f}",
+            f"{found['chance']:.3f}",
+            f"{found['brier']:.3f}",
+        ]
+        for group, found in groups.items()
+        if found
+    ]
+    return (
+        diagram
+        + table(["probability", "cases", "mean told", "share right"], rows)
+        + table(["cases of", "cases", "expected calibration error", "by chance alone", "Brier score"], errors)
+    )
 
 
 def _controls(controls: Mapping[str, Any]) -> str:
@@ -111,7 +162,7 @@ def _holdout(figures: Mapping[str, Any]) -> str:
 
 def _cases(cases: Sequence[Mapping[str, Any]]) -> str:
     return table(
-        ["case", "kind", "plant", "truth", "told", "verdict right", "component right", "shrinkage"],
+        ["case", "kind", "plant", "truth", "told", "verdict right", "exact set", "component right", "shrinkage"],
         [
             [
                 case["label"]["case"],
@@ -120,6 +171,7 @@ def _cases(cases: Sequence[Mapping[str, Any]]) -> str:
                 ", ".join(case["label"]["names"]),
                 ", ".join(case["told_names"]) or case["told"],
                 case["verdict_right"],
+                case["exact_set"],
                 case["component_right"],
                 case["shrinkage"],
             ]

@@ -11,17 +11,18 @@ from typing import Any, get_args
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.services.trial.looked_at import reason_to_refuse
 from wetwell.sim2real.trial.cases import (
     DEFAULT_STORAGE,
     KINDS,
     CaseKind,
-    PlantName,
     StoragePlan,
     TrialCase,
     trial_case,
 )
+from wetwell.sim2real.trial.families import PlantName
 
-TRIAL_SCHEMA = "wetwell.trial/3"
+TRIAL_SCHEMA = "wetwell.trial/4"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
 SLOWEST_S = 3600
 """Rows further apart are daily figures rather than a recording. [s]"""
@@ -70,6 +71,7 @@ class TrialPlan:
             "schema": TRIAL_SCHEMA,
             "version": version("wetwell"),
             "seed": self.seed,
+            "looked_at": reason_to_refuse(self.seed),
             "kinds": list(self.kinds),
             "plants": list(self.plants),
             "length_s": self.seconds,

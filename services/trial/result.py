@@ -16,6 +16,8 @@ from wetwell.services.trial.holdout import holdout_summary
 from wetwell.services.trial.page import trial_page
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.sealed_case import open_case
+from wetwell.sim2real.trial.cases import KNOWN_KINDS
+from wetwell.sim2real.trial.reliability import reliability
 from wetwell.sim2real.trial.scores import CaseScore, chance_level, confusion, named_shrinkage, score_case, summary
 
 
@@ -31,7 +33,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         again = [
             score_case(label, answer_in(folder / RECALIBRATED / label.case))
             for label, _ in pairs
-            if label.kind in {"single", "pair"}
+            if label.kind in KNOWN_KINDS
         ]
         controls["recalibration_only"] = summary(again)
     result = plan.header | {
@@ -40,6 +42,14 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
         "failed": [{"case": name, "error": failed[name].error} for name in sorted(failed)],
         "all": summary(scores),
         "kinds_scored": _grouped(scores, lambda score: score.label.kind),
+        "reliability": {
+            "all": _reliability(scores),
+            **{group: _reliability(ours) for group, ours in _groups(scores, lambda score: score.label.plant).items()},
+            **{
+                group: _reliability(ours)
+                for group, ours in _groups(scores, lambda score: score.label.metering).items()
+            },
+        },
         "named_shrinkage": named_shrinkage(scores),
         "plants_scored": _grouped(scores, lambda score: score.label.plant),
         "effects_scored": _grouped(
@@ -49,6 +59,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
             "rate": _split(scores, lambda score: score.label.rate),
             "inflow": _split(scores, lambda score: score.label.metering),
             "noise": _split(scores, lambda score: score.label.noise),
+            "pumps": _split(scores, lambda score: score.label.pumps),
         },
         "unseen": holdout_summary([folder / REPORTS / name for name in names]),
         "controls": controls,
@@ -64,7 +75,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
 
 def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
     """What is printed for people: right answers of how many, by kind, rate, metering and noise."""
-    names = ("verdict_right", "top_1", "top_2", "component_right", "false_attribution")
+    names = ("verdict_right", "exact_set", "top_1", "top_2", "component_right", "false_attribution")
     split = {group: parts["scores"] for groups in result["splits"].values() for group, parts in groups.items()}
     rows = [
         {"kind": kind, "cases": scores["cases"], "not_tested": scores["not_tested"]}
@@ -75,6 +86,7 @@ def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
         "page": str(folder / "trial.html"),
         "without an answer": result["all"]["failed"],
         "failed": result["failed"],
+        "calibration error": (result["reliability"]["all"] or {}).get("calibration_error"),
         "scores": rows,
     }
 
@@ -92,5 +104,12 @@ def _split(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict
 
 
 def _grouped(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, Any]:
-    groups = sorted({key(score) for score in scores})
-    return {group: summary([score for score in scores if key(score) == group]) for group in groups}
+    return {group: summary(ours) for group, ours in _groups(scores, key).items()}
+
+
+def _groups(scores: Sequence[CaseScore], key: Callable[[CaseScore], str]) -> dict[str, list[CaseScore]]:
+    return {group: [one for one in scores if key(one) == group] for group in sorted({key(one) for one in scores})}
+
+
+def _reliability(scores: Sequence[CaseScore]) -> dict[str, Any] | None:
+    return reliability([score.said for score in scores if score.said is not None])

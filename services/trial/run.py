@@ -20,7 +20,7 @@ from wetwell.services.trial.holdout import measure_holdout
 from wetwell.services.trial.plan import TrialPlan, take_folder
 from wetwell.services.trial.result import score_trial
 from wetwell.services.trial.sealed_case import is_published, open_case, publish, published_in
-from wetwell.sim2real.trial.cases import TrialCase
+from wetwell.sim2real.trial.cases import KNOWN_KINDS, TrialCase
 
 
 def run_trial(plan: TrialPlan, folder: Path, workers: int, scheduler: str | None = None) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def run_trial(plan: TrialPlan, folder: Path, workers: int, scheduler: str | None
         failed.update(found)
 
     cases = [plan.case(number) for number in range(plan.count)]
-    deviating = [case for case in cases if case.kind in {"single", "pair"}]
+    deviating = [case for case in cases if case.kind in KNOWN_KINDS]
     jobs = [(case, REPORTS) for case in cases]
     each("cases", partial(_publish, folder), jobs, lambda job: is_published(job[0], folder))
     if plan.has_recalibration:

@@ -55,7 +55,7 @@ def publish(case: TrialCase, folder: Path) -> None:
         "names": list(case.names),
         "components": list(case.components),
         "parameters": {deviation.name: dict(deviation.parameters) for deviation in truth.deviations},
-        "inherent": [*case.inherent, *truth.storage.inherent],
+        "inherent": [*case.family.inherent, *truth.storage.inherent],
         "truth_seed": truth.seed,
         "slow_share": truth.slow_share,
         "storage": {**asdict(truth.storage), "report_s": _finite(truth.storage.report_s)},

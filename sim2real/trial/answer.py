@@ -51,6 +51,14 @@ class NotTested(_Part):
     reason: str = ""
 
 
+class GivenProbability(_Part):
+    """An answer of the posterior: none, unknown, or a set of effects."""
+
+    verdict: Literal["effect", "none", "unknown"]
+    effects: tuple[str, ...] = ()
+    probability: Annotated[float, Field(ge=0.0, le=1.0)]
+
+
 class Gap(_Part):
     """Whitened gap before and after, and its floor."""
 
@@ -69,6 +77,12 @@ class Answer(_Part):
     candidates: tuple[Candidate, ...] = ()
     gap: Gap = Gap()
     not_tested: tuple[NotTested, ...] = ()
+    posterior: tuple[GivenProbability, ...] = ()
+
+    @property
+    def sets(self) -> list[frozenset[str]]:
+        """Of each told effect its name and those that it declares equivalent."""
+        return [frozenset({effect.name, *effect.equivalent}) for effect in self.effects]
 
     @property
     def untested(self) -> frozenset[str]:

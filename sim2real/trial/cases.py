@@ -12,14 +12,11 @@ import numpy as np
 
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.sim2real.trial.families import FAMILIES, Family, PlantName
 from wetwell.sim2real.truth.case import TruthCase
-from wetwell.sim2real.truth.deviations import DEVIATIONS, LIBRARY, OPEN
-from wetwell.sim2real.truth.sampling import RAMPS_S, case_of
 from wetwell.sim2real.truth.storage import storage_of
-from wetwell.sim2real.truth.swmm_input import SWMM_LIBRARY, SWMM_OPEN, SWMM_RAMPS_S
 
-CaseKind = Literal["single", "pair", "none", "open", "leave_one_out"]
-PlantName = Literal["fine", "swmm"]
+CaseKind = Literal["single", "pair", "none", "open", "leave_one_out", "triple"]
 KINDS: tuple[CaseKind, ...] = get_args(CaseKind)
 VERDICT_OF: dict[CaseKind, str] = {
     "single": "effect",
@@ -27,13 +24,12 @@ VERDICT_OF: dict[CaseKind, str] = {
     "none": "none",
     "open": "unknown",
     "leave_one_out": "unknown",
+    "triple": "effect",
 }
-_HELD: dict[tuple[PlantName, bool], tuple[str, ...]] = {
-    ("fine", False): LIBRARY,
-    ("fine", True): OPEN,
-    ("swmm", False): SWMM_LIBRARY,
-    ("swmm", True): SWMM_OPEN,
-}
+KNOWN_KINDS: tuple[CaseKind, ...] = ("single", "pair", "triple")
+"""Kinds whose truth the library holds."""
+_BESIDE: dict[CaseKind, int] = {"pair": 1, "triple": 2}
+"""How many effects stand beside the first."""
 SLOW_SHARE = 0.2
 """Share of the variance of the sensors' noise that is slow, in every other case."""
 
@@ -112,12 +108,12 @@ class TrialCase:
     @property
     def components(self) -> tuple[str, ...]:
         """Components in which its deviations lie."""
-        return tuple(DEVIATIONS[name].component for name in self.names)
+        return tuple(self.family.kinds[name].component for name in self.names)
 
     @property
-    def inherent(self) -> tuple[str, ...]:
-        """Effects that its plant always has to some degree: the mains of SWMM are not without inertia."""
-        return ("water_inertia",) if self.plant == "swmm" else ()
+    def family(self) -> Family:
+        """Of its plant."""
+        return FAMILIES[self.plant]
 
     @property
     def without(self) -> tuple[str, ...]:
@@ -133,15 +129,13 @@ class TrialCase:
             rng = _stream(self.seed, self.number, self.attempt)
         else:
             rng = _stream(self.seed, self.number)
-            if self.kind == "pair":
-                _other(self.names[0], _HELD[self.plant, False], rng)  # this stream has drawn the name, too
-        truth = case_of(
+            _others(self.names[:1], _BESIDE.get(self.kind, 0), self.family, rng)  # this stream has drawn them, too
+        truth = self.family.case_of(
             self.names,
             f"station-{rng.integers(16**6):06x}",
             rng,
             seconds=self.seconds,
             slow_share=SLOW_SHARE if rng.random() < 0.5 else 0.0,
-            ramps_s=SWMM_RAMPS_S if self.plant == "swmm" else RAMPS_S,
             every_s=self.every_s,
         )
         storage = storage_of(
@@ -205,16 +199,20 @@ def trial_case(
 def _names(seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int) -> tuple[str, ...]:
     if kind == "none":
         return ()
-    held = _HELD[plant, kind == "open"]
+    family = FAMILIES[plant]
+    held = family.open if kind == "open" else family.library
     order = _stream(seed, KINDS.index(kind), len(held), 0)
     first = held[int(order.permutation(len(held))[turn % len(held)])]
-    return (first, _other(first, held, _stream(seed, number))) if kind == "pair" else (first,)
+    return _others((first,), _BESIDE.get(kind, 0), family, _stream(seed, number))
 
 
-def _other(first: str, held: tuple[str, ...], rng: np.random.Generator) -> str:
-    """Second name of a pair, which lies in another component."""
-    others = [name for name in held if DEVIATIONS[name].component != DEVIATIONS[first].component]
-    return others[int(rng.integers(len(others)))]
+def _others(names: tuple[str, ...], more: int, family: Family, rng: np.random.Generator) -> tuple[str, ...]:
+    """Names and as many more, each in a component of its own."""
+    for _ in range(more):
+        taken = {family.kinds[name].component for name in names}
+        others = [name for name in family.library if family.kinds[name].component not in taken]
+        names = (*names, others[int(rng.integers(len(others)))])
+    return names
 
 
 _STORAGE, _METERS = (0, 1), (0, 2)

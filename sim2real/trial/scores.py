@@ -10,7 +10,9 @@ import numpy as np
 from wetwell.protocols.arrays import Integers
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.sim2real.trial.answer import Answer, ToldEffect
-from wetwell.sim2real.trial.cases import VERDICT_OF, CaseKind, PlantName
+from wetwell.sim2real.trial.cases import KNOWN_KINDS, VERDICT_OF, CaseKind
+from wetwell.sim2real.trial.exact import has_all, is_exact_set
+from wetwell.sim2real.trial.families import PlantName
 
 FAILED = "failed"
 NOT_TESTED = "not tested"
@@ -69,6 +71,12 @@ class Label:
         """Of the sensors."""
         return "slow noise" if self.slow_share > 0.0 else "white noise"
 
+    @property
+    def pumps(self) -> str:
+        """Whether an effect is confined to one pump."""
+        told = [values["pump"] for values in self.parameters.values() if "pump" in values]
+        return "no effect of pumps" if not told else "one pump" if any(told) else "all pumps"
+
     def less(self, names: frozenset[str]) -> Self:
         """The label without some of its effects."""
         kept = [(name, at) for name, at in zip(self.names, self.components, strict=True) if name not in names]
@@ -91,6 +99,9 @@ class CaseScore:
     told first is one of them, and `top_2` whether both are told or declared equivalent. Where the truth is not in
     the library, `top_1` and `top_2` do not arise, and "unknown" or a declared equivalent is right.
 
+    `exact_set` asks whether nothing is missing and nothing false beside it. `said` is the probability of the answer
+    that the posterior gives most, and whether that very set is the truth.
+
     A true effect that the answer lists as not tested is neither right nor wrong: of a pair the other is asked for.
     Where none is left, "none" is right, "unknown" neither, and the rest does not arise.
     """
@@ -103,8 +114,10 @@ class CaseScore:
     top_2: bool | None
     component_right: bool | None
     false_attribution: bool | None
+    exact_set: bool | None
     shrinkage: float | None
     parameters: tuple[dict[str, Any], ...]
+    said: tuple[float, bool] | None = None
     not_tested: tuple[str, ...] = ()
 
     @property
@@ -138,25 +151,29 @@ def score_case(label: Label, answer: Answer | None, whole: Answer | None = None)
             top_2=None,
             component_right=None,
             false_attribution=None,
+            exact_set=None,
             shrinkage=None,
             parameters=(),
             not_tested=not_tested,
         )
     asked = label.less(told_untested)
-    is_known = label.kind in {"single", "pair"}
+    is_known = label.kind in KNOWN_KINDS
     place = answer.where[0].component if answer and answer.where else ""
     expected = VERDICT_OF[label.kind]
     told_by = [one for one in (answer, whole) if one and names]
     named_equivalent = any(_is_equivalent(names[0], asked.names, one) for one in told_by)
+    verdict_right = told == expected or (label.kind == "leave_one_out" and named_equivalent)
     return CaseScore(
         label=label,
         told=told,
         told_names=names,
-        verdict_right=told == expected or (label.kind == "leave_one_out" and named_equivalent),
+        verdict_right=verdict_right,
         top_1=bool(names and names[0] in asked.names) if is_known else None,
         top_2=_top_2(asked, answer if names else None) if is_known else None,
         component_right=place in asked.components if asked.names else None,
         false_attribution=told == "effect" if label.kind == "none" else None,
+        exact_set=bool(answer and names and is_exact_set(answer.sets, asked.names)) if is_known else verdict_right,
+        said=_said(label, asked, answer) if answer else None,
         shrinkage=answer.gap.shrinkage if answer and is_known and told == "effect" else 0.0 if is_known else None,
         parameters=tuple(_parameter_rows(asked, answer)) if answer and is_known else (),
         not_tested=not_tested,
@@ -186,13 +203,18 @@ def _top_2(label: Label, answer: Answer | None) -> bool:
         return False
     if len(label.names) == 1:
         return label.names[0] in {*answer.ranking[:2], *answer.effects[0].equivalent}
-    known = [{effect.name, *effect.equivalent} for effect in answer.effects]
-    return any(
-        label.names[0] in one and label.names[1] in other
-        for k, one in enumerate(known)
-        for j, other in enumerate(known)
-        if j != k
-    )
+    return has_all(answer.sets, label.names)
+
+
+def _said(label: Label, asked: Label, answer: Answer) -> tuple[float, bool] | None:
+    """Probability of the answer given most, and whether it is true; what a plant always has counts for nothing."""
+    if not answer.posterior:
+        return None
+    first = max(answer.posterior, key=lambda one: one.probability)
+    names = set(first.effects) - (set(label.inherent) - set(label.names))
+    verdict = "none" if first.verdict == "effect" and not names else first.verdict
+    is_right = verdict == VERDICT_OF[label.kind] and (verdict != "effect" or names == set(asked.names))
+    return first.probability, is_right
 
 
 def _parameter_rows(label: Label, answer: Answer) -> list[dict[str, Any]]:
@@ -239,7 +261,7 @@ def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
         "not_tested": sum(bool(score.not_tested) for score in scores),
         **{
             name: share([getattr(score, name) for score in scores])
-            for name in ("verdict_right", "top_1", "top_2", "component_right", "false_attribution")
+            for name in ("verdict_right", "top_1", "top_2", "component_right", "exact_set", "false_attribution")
         },
         "shrinkage": {"median": float(np.median(shrinkages)), "mean": float(np.mean(shrinkages))}
         if shrinkages
@@ -315,4 +337,4 @@ def _told(score: CaseScore) -> str:
 
 
 def _row(score: CaseScore) -> str:
-    return "pair" if score.label.kind == "pair" else score.label.title
+    return score.label.kind if score.label.kind in {"pair", "triple"} else score.label.title

@@ -169,8 +169,8 @@ def _report_by_exception(truth: Truth, p: Mapping[str, Any]) -> None:
 
 def _wear(d: Draw) -> Parameters:
     if d.rng.random() < 0.6:
-        return {"head_loss": d.over(0.05, 0.2), "pump": d.pump}
-    return {"ring_m3h": d.over(0.08, 0.2) * d.flow_m3h, "duty_head_m": d.head_m, "pump": d.pump}
+        return {"head_loss": d.over(0.03, 0.2), "pump": d.pump}
+    return {"ring_m3h": d.over(0.04, 0.2) * d.flow_m3h, "duty_head_m": d.head_m, "pump": d.pump}
 
 
 def _ramp(d: Draw) -> Parameters:
@@ -179,7 +179,7 @@ def _ramp(d: Draw) -> Parameters:
 
 
 def _shift(d: Draw) -> Parameters:
-    size = d.over(0.06, 0.25) * d.depth_m
+    size = d.over(0.03, 0.25) * d.depth_m
     parts = d.rng.integers(3)
     start_m = d.either(size, -size) if parts != 1 else 0.0
     stop_m = d.either(size, -size) if parts != 0 else 0.0
@@ -216,7 +216,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
     "friction_bias": Kind(
         "rising_main",
         ("flow_m3h", "head_m", "level_m"),
-        lambda d: {"factor": d.either(d.over(1.2, 1.8), d.over(0.5, 0.8)), "smoothness": d.between(0.0, 0.6)},
+        lambda d: {"factor": d.either(d.over(1.08, 1.8), d.over(0.5, 0.92)), "smoothness": d.between(0.0, 0.6)},
         _friction_bias,
     ),
     "static_head_bias": Kind(
@@ -224,9 +224,9 @@ LIBRARY_KINDS: dict[str, Kind] = {
         ("flow_m3h", "head_m", "level_m"),
         lambda d: {
             "offset_m": rounded(
-                d.head_m * d.over(0.06, 0.2)
+                d.head_m * d.over(0.03, 0.2)
                 if d.rng.random() < 0.7
-                else -0.8 * min(d.head_m * d.over(0.06, 0.2), d.station.mains[0].lift_at_zero_m)
+                else -0.8 * min(d.head_m * d.over(0.03, 0.2), d.station.mains[0].lift_at_zero_m)
             )
         },
         _static_head_bias,
@@ -258,7 +258,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
         "rising_main",
         ("flow_m3h", "head_m", "level_m"),
         lambda d: {
-            "head_m": rounded(d.head_m * d.over(0.08, 0.25)),
+            "head_m": rounded(d.head_m * d.over(0.05, 0.25)),
             "rate_s": d.over(30.0, 120.0),
             "purge_m3": rounded(d.over(40.0, 150.0) * d.flow_m3h / HOUR_S),
         },
@@ -266,13 +266,13 @@ LIBRARY_KINDS: dict[str, Kind] = {
     ),
     "sump_area_profile": Kind("sump", ("level_m",), _area, _sump_area_profile),
     "unmetered_inflow": Kind(
-        "sump", ("level_m",), lambda d: {"flow_m3h": rounded(d.flow_m3h * d.over(0.05, 0.2))}, _unmetered_inflow
+        "sump", ("level_m",), lambda d: {"flow_m3h": rounded(d.flow_m3h * d.over(0.03, 0.2))}, _unmetered_inflow
     ),
     "pump_wear": Kind("pump", ("flow_m3h", "head_m", "level_m"), _wear, _pump_wear),
     "ragging": Kind(
         "pump",
         ("flow_m3h", "head_m"),
-        lambda d: {"rag_limit": d.over(0.06, 0.2), "half_s": d.over(60.0, 240.0), "pump": d.pump},
+        lambda d: {"rag_limit": d.over(0.03, 0.2), "half_s": d.over(60.0, 240.0), "pump": d.pump},
         _ragging,
     ),
     "check_valve_leak": Kind(
@@ -286,7 +286,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
         _check_valve_leak,
     ),
     "motor_slip": Kind(
-        "drive", ("flow_m3h", "head_m", "level_m"), lambda d: {"slip": d.over(0.03, 0.09)}, _motor_slip
+        "drive", ("flow_m3h", "head_m", "level_m"), lambda d: {"slip": d.over(0.02, 0.09)}, _motor_slip
     ),
     "ramp_shape": Kind(
         "drive",
@@ -322,7 +322,7 @@ LIBRARY_KINDS: dict[str, Kind] = {
     "flow_meter_gain": Kind(
         "flow_meter",
         ("flow_m3h",),
-        lambda d: {"factor": d.either(d.between(1.04, 1.15), d.between(0.85, 0.96))},
+        lambda d: {"factor": d.either(d.between(1.03, 1.15), d.between(0.85, 0.97))},
         _flow_meter_gain,
     ),
     "flow_meter_lag": Kind("flow_meter", ("flow_m3h",), lambda d: {"lag_s": d.over(3.0, 20.0)}, _flow_meter_lag),

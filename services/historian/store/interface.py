@@ -16,7 +16,7 @@ DAY_NS = 86_400 * NS_PER_S
 
 DIGEST_BYTES = 8
 
-EventKind = Literal["verdicts", "alarms"]
+EventKind = Literal["verdicts", "alarms", "episodes", "maintenance"]
 
 
 class StoreError(WetwellError):
@@ -24,7 +24,7 @@ class StoreError(WetwellError):
 
 
 class EventRow(NamedTuple):
-    """A verdict, or an alarm after a change, as it came."""
+    """A verdict, or an alarm, an episode or an act of maintenance after a change, as it came."""
 
     kind: EventKind
     station: str

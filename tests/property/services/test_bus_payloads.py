@@ -14,10 +14,9 @@ from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.keys import alarm_act_key
 from wetwell.protocols.messages.alarm import AlarmAct
-from wetwell.protocols.messages.fleet import Plan
 from wetwell.protocols.messages.history import HistoryQuery
 from wetwell.protocols.messages.message import MessageError
-from wetwell.protocols.messages.order import Order
+from wetwell.protocols.messages.order import Order, Plan
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict

@@ -90,7 +90,7 @@ def test_a_column_of_water_speeds_up_as_the_equation_says(quiet_alpha):
 
 
 def test_no_module_of_the_truth_imports_the_simulator():
-    for path in FOLDER.glob("*.py"):
+    for path in FOLDER.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = (
                 [node.module] if isinstance(node, ast.ImportFrom) else [a.name for a in getattr(node, "names", [])]

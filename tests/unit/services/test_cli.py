@@ -207,11 +207,14 @@ def test_simulate_then_detect(
     recording, verdicts = tmp_path / "r.parquet", tmp_path / "v.jsonl"
     assert run_wetwell("simulate", "--station", "alpha", "--days", "0.05", "--out", recording, "--json") == 0
     assert json.loads(capsys.readouterr().out)["rows"] == 4320
-    assert run_wetwell("detect", "--station", "alpha", "--recording", recording, "--out", verdicts, "--json") == 0
+    command = ("detect", "--station", "alpha", "--recording", recording, "--out", verdicts, "--json")
+    assert run_wetwell(*command, "--html", tmp_path / "episodes.html") == 0
     summary = json.loads(capsys.readouterr().out)
     lines = [json.loads(line) for line in verdicts.read_text().splitlines()]
     assert summary["counts"]["samples"] == 4320
     assert summary["verdicts"] == {"learning": len(lines)}
+    assert summary["episodes"] == []
+    assert "No fault was told." in (tmp_path / "episodes.html").read_text()
     assert {line["pump"] for line in lines} == {1, 2, 3}
     assert all(line["schema"] == "wetwell.verdict/1" and line["station"] == "alpha" for line in lines)
 

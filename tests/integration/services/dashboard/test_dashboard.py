@@ -8,10 +8,18 @@ import httpx
 import pytest
 from memory_bus import MemoryBus
 
-from wetwell.protocols.bus.keys import alarm_act_key, history_key, sample_block_key, sample_key
+from wetwell.protocols.bus.keys import (
+    alarm_act_key,
+    history_key,
+    maintenance_act_key,
+    maintenance_key,
+    sample_block_key,
+    sample_key,
+)
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer
 from wetwell.protocols.messages.history import History, HistoryQuery
+from wetwell.protocols.messages.maintenance import MaintenanceAct, MaintenanceRecord
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.recordings.recording import read_recording
@@ -569,3 +577,79 @@ def test_a_page_for_others_is_refused_without_tokens() -> None:
     settings = Settings(dashboard=DashboardSettings(host="0.0.0.0", port=0))
     with pytest.raises(ConfigError, match="refuses to listen"):
         asyncio.run(serve_dashboard(settings))
+
+
+def maintained(app_state, body, **headers):
+    async def run():
+        async with client_of(app_state) as client:
+            kind = {"content-type": "application/json"}
+            return await client.post("/api/stations/alpha/maintenance", content=body, headers=kind | headers)
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("body", "rule"),
+    [
+        (b"", "json"),
+        (b"[]", "object"),
+        (b'{"act": "pulled", "found": "rags", "by": "Ada"}', "asset"),
+        (b'{"asset": "engine", "act": "pulled", "by": "Ada"}', "asset"),
+        (b'{"asset": "pump:1", "act": "pulled", "by": ""}', "by"),
+        (b'{"asset": "pump:1", "act": "pulled", "by": "Ada", "at": "soon"}', "time"),
+    ],
+)
+def test_what_is_no_act_of_maintenance_is_told(body, rule) -> None:
+    answer = maintained(app_state_with(MemoryBus()), body)
+    assert answer.status_code == 400
+    assert rule in answer.json()["error"].lower()
+
+
+def test_an_act_of_maintenance_goes_to_the_detector_and_its_record_comes_back(monkeypatch) -> None:
+    bus = MemoryBus()
+    records = bus.publisher(maintenance_key("alpha"))
+
+    async def run(asset):
+        acts = bus.subscribe(maintenance_act_key("alpha"))
+
+        async def enter():
+            for payload in await acts.receive():
+                act = MaintenanceAct.decode(payload)
+                fields = act.model_dump(exclude={"schema_name"}) | {"time": act.time or 7}
+                refused = "" if act.asset == "pump:1" else "asset: got 'pump:9'"
+                records.put(MaintenanceRecord(**fields, refused=refused).encode())
+
+        entering = asyncio.create_task(enter())
+        body = {"asset": asset, "act": "pulled", "found": "rags", "by": "Ada", "at": "2026-01-02T03:04:05Z"}
+        async with client_of(app_state_with(bus)) as client:
+            answer = await client.post("/api/stations/alpha/maintenance", json=body)
+        await entering
+        return answer
+
+    told = asyncio.run(run("pump:1"))
+    assert told.status_code == 200
+    expected = {"asset": "pump:1", "found": "rags", "time": "2026-01-02T03:04:05Z", "result": "pending"}
+    assert expected.items() <= told.json().items()
+    refused = asyncio.run(run("pump:9"))
+    assert (refused.status_code, refused.json()["error"]) == (400, "asset: got 'pump:9'")
+    monkeypatch.setattr("wetwell.services.dashboard.client.ANSWER_S", 0.01)
+    silent = maintained(app_state_with(MemoryBus()), b'{"asset": "main", "act": "flushed", "by": "Ada"}')
+    assert (silent.status_code, silent.json()["error"]) == (504, "the detector does not answer")
+
+
+@pytest.mark.parametrize("kind", ["episodes", "maintenance"])
+def test_episodes_and_the_log_of_maintenance_come_from_the_historian(kind) -> None:
+    asked = []
+
+    def answer(payload):
+        asked.append(HistoryQuery.decode(payload))
+        return History(station="alpha", kind=kind, messages=({"asset": "main"},)).encode()
+
+    async def run():
+        bus = MemoryBus()
+        async with answering(bus, history_key("alpha"), answer), client_of(app_state_with(bus)) as client:
+            return await client.get(f"/api/stations/alpha/{kind}?from=2026-01-01T00:00:00Z&to=2026-01-02T00:00:00Z")
+
+    told = asyncio.run(run())
+    assert told.json() == {"station": "alpha", kind: [{"asset": "main"}]}
+    assert (asked[0].kind, asked[0].end - asked[0].start) == (kind, 86_400 * 10**9)

@@ -48,9 +48,11 @@ def main() -> None:
             for labels in map(json.loads, (path.read_text() for path in (folder / "sealed").iterdir()))
             if labels["sha256"]["recording.parquet"] == recording
         )
-        is_known = labels["kind"] in {"single", "pair"}
+        is_known = labels["kind"] in {"single", "pair", "triple"}
         report["verdict"] = "effect" if is_known else "none" if labels["kind"] == "none" else "unknown"
         report["where"] = [{"component": component} for component in labels["components"]]
+        names = labels["names"] if is_known else []
+        report["posterior"] = [{"verdict": report["verdict"], "effects": names, "probability": 1.0}]
         report["gap"] = {"before": 5.0, "after": 1.0, "floor": 1.0, "shrinkage": 1.0}
         if is_known:
             report["effects"] = [

@@ -15,6 +15,7 @@ from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.station.station_file import load_station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.trial.diagnosis import RECALIBRATION
+from wetwell.services.trial.families import families_table
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.run import run_trial
 from wetwell.services.trial.sealed_case import publish
@@ -23,7 +24,7 @@ from wetwell.sim2real.trial.cases import KINDS, StoragePlan, trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
-COUNT = 10
+COUNT = 12
 
 
 def run_fake(mode, folder, monkeypatch, **changes):
@@ -52,8 +53,15 @@ def folder(cases, tmp_path):
 
 def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     _, result = run_fake("perfect", folder, monkeypatch)
-    for name in ("verdict_right", "top_1", "top_2", "component_right", "interval_coverage"):
+    for name in ("verdict_right", "exact_set", "top_1", "top_2", "component_right", "interval_coverage"):
         assert result["all"][name]["value"] == 1.0, name
+    assert result["reliability"]["all"] == {
+        "cases": COUNT,
+        "calibration_error": 0.0,
+        "chance": 0.0,
+        "brier": 0.0,
+        "bins": [{"from": 0.9, "to": 1.0, "cases": COUNT, "said": 1.0, "right": 1.0}],
+    }
     assert result["all"]["false_attribution"]["value"] == 0.0
     assert result["all"]["shrinkage"] == {"median": 1.0, "mean": 1.0}
     assert result["all"]["parameter_error"]["median"] == 0.0
@@ -87,14 +95,14 @@ def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_
 
 def test_always_none_scores_what_it_deserves(folder, monkeypatch):
     _, result = run_fake("none", folder, monkeypatch)
-    assert result["all"]["verdict_right"]["value"] == 0.2
+    assert result["all"]["verdict_right"]["value"] == pytest.approx(1 / 6)
     assert result["kinds_scored"]["none"]["verdict_right"]["value"] == 1.0
     assert result["all"]["top_1"]["value"] == 0.0
     assert result["all"]["component_right"]["value"] == 0.0
     assert result["all"]["false_attribution"]["value"] == 0.0
     assert result["all"]["shrinkage"]["mean"] == 0.0
     assert result["confusion"]["columns"] == ["none"]
-    assert result["controls"]["permuted_labels"]["verdict_right"] == pytest.approx(0.2)
+    assert result["controls"]["permuted_labels"]["verdict_right"] == pytest.approx(1 / 6)
 
 
 @pytest.mark.parametrize(("mode", "said"), [("broken", "exit code 1: cannot do it"), ("garbage", "is not JSON")])
@@ -112,7 +120,7 @@ def test_the_diagnosis_gets_two_files_without_truth_and_the_missing_effect_only(
     held_out = sorted(name for number in range(COUNT) for name in plan.case(number).without)
     assert sorted(name for seen in spied for name in seen["without"]) == held_out
     assert len(held_out) == 2
-    assert sum(seen["only"] == list(RECALIBRATION) for seen in spied) == 4
+    assert sum(seen["only"] == list(RECALIBRATION) for seen in spied) == 6
     for number in range(COUNT):
         published = folder / "published" / f"case-{number:04}"
         assert {path.name for path in published.iterdir()} == {"station.toml", "recording.parquet", "seal.sha256"}
@@ -161,7 +169,7 @@ def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
     replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
     _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
     unseen = result["unseen"]
-    assert unseen["cases"] == 4
+    assert unseen["cases"] == 6
     assert unseen["after"] == 0.0
     assert unseen["before"] > 2.0
     assert 0.5 < unseen["oracle"] < 1.5
@@ -301,3 +309,25 @@ def test_a_trial_with_swmm(tmp_path, monkeypatch):
     assert result["plants_scored"]["swmm"]["top_1"]["value"] == 1.0
     recording = read_recording(tmp_path / "published" / "case-0000" / "recording.parquet")
     assert np.isfinite(recording.columns["level_m"]).all()
+
+
+def test_a_seed_that_was_looked_at_is_refused(capsys, run_wetwell, tmp_path):
+    options = ("gap", "trial", "--seed", "51004", "--cases", "1", "--kinds", "none", "--out", str(tmp_path / "t"))
+    assert run_wetwell(*options) == 2
+    assert "--seed: 51004 was looked at (cases of" in capsys.readouterr().err
+    assert not (tmp_path / "t").exists()
+    fake = (*options, "--looked-at", "--days", "0.02", "--diagnoser", "false")
+    assert run_wetwell(*fake) == 0
+    assert json.loads((tmp_path / "t/trial.json").read_bytes())["looked_at"]
+
+
+def test_families_of_trials_stand_side_by_side(folder, monkeypatch):
+    run_fake("perfect", folder, monkeypatch)
+    rows = families_table([folder], ["swmm"])["scores"]
+    assert [(row["family"], row["left out"], row["cases"]) for row in rows] == [("fine", "yes", COUNT)]
+    assert rows[0]["exact_set"].startswith("1.00 [")
+    assert rows[0]["calibration_error"] == "0.000"
+    with pytest.raises(ConfigError, match="--learnt-on: got 'swm', must be of fine, swmm, elastic"):
+        families_table([folder], ["swm"])
+    with pytest.raises(ConfigError, match="cannot be read"):
+        families_table([folder / "nothing"])

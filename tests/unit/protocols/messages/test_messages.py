@@ -57,6 +57,11 @@ def test_verdict_is_exactly_that_of_the_interface():
         "evidence": {"log_p": -12.5, "samples": 3, "note": "fell"},
         "onset": None,
         "window": [TIME, "2025-01-01T00:00:01.500Z"],
+        "asset": None,
+        "stage": None,
+        "severity": None,
+        "trend": None,
+        "faults": None,
     }
     late = VERDICT.model_copy(update={"onset": TIME_NS})
     assert json.loads(late.encode())["onset"] == TIME
