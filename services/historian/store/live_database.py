@@ -308,7 +308,7 @@ class LiveDatabase:
 
 
 def damage_of(path: Path) -> list[str]:
-    """What SQLite finds wrong in a file, and verdicts and alarms that are not what was written; nothing is changed.
+    """What SQLite finds wrong in a file, and messages that are not what was written; nothing is changed.
 
     Of the rows of samples only their order and form is known: they have no checksum until their day becomes a file.
     """
@@ -321,7 +321,7 @@ def damage_of(path: Path) -> list[str]:
             )
     except sqlite3.Error as error:
         return [str(error)]
-    return [*told, *([f"{changed} verdicts or alarms are not what was written"] if changed else [])]
+    return [*told, *([f"{changed} messages are not what was written"] if changed else [])]
 
 
 def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:

@@ -96,13 +96,13 @@ def test_a_bit_that_flips_is_found_and_no_file_is_changed_by_looking(kept, tmp_p
     assert file.read_bytes() == content
 
 
-def test_a_verdict_that_was_changed_in_the_database_is_found(kept, tmp_path):
+def test_a_message_that_was_changed_in_the_database_is_found(kept, tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(kept, folder)
     file = folder / "history" / "live.sqlite"
     file.write_bytes(file.read_bytes().replace(b'"pump_fault"', b'"pump_fqult"'))
     (finding,) = verified(folder)["error"]
-    assert "1 verdicts or alarms are not what was written" in finding.text
+    assert "messages are not what was written" in finding.text
 
 
 @pytest.mark.parametrize("damage", ["change", "remove", "insert", "swap"])
