@@ -1,5 +1,10 @@
-"""The audit of alarms: who has done what to which alarm, one JSON object a line, never changed afterwards."""
+"""The audit of alarms: who has done what to which alarm, one JSON object a line, never changed afterwards.
 
+Each line ends with a link: the SHA-256 of the link before and of the line itself. A line that is changed, missing or
+put in shows; lines that were cut off at the end do not, unless the last link was written down elsewhere.
+"""
+
+import hashlib
 import json
 import logging
 import os
@@ -10,12 +15,15 @@ from wetwell.protocols.timestamps import to_iso
 
 log = logging.getLogger(__name__)
 
+LINK = "link"
+
 
 class Audit:
     """Append-only file of acts; a line is on the disk when `write` returns. Without a folder acts are only logged."""
 
     def __init__(self, folder: Path | None) -> None:
         self.path = None if folder is None else folder / "alarm-audit.jsonl"
+        self._link: str | None = None
 
     def write(self, now_ns: int, **fields: object) -> None:
         """Write an act down.
@@ -25,19 +33,75 @@ class Audit:
         RecordingError
             If the file cannot be written; names it and the reason.
         """
-        line = json.dumps({"time": to_iso(now_ns), **fields}, ensure_ascii=False)
-        log.info("audit: %s", line)
+        entry = {"time": to_iso(now_ns), **fields}
+        log.info("audit: %s", json.dumps(entry, ensure_ascii=False))
         if self.path is None:
             return
         try:
+            before = _last_link(self.path) if self._link is None else self._link
+            link = link_of(before, entry)
+            line = json.dumps(entry | {LINK: link}, ensure_ascii=False)
             is_new = not self.path.exists()
             with self.path.open("ab") as file:
                 start = b"" if is_new or _ends_with_newline(self.path) else b"\n"  # a power cut left half a line
                 file.write(start + line.encode() + b"\n")
                 file.flush()
                 os.fsync(file.fileno())
+            self._link = link
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror or error}") from error
+
+
+def link_of(before: str, entry: dict[str, object]) -> str:
+    """Link of a line, from that of the line before, empty for the first.
+
+    Examples
+    --------
+    >>> link_of("", {"act": "acknowledge"})[:8], link_of("1", {"act": "acknowledge"})[:8]
+    ('710605c2', '36cdea25')
+    """
+    text = json.dumps(entry, ensure_ascii=False, sort_keys=True)
+    return hashlib.sha256(f"{before}\n{text}".encode()).hexdigest()
+
+
+def broken_lines(path: Path) -> list[int]:
+    """Numbers, from 1, of lines that are damaged, or whose link does not follow from the line before.
+
+    Lines without a link, of an earlier version, are passed over where none with one stands before them.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    broken, before = [], ""
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+        entry = _entry(line)
+        link = None if entry is None else entry.pop(LINK, None)
+        if entry is not None and link is None and not before:
+            continue
+        if entry is None or link != link_of(before, entry):
+            broken.append(number)
+        before = link if isinstance(link, str) else before
+    return broken
+
+
+def _entry(line: str) -> dict[str, object] | None:
+    try:
+        entry = json.loads(line)
+    except ValueError:
+        return None
+    return entry if isinstance(entry, dict) else None
+
+
+def _last_link(path: Path) -> str:
+    """Link of the last line that has one; empty where none has."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except FileNotFoundError:
+        return ""
+    links = (entry.get(LINK) for entry in map(_entry, reversed(lines)) if entry is not None)
+    return next((link for link in links if isinstance(link, str)), "")
 
 
 def _ends_with_newline(path: Path) -> bool:

@@ -1,5 +1,6 @@
 """The state of the alarms on disk: written whole, with a version; what cannot be read is put aside and told."""
 
+import hashlib
 import logging
 from pathlib import Path
 from typing import Literal
@@ -7,7 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from wetwell.protocols.atomic_file import atomic_file
-from wetwell.protocols.errors import RecordingError, first_fault
+from wetwell.protocols.errors import RecordingError, WetwellError, first_fault
 from wetwell.services.alarms.registry import RegistryState
 from wetwell.services.runtime.state_file import put_aside, read_kept
 
@@ -56,22 +57,53 @@ class StateFile:
         if data is None:
             return None
         try:
-            return SiteState.model_validate_json(data)
+            return read_state(data)
         except ValidationError as error:
-            aside = put_aside(self._path)
-            log.warning("%s: %s; kept as %s, the alarms begin anew", self._path.name, first_fault(error), aside)
-            return None
+            fault = first_fault(error)
+        except DamagedStateError as error:
+            fault = str(error)
+        aside = put_aside(self._path)
+        log.warning("%s: %s; kept as %s, the alarms begin anew", self._path.name, fault, aside)
+        return None
 
     def save(self, state: SiteState) -> None:
         """Write the state; a disk that refuses is told once, and the last file stays."""
         if self._path is None:
             return
         try:
+            body = state.model_dump_json().encode()
             with atomic_file(self._path) as file:
-                file.write(state.model_dump_json().encode())
+                file.write(body + b"\n" + checksum(body))
         except RecordingError as error:
             if not self.errors:
                 log.warning("%s; alarms go on without", error)
             self.errors += 1
         else:
             self.errors = 0
+
+
+class DamagedStateError(WetwellError):
+    """A state whose checksum differs."""
+
+
+def checksum(body: bytes) -> bytes:
+    """SHA-256 of a state, as it stands in the last line of its file."""
+    return hashlib.sha256(body).hexdigest().encode()
+
+
+def read_state(data: bytes) -> SiteState:
+    """State in a file; one of an earlier version has no checksum.
+
+    Raises
+    ------
+    DamagedStateError
+        If it is not what was written.
+    ValidationError
+        If it is no state.
+    """
+    body, line, last = data.rpartition(b"\n")
+    if not line or not last:
+        return SiteState.model_validate_json(data)
+    if last != checksum(body):
+        raise DamagedStateError("damaged, its checksum differs")
+    return SiteState.model_validate_json(body)

@@ -1,5 +1,6 @@
 """A look at a running site."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -17,6 +18,17 @@ def doctor(
         typer.Option("--station", metavar="FILE", help="Station that must be there; may be given again."),
     ] = None,
     seconds: Annotated[float, typer.Option("--seconds", help="How long to listen.")] = 5.0,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Check by checksums that what is kept here is what was written; needs no bus.",
+        ),
+    ] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="DIR", help="With --verify: folder of wetwell up, not those of the settings."),
+    ] = None,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
     as_json: JsonOption = False,
@@ -28,7 +40,14 @@ def doctor(
     from wetwell.services.doctor.examine import examine
     from wetwell.services.doctor.finding import exit_code, finding_lines
 
-    findings = asyncio.run(examine(config, zenoh, station or [], positive(seconds, "--seconds")))
+    if verify:
+        from wetwell.services.commands.options import settings_of, with_data
+        from wetwell.services.doctor.verify import verify_kept
+
+        settings = settings_of(config)
+        findings = verify_kept(settings if data is None else with_data(settings, data, data))
+    else:
+        findings = asyncio.run(examine(config, zenoh, station or [], positive(seconds, "--seconds")))
     if as_json:
         print_result({"findings": [asdict(finding) for finding in findings]}, as_json=True)
     else:

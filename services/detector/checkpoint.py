@@ -1,5 +1,6 @@
 """The state of a station's judge on disk: written whole, read back at the start."""
 
+import hashlib
 import json
 import logging
 import threading
@@ -107,3 +108,14 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         return Told(answers, verdicts, acts), rest
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
+
+
+def is_intact(data: bytes) -> bool:
+    """Whether a checkpoint is what was written, by the checksum of its snapshot."""
+    try:
+        _, snapshot = _parted(data)
+        head, _, body = snapshot.partition(b"\n")
+        header = json.loads(head)
+        return bool(hashlib.sha256(body.rstrip(b"\n")).hexdigest() == header["sha256"])
+    except (SnapshotError, ValueError, KeyError, TypeError):
+        return False

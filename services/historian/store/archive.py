@@ -5,7 +5,7 @@ A file of samples is a recording with two more columns, `seq` and `quality`; it 
 
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pyarrow as pa
@@ -116,6 +116,18 @@ class Archive:
         ):
             raise StoreError(f"{path}: does not hold what was written")
 
+    def damage(self) -> list[str]:
+        """Daily files that cannot be read, or whose pages are not what was written."""
+        told = []
+        for station in self.stations():
+            for form in get_args(Form):
+                for day_ns in self.days_ns(form, station):
+                    try:
+                        self._read(self.path(form, station, day_ns))
+                    except StoreError as error:
+                        told.append(str(error))
+        return told
+
     def delete(self, form: Form, station: str, day_ns: int) -> None:
         """Delete the file of a day."""
         path = self.path(form, station, day_ns)
@@ -126,7 +138,7 @@ class Archive:
 
     def _read(self, path: Path, columns: list[str] | None = None) -> pa.Table | None:
         try:
-            return pa.parquet.ParquetFile(path).read(columns)
+            return pa.parquet.ParquetFile(path, page_checksum_verification=True).read(columns)
         except FileNotFoundError:
             return None
         except (OSError, pa.ArrowException) as error:
@@ -144,6 +156,7 @@ def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: di
                 table,
                 file,
                 compression="zstd",
+                write_page_checksum=True,
                 use_dictionary=[name for name in table.column_names if name.endswith(_FEW_VALUES)],
                 use_byte_stream_split=[name for name in values if not name.endswith(_FEW_VALUES)],
                 column_encoding={

@@ -14,6 +14,8 @@ from wetwell.services.historian.summary import Summary
 
 DAY_NS = 86_400 * NS_PER_S
 
+DIGEST_BYTES = 8
+
 EventKind = Literal["verdicts", "alarms", "episodes", "maintenance"]
 
 
@@ -42,7 +44,7 @@ class EventRow(NamedTuple):
     @property
     def digest(self) -> bytes:
         """Tells it from others of the same time."""
-        return hashlib.blake2b(self.payload, digest_size=8).digest()
+        return hashlib.blake2b(self.payload, digest_size=DIGEST_BYTES).digest()
 
 
 @dataclass

@@ -1,0 +1,134 @@
+"""`wetwell doctor --verify`: a single bit that flips in anything that is kept shows, and nothing else does."""
+
+import json
+import shutil
+
+import pytest
+from memory_bus import MemoryBus
+
+from wetwell.protocols.messages.alarm import AlarmAct
+from wetwell.protocols.messages.verdict import Verdict
+from wetwell.services.alarms.audit import Audit, broken_lines
+from wetwell.services.alarms.service import AlarmService
+from wetwell.services.alarms.station_watch import Now
+from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.station_detector import StationDetector
+from wetwell.services.doctor.finding import Finding
+from wetwell.services.doctor.verify import verify_kept
+from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.service import Historian
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import DAY_NS, Batch
+from wetwell.services.runtime.settings import AlarmSettings, DetectorSettings, HistorianSettings, Settings
+from wetwell.services.stations import find_scenario
+from wetwell.simulator.simulation import Simulation
+
+NOW_NS = 1_800_000_000_000_000_000
+
+
+@pytest.fixture(scope="module")
+def kept(alpha, tmp_path_factory):
+    """History with a complete day, checkpoint, alarms and audit of a station."""
+    folder = tmp_path_factory.mktemp("kept")
+    recording = Simulation(alpha, find_scenario("nominal"), 1).advance(3 * 86_400, truth=False)
+    every = Samples.of_recording(recording).select(slice(0, None, 60))
+    store = FolderStore(folder / "history")
+    store.write(Batch(samples=every.rows("alpha")))
+    historian = Historian(store)
+    verdict = Verdict(
+        time=NOW_NS, station="alpha", pump=2, state="pump_fault", probability={}, evidence={}, onset=0, window=(0, 0)
+    )
+    historian.handle("verdicts", verdict.encode())
+    historian.commit(NOW_NS)
+    while historian.maintain(NOW_NS + DAY_NS):
+        pass
+    store.close()
+    with MemoryBus() as bus:
+        StationDetector(bus, alpha, checkpoint=Checkpoint(folder / "detector", "alpha")).keep()
+        settings = AlarmSettings(state_dir=folder / "alarms")
+        service = AlarmService(bus, settings, [alpha], lambda: Now(NOW_NS, 0.0))
+        service.handle_verdict(verdict.encode())
+        service.look()
+        for number in range(3):
+            act = {"station": "alpha", "alarm": "pump2.pump_fault", "act": "acknowledge", "by": "Ann"}
+            service.carry_out(AlarmAct.model_validate(act | {"id": f"act-{number}"}))
+        service.save()
+    return folder
+
+
+def verified(folder) -> dict[str, list[Finding]]:
+    settings = Settings(
+        historian=HistorianSettings(folder=folder / "history"),
+        detector=DetectorSettings(state_dir=folder / "detector"),
+        alarms=AlarmSettings(state_dir=folder / "alarms"),
+    )
+    found: dict[str, list[Finding]] = {}
+    for finding in verify_kept(settings):
+        found.setdefault(finding.level, []).append(finding)
+    return found
+
+
+def test_what_was_written_is_well(kept):
+    found = verified(kept)
+    assert [finding.check for finding in found["ok"]] == ["history", "history", "detector", "alarms", "audit"]
+    assert set(found) == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "check"),
+    [
+        ("history/samples/*/*.parquet", "history"),
+        ("detector/*.detector.json", "detector"),
+        ("alarms/alarms.json", "alarms"),
+        ("alarms/alarm-audit.jsonl", "audit"),
+    ],
+)
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.7])
+def test_a_bit_that_flips_is_found_and_no_file_is_changed_by_looking(kept, tmp_path, pattern, check, place):
+    folder = tmp_path / "copy"
+    shutil.copytree(kept, folder)
+    file = min(folder.glob(pattern))
+    content = bytearray(file.read_bytes())
+    content[int(place * len(content))] ^= 0x04
+    file.write_bytes(content)
+    found = verified(folder)
+    assert [finding.check for finding in found["error"]] == [check]
+    assert file.read_bytes() == content
+
+
+def test_a_message_that_was_changed_in_the_database_is_found(kept, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(kept, folder)
+    file = folder / "history" / "live.sqlite"
+    file.write_bytes(file.read_bytes().replace(b'"pump_fault"', b'"pump_fqult"'))
+    (finding,) = verified(folder)["error"]
+    assert "messages are not what was written" in finding.text
+
+
+@pytest.mark.parametrize("damage", ["change", "remove", "insert", "swap"])
+def test_a_line_of_the_audit_that_is_not_as_it_was_shows(kept, tmp_path, damage):
+    lines = (kept / "alarms" / "alarm-audit.jsonl").read_text().splitlines()
+    assert len(lines) == 3
+    first, second, third = lines
+    changed = {
+        "change": [first, second.replace("Ann", "Bob"), third],
+        "remove": [first, third],
+        "insert": [first, json.dumps({"act": "shelve"}), second, third],
+        "swap": [second, first, third],
+    }[damage]
+    path = tmp_path / "audit.jsonl"
+    path.write_text("\n".join(changed) + "\n")
+    assert broken_lines(path)
+    path.write_text("\n".join(lines) + "\n")
+    assert broken_lines(path) == []
+
+
+def test_the_chain_goes_on_after_a_restart_and_behind_lines_of_an_earlier_version(tmp_path):
+    path = tmp_path / "alarm-audit.jsonl"
+    path.write_text('{"time": "2026-01-01T00:00:00Z", "act": "acknowledge"}\n')
+    for number in range(4):
+        Audit(tmp_path).write(NOW_NS, act="shelve", number=number)
+    assert broken_lines(path) == []
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], *lines[2:]]) + "\n")
+    assert broken_lines(path) == [2]
