@@ -11,6 +11,7 @@ from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.station.control import DEFAULT_START_LEVELS_M, DEFAULT_STOP_LEVELS_M, Control
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.limits import Limits
+from wetwell.protocols.station.materiality import Materiality
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.sump import Sump
@@ -73,6 +74,7 @@ class Station(Table):
     control: Control = Control()
     electrical: Electrical = Electrical()
     sensors: Sensors = Sensors()
+    materiality: Materiality = Materiality()
     limits: Limits = Limits()
     costs: Costs | None = None
     effect: tuple[EffectTable, ...] = ()

@@ -1,4 +1,4 @@
-"""Which effects of the library explain the gap: fitted on half of the cycles, ranked on the other half."""
+"""Which effects of the library explain the gap: fitted on half of the cycles, weighed on all of them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,16 +8,21 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.gains import CELL_GAIN, SPAN_GAIN, Gains, RankedFit
+from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.intervals import intervals_of
-from wetwell.sim2real.attribution.search import Search
+from wetwell.sim2real.attribution.intervals import are_there, intervals_of
+from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
+from wetwell.sim2real.likelihood.cells import cells_of
+from wetwell.sim2real.likelihood.posterior import SetProbability, best_set, equivalents, posterior_of, verdict_of
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.station import StationResiduals
+
+LEAST_DOUBTED = 0.02
+"""Probability from which the intervals of a set are looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,35 +34,34 @@ class Attribution:
     plain : (bins,) array
         Residuals without any effect, as `asinh_loss` makes them; so are all others.
     accepted : Fit or None
-        None where no effect explains the gap.
-    left : (bins,) array
-        Residuals under the accepted effects; where values of each second cannot show one of these, or none is
-        accepted, with short transients in ramps excused.
+        The most probable set where effects are the verdict; the effect first without which most is left.
     equivalent : tuple of tuple of str
-        Effects that explain as much in the place of each accepted one.
+        Effects that may be in the place of each accepted one.
     ends : (parameters, 2) array
         Of the 95 % intervals of the accepted points, in the order of the candidates.
-    singles : tuple of RankedFit
-        Single candidates by score.
+    singles : tuple of Fit
+        Single candidates, the one that explains most first.
     training, validation : (bins,) array
-        Bins that are fitted, and those on which gains and gaps are measured.
+        Bins that are fitted, and those on which gaps are measured.
+    posterior : tuple of SetProbability
+        Best first.
     not_tested : tuple of NotTested
         Candidates that the recording cannot show.
     """
 
     plain: Floats
     accepted: Fit | None
-    left: Floats
     equivalent: tuple[tuple[str, ...], ...]
     ends: Floats
-    singles: tuple[RankedFit, ...]
+    singles: tuple[Fit, ...]
     training: Flags
     validation: Flags
+    posterior: tuple[SetProbability, ...]
     not_tested: tuple[NotTested, ...] = ()
 
     @property
     def after(self) -> Floats:
-        """(bins,) residuals under the accepted effects, nothing excused; the plain ones where there are none."""
+        """(bins,) residuals under the accepted effects; the plain ones where there are none."""
         return self.plain if self.accepted is None else self.accepted.residuals
 
 
@@ -85,29 +89,53 @@ def attribute(
     training, validation = halves(residuals.bins, replay.traces.pumps)
     fitter = Fitter(replay, residuals, training)
     plain = fitter.plain.residuals
-    gains = Gains(plain, residuals.bins, validation)
     tested, not_tested = shown_by(candidates, fitter, (training, validation), replay, regimes, each)
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
-    trials = Trials(fitter, gains, guesses, progress, each)
+    trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
+    hypotheses = Hypotheses(fitter, cells_of(residuals.bins, has_inflow=replay.traces.inflow_m3h is not None), each)
+    hypotheses.add(singles)
+    search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
+    posterior = _posterior(fitter, hypotheses, len(singles))
     accepted: Fit | None = None
-    equivalent: tuple[tuple[str, ...], ...] = ()
-    if singles and gains.is_real(singles[0], plain, CELL_GAIN, SPAN_GAIN):
-        search = Search(fitter, gains, trials, singles)
-        final = search.accepted()
-        accepted, equivalent = final.fit, search.equivalent(final)
+    equal: dict[str, tuple[str, ...]] = {}
+    if verdict_of(posterior) == "effect":
+        accepted = in_order(fitter, hypotheses.of(best_set(posterior)).fit)
+        equal = equivalents(posterior, accepted.names)
     progress(1.0)
     return Attribution(
         plain=plain,
         accepted=accepted,
-        left=fitter.left(accepted),
-        equivalent=equivalent,
+        equivalent=() if accepted is None else tuple(equal[name] for name in accepted.names),
         ends=np.zeros((0, 2)) if accepted is None else intervals_of(fitter, accepted, residuals.bins),
         singles=tuple(singles),
         training=training,
         validation=validation,
+        posterior=posterior,
         not_tested=not_tested,
     )
+
+
+def _posterior(fitter: Fitter, hypotheses: Hypotheses, library: int) -> tuple[SetProbability, ...]:
+    """Posterior without sets of which an effect may as well not be there, by its interval."""
+    sure: set[tuple[str, ...]] = set()
+    while True:
+        posterior = posterior_of(hypotheses.weights(), library)
+        doubtful = next(
+            (
+                one.effects
+                for one in posterior
+                if one.verdict == "effect" and one.probability > LEAST_DOUBTED and one.effects not in sure
+            ),
+            None,
+        )
+        if doubtful is None:
+            return posterior
+        fit = hypotheses.of(doubtful).fit
+        if are_there(fit, intervals_of(fitter, fit, fitter.bins)):
+            sure.add(doubtful)
+        else:
+            hypotheses.rule_out(doubtful)
 
 
 def halves(bins: Bins, pumps: int) -> tuple[Flags, Flags]:

@@ -21,11 +21,7 @@ LONGEST_STEP = 0.3
 SETTLED = 1e-3
 MOST_AWAY = 2
 """Points of a grid, each worse than the best before, after which it is left."""
-STAYED = 0.01
-"""Share of its range by which a strength may move and still count as neutral."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
-EXCUSED_S = 2
-"""Transients in ramps that a right model may be late or early by, and more, when it comes to what is left."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,15 +41,6 @@ class Fit:
     def names(self) -> tuple[str, ...]:
         """Their names."""
         return tuple(candidate.name for candidate in self.candidates)
-
-    @property
-    def free(self) -> int:
-        """Number of free parameters, but for strengths that have stayed neutral."""
-        return sum(
-            free.neutral is None or abs(float(one) - free.normalised(free.neutral)) > STAYED
-            for candidate, point in zip(self.candidates, self.points, strict=True)
-            for free, one in zip(candidate.free, point, strict=True)
-        )
 
     @property
     def position(self) -> Floats:
@@ -102,12 +89,6 @@ class Fitter:
         kept = [k for k in range(len(fit.candidates)) if k != member]
         return self.at([fit.candidates[k] for k in kept], [fit.points[k] for k in kept])
 
-    def left(self, fit: Fit | None) -> Floats:
-        """(bins,) residuals under a fit; with short transients in ramps excused unless all of it can be seen."""
-        effects = () if fit is None else fit.effects
-        is_seen = bool(effects) and all(effect.is_seen(self.plant) for effect in effects)
-        return asinh_loss(self._residuals.of(self._replay.run(effects), 0 if is_seen else EXCUSED_S))
-
     def cost(self, fit: Fit | None) -> float:
         """Sum of squares over the bins that are fitted."""
         return float("inf") if fit is None else float(np.sum(fit.residuals[self.rows] ** 2))
@@ -137,7 +118,7 @@ class Fitter:
             return fit
         current, damping = fit, 1e-2
         for _ in range(ROUNDS):
-            slopes = self.slopes(current)
+            slopes = self.slopes(current)[self.rows]
             gradient = slopes.T @ current.residuals[self.rows]
             squares = slopes.T @ slopes
             x = current.position
@@ -186,15 +167,15 @@ class Fitter:
         return best
 
     def slopes(self, fit: Fit) -> Floats:
-        """(fitted bins, parameters) change of the residuals with each parameter."""
-        x, residuals = fit.position, fit.residuals[self.rows]
-        slopes = np.zeros((int(self.rows.sum()), x.size))
+        """(bins, parameters) change of the residuals with each parameter, over its range."""
+        x = fit.position
+        slopes = np.zeros((self.rows.size, x.size))
         for k in range(x.size):
             for step in (SLOPE_STEP, -SLOPE_STEP) if x[k] < 0.5 else (-SLOPE_STEP, SLOPE_STEP):
                 moved = x.copy()
                 moved[k] += step
                 beside = self.at(fit.candidates, fit.split(moved))
                 if beside is not None:
-                    slopes[:, k] = (beside.residuals[self.rows] - residuals) / step
+                    slopes[:, k] = (beside.residuals - fit.residuals) / step
                     break
         return slopes

@@ -39,7 +39,7 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
     if x.size == 0:
         return np.zeros((0, 2))
     rows = fitter.rows
-    slopes, residuals = fitter.slopes(fit), fit.residuals[rows]
+    slopes, residuals = fitter.slopes(fit)[rows], fit.residuals[rows]
     cycles = np.unique(bins.cycle[rows], return_inverse=True)[1]
     count = int(cycles.max(initial=0)) + 1
     block = cycles * min(MOST_BLOCKS, count) // count
@@ -63,6 +63,27 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
         low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
         ends[k] = min(ends[k, 0], free.normalised(low)), max(ends[k, 1], free.normalised(high))
     return np.asarray(ends, dtype=np.float64)
+
+
+def are_there(fit: Fit, ends: Floats) -> bool:
+    """Whether each effect has a strength whose interval is without its neutral value.
+
+    Parameters
+    ----------
+    fit : Fit
+    ends : (parameters, 2) array
+        As of `intervals_of`.
+    """
+    intervals = np.split(ends, np.cumsum([point.size for point in fit.points])[:-1])
+    for candidate, own in zip(fit.candidates, intervals, strict=True):
+        strengths = [
+            (low - free.normalised(free.neutral), high - free.normalised(free.neutral))
+            for free, (low, high) in zip(candidate.free, own, strict=True)
+            if free.neutral is not None
+        ]
+        if strengths and not any(low > 0.0 or high < 0.0 for low, high in strengths):
+            return False
+    return True
 
 
 def _sums(values: Floats, group: Integers) -> Floats:

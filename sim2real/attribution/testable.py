@@ -9,11 +9,15 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fitter
-from wetwell.sim2real.attribution.gains import least_gain
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.bins import Bins
 
+LEAST_GAIN = 200.0
+"""Drop of the sum of squares that a right model may make, however much there is to compare."""
+LEAST_BY_CHANCE = 40.0
+"""Drop that the library makes of white noise: χ² of four parameters passes it once in ten million fits."""
 PROBED = (0.3, 1.0)
 """Strengths that are tried, as shares of the way from neutral to either end of the range."""
 CHANGED = 0.01
@@ -53,7 +57,7 @@ def shown_by(
     each : callable
         Tries candidates, perhaps side by side.
     """
-    least = tuple((half, least_gain(fitter.bins, half)) for half in halves)
+    least = tuple((half, _least_gain(fitter.bins, half)) for half in halves)
     are_moving = list(each(lambda candidate: _moves(candidate, fitter, least, replay), candidates))
     tested = tuple(candidate for candidate, moves in zip(candidates, are_moving, strict=True) if moves)
     names = {candidate.name for candidate in tested}
@@ -61,6 +65,11 @@ def shown_by(
     return tested, tuple(
         NotTested(effect=name, reason=_reason(candidate, replay, regimes)) for name, candidate in hidden.items()
     )
+
+
+def _least_gain(bins: Bins, rows: Flags) -> float:
+    """Drop of the sum of squares of some bins that a right model may make: by its tolerance, or by chance."""
+    return min(LEAST_GAIN, max(LEAST_BY_CHANCE, float(np.sum(bins.tolerance[rows] ** 2))))
 
 
 def _moves(candidate: Candidate, fitter: Fitter, least: tuple[tuple[Flags, float], ...], replay: Replay) -> bool:

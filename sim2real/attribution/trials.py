@@ -8,7 +8,6 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.gains import Gains, RankedFit, penalise
 
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Applies a function to items, in order, as `map` does: perhaps side by side."""
@@ -18,17 +17,18 @@ PROBES = (0.02,)
 MOST_FITTED = 8
 """Further effects that are fitted, the most promising first."""
 MOST_REFINED = 4
+LEAST_PROMISED = 10.0
+"""Drop of the sum of squares under which a further effect is not fitted: it could not pay for its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
 
 class Trials:
-    """Fits candidates to the training cycles, and ranks them on the others.
+    """Fits candidates to the training cycles.
 
     Parameters
     ----------
     fitter : Fitter
-    gains : Gains
     guesses : mapping of Candidate to list of dict
         Where the search for each begins.
     progress : callable
@@ -40,19 +40,17 @@ class Trials:
     def __init__(
         self,
         fitter: Fitter,
-        gains: Gains,
         guesses: Mapping[Candidate, Sequence[Mapping[str, float]]],
         progress: Callable[[float], None],
         each: Each,
     ) -> None:
         self._fitter = fitter
-        self._gains = gains
         self._guesses = guesses
         self._progress = progress
         self._each = each
 
-    def singles(self) -> list[RankedFit]:
-        """Single effects, best first."""
+    def singles(self) -> list[Fit]:
+        """Single effects, each with the pump or channel that fits best; the best effect first."""
         fitter, before = self._fitter, self._fitter.cost(self._fitter.plain)
         firsts: list[Fit] = []
         tried = self._each(lambda candidate: fitter.first(candidate, self._start_grids(candidate)), self._guesses)
@@ -65,28 +63,25 @@ class Trials:
             gain = before - fitter.cost(fit)
             return fitter.refine(fit) if gain > PROMISING * most and gain > 0.0 else fit
 
-        ranked = []
+        best: dict[tuple[str, ...], Fit] = {}
         for k, fit in enumerate(self._each(refined, firsts)):
-            ranked.append(self._gains.ranked(fit))
+            if fitter.cost(fit) < fitter.cost(best.get(fit.names)):
+                best[fit.names] = fit
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
-        return penalise(ranked)
+        return sorted(best.values(), key=fitter.cost)
 
-    def with_one_more(self, current: Fit, library: Sequence[Candidate]) -> list[RankedFit]:
-        """Fits of the current effects with one more, best first."""
+    def with_one_more(self, current: Fit, library: Sequence[Candidate]) -> list[Fit]:
+        """Fits of the current effects with one more, the most promising ones."""
         fitter = self._fitter
-        taken = {c.component for c in current.candidates} if len(current.names) > 1 else set()
-        free = [c for c in library if c.name not in current.names and c.component not in taken]
+        free = [c for c in library if c.name not in current.names]
         promises = list(self._each(lambda candidate: self._promise(candidate, current), free))
-        likely = [free[k] for k in np.argsort(-np.array(promises), kind="stable")[:MOST_FITTED]]
+        order = np.argsort(-np.array(promises), kind="stable")[:MOST_FITTED]
+        likely = [free[k] for k in order if promises[k] > LEAST_PROMISED]
         tried = self._each(
             lambda candidate: fitter.first(candidate, self._start_grids(candidate), others=current), likely
         )
         firsts = sorted((fit for fit in tried if fit is not None), key=fitter.cost)
-        refined = self._each(fitter.refine, firsts[:MOST_REFINED])
-        ranked = penalise([self._gains.ranked(fit) for fit in refined], self._gains.of(current))
-        while ranked and self._is_contrived(ranked[0].fit):
-            del ranked[0]
-        return ranked
+        return list(self._each(fitter.refine, firsts[:MOST_REFINED]))
 
     def _start_grids(self, candidate: Candidate, strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
         """Points to begin at, each grid once: guesses that leave the strength open have the same ones."""
@@ -105,8 +100,3 @@ class Trials:
                 along = max(-float(change @ before), 0.0)
                 most = max(most, along**2 / max(float(change @ change), 1e-12))
         return most
-
-    def _is_contrived(self, fit: Fit) -> bool:
-        """Whether an effect makes a gap in signals that show none, which the others undo."""
-        fewer = (self._fitter.without(fit, k) for k in range(len(fit.names)))
-        return any(one is not None and self._gains.is_undone(one) for one in fewer)

@@ -1,7 +1,7 @@
 """The diagnosis: verdict, where the gap lies, which effects cause it, and how far it shrinks with them."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from wetwell.sim2real.diagnosis.findings import found_effects, ranking, where_it
 from wetwell.sim2real.diagnosis.limitations import limitations
 from wetwell.sim2real.diagnosis.localisation import localise
 from wetwell.sim2real.diagnosis.report import (
+    AnswerProbability,
     ClosedLoopComparison,
     DetectorVerdicts,
     FoundEffect,
@@ -24,31 +25,34 @@ from wetwell.sim2real.diagnosis.report import (
     UntestedEffect,
     Where,
 )
-from wetwell.sim2real.diagnosis.shrinkage import gap_of, gaps_of, shrinkage
-from wetwell.sim2real.diagnosis.verdict import Verdict, repeating_gap, verdict_of
+from wetwell.sim2real.diagnosis.shrinkage import gap_of
+from wetwell.sim2real.likelihood.posterior import SetProbability, Verdict, verdict_of
 from wetwell.sim2real.recording.excerpt import excerpt
 from wetwell.sim2real.recording.regimes import Regimes, regimes_of
 from wetwell.sim2real.recording.traces import Traces, traces_of
 from wetwell.sim2real.replay.plausibility import check_plausible
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.sim2real.residuals.bins import LEVEL, SIGNALS, Bins
+from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.simulator.effects import effects_of
-from wetwell.simulator.parameters import PlantParameters
-
-LITTLE = 0.3
-"""Shrinkage under which an effect is none."""
+from wetwell.simulator.effects import EFFECTS, effects_of
+from wetwell.simulator.effects.effect import Component
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """All that is found; `station` has the effects added. `attribution` and what follows are for drawings."""
+    """All that is found; `station` has the effects added. `attribution` and what follows are for drawings.
+
+    `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
+    is in a component, whether an effect of the library or something unknown.
+    """
 
     verdict: Verdict
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
+    posterior: tuple[SetProbability, ...]
+    component_probability: dict[str, float]
     station: Station
     attribution: Attribution
     bins: Bins
@@ -71,6 +75,11 @@ class Diagnosis:
             verdict=self.verdict,
             where=self.where,
             effects=self.effects,
+            posterior=tuple(
+                AnswerProbability(effects=one.effects, verdict=one.verdict, probability=one.probability)
+                for one in self.posterior
+            ),
+            component_probability=self.component_probability,
             candidates=self.candidates,
             gap=self.gap,
             closed_loop=closed_loop,
@@ -130,20 +139,22 @@ def diagnose(
     check_plausible(traces, station, regimes, plain)
     residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
     bins = residuals.bins
-    found = _if_much(attribute(replay, residuals, regimes, candidates, progress, each), bins)
-    told = set(range(len(SIGNALS))) - ({LEVEL} if traces.inflow_m3h is None else set())  # an unknown inflow moves it
-    verdict = verdict_of(found, bins, traces.pumps, told, plain.plant)
+    found = attribute(replay, residuals, regimes, candidates, progress, each)
+    verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
-    where = _where(verdict, found, bins, traces.pumps, plain.plant, rng)
-    is_effect = verdict == "effect" and found.accepted is not None
-    effects = found.accepted.effects if is_effect and found.accepted is not None else ()
+    excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
+    unknown = localise(excess, found.plain, bins, plain.plant)
+    blamed = unknown if found.accepted is None else found.accepted.candidates[0].component
+    effects = () if found.accepted is None else found.accepted.effects
     tables = tuple(EffectTable.model_validate(effect.model_dump()) for effect in effects)
     return Diagnosis(
         verdict=verdict,
-        where=where,
-        effects=found_effects(found) if is_effect else (),
+        where=() if verdict == "none" else where_it_lies(found, bins, excess, blamed, rng),
+        effects=found_effects(found),
         candidates=ranking(found, bins, rng),
-        gap=gap_of(found.plain, found.after if is_effect else found.plain, bins, found.validation, rng),
+        gap=gap_of(found.plain, found.after, bins, found.validation, rng),
+        posterior=found.posterior,
+        component_probability=_by_component(found.posterior, unknown),
         station=station.model_copy(update={"effect": (*station.effect, *tables)}),
         attribution=found,
         bins=bins,
@@ -153,21 +164,11 @@ def diagnose(
     )
 
 
-def _if_much(found: Attribution, bins: Bins) -> Attribution:
-    """Attribution, without effects that hardly shrink the gap."""
-    if shrinkage(*gaps_of(found.plain, found.after, bins, found.validation)) >= LITTLE:
-        return found
-    return replace(found, accepted=None, equivalent=(), ends=np.zeros((0, 2)))
-
-
-def _where(
-    verdict: Verdict, found: Attribution, bins: Bins, pumps: int, plant: PlantParameters, rng: np.random.Generator
-) -> tuple[Where, ...]:
-    """Cells of what is beyond noise where nothing explains it, of what repeats where effects do."""
-    if verdict == "unknown":
-        excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
-        return where_it_lies(found, bins, excess, localise(excess, found.plain, bins, plant), rng)
-    if verdict == "effect" and found.accepted is not None:
-        excess = repeating_gap(found.plain, bins, found, pumps)
-        return where_it_lies(found, bins, excess, found.accepted.candidates[0].component, rng)
-    return ()
+def _by_component(posterior: tuple[SetProbability, ...], unknown: Component) -> dict[str, float]:
+    """Probability of each component in which something may be, the largest first."""
+    found: dict[str, float] = {}
+    for one in posterior:
+        components = {unknown} if one.verdict == "unknown" else {EFFECTS[name].component for name in one.effects}
+        for component in components:
+            found[component] = found.get(component, 0.0) + one.probability
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))

@@ -111,6 +111,14 @@ class UntestedEffect(_Part):
     reason: str
 
 
+class AnswerProbability(_Part):
+    """Probability of one answer: `none`, `unknown`, or a set of effects."""
+
+    effects: tuple[str, ...]
+    verdict: Literal["effect", "none", "unknown"]
+    probability: Short
+
+
 class GapReport(_Part):
     """What `wetwell gap diagnose` writes."""
 
@@ -119,6 +127,8 @@ class GapReport(_Part):
     verdict: Literal["effect", "none", "unknown"]
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
+    posterior: tuple[AnswerProbability, ...] = ()
+    component_probability: dict[str, Short] = {}
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
     closed_loop: ClosedLoopComparison | None

@@ -20,4 +20,14 @@ def squares_of(losses: Floats) -> Floats:
     >>> squares_of(asinh_loss(np.array([0.0, -20.0]))).round(6)
     array([  0., 400.])
     """
-    return np.asarray((ASINH_SCALE * np.sinh(losses / ASINH_SCALE)) ** 2, dtype=np.float64)
+    return np.asarray(residuals_of(losses) ** 2, dtype=np.float64)
+
+
+def residuals_of(losses: Floats) -> Floats:
+    """Residuals themselves, from what `asinh_loss` made of them."""
+    return np.asarray(ASINH_SCALE * np.sinh(losses / ASINH_SCALE), dtype=np.float64)
+
+
+def slopes_of(slopes: Floats, losses: Floats) -> Floats:
+    """(bins, parameters) slopes of the residuals themselves, from those of their losses."""
+    return np.asarray(slopes * np.cosh(losses / ASINH_SCALE)[:, None], dtype=np.float64)

@@ -31,6 +31,8 @@ class Bins:
         Mean square that noise alone makes of the residual, at most 1.
     tolerance : array
         Error of a right model that does not average out, such as of a curve or of a scan, in units of `deviation`.
+    material : array
+        Size under which nobody acts on a difference, in units of `deviation`.
     """
 
     signal: Integers
@@ -41,6 +43,7 @@ class Bins:
     deviation: Floats
     floor: Floats
     tolerance: Floats
+    material: Floats
 
     @property
     def size(self) -> int:
@@ -94,6 +97,7 @@ class Seconds:
         deviation: Floats,
         floor: Floats,
         tolerance: Floats,
+        material: Floats,
     ) -> Bins:
         """Bins of one signal of one pump, or of the station; regime and cycle are those of (n,) seconds."""
         return Bins(
@@ -105,6 +109,7 @@ class Seconds:
             deviation=deviation,
             floor=floor,
             tolerance=tolerance,
+            material=material,
         )
 
 

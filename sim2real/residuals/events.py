@@ -90,7 +90,7 @@ class EventResiduals:
     noise_m: float
     pattern: Pattern | None
 
-    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
+    def of(self, prediction: Prediction) -> Floats:
         """(events,) level that the controller saw, minus its threshold, over the standard deviation.
 
         A late level shows afterwards what the controller saw; under a late frequency the event was before its record.
@@ -153,6 +153,7 @@ def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern:
             deviation=deviation,
             floor=np.full(second.size, EVENT_FLOOR),
             tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
+            material=np.hypot(station.materiality.threshold_m, SCAN_S * slope_m_s) / deviation,
         ),
         number=np.array([event.number - 1 for event in events], dtype=np.int64)[kept],
         since_s=np.array(waited_s, dtype=np.int64)[kept],

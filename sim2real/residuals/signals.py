@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import AnalogueQuantity
+from wetwell.protocols.station.materiality import Materiality
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
@@ -38,6 +38,8 @@ AREA_TOLERANCE = 0.015
 """Share by which a right area of the wet well may be off at some level: nobody draws ladders and benches."""
 BALANCE_TOLERANCE = 0.004
 """Share of the rated flow by which a right balance may not close."""
+GAP_S, FORGOTTEN_S = 10, round(2.0 * LEVEL_TIME_S)
+"""Time without rows in which pumps may have been switched unseen; time for which the level shows it then. [s]"""
 MIN_STRETCH_S = 60
 RAMP_ROWS = 4
 """Rows in a ramp from which it is looked at."""
@@ -59,20 +61,13 @@ class SignalResiduals:
     is_repeated: Flags
     pattern: Pattern | None
 
-    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:
+    def of(self, prediction: Prediction) -> Floats:
         """(bins,) means of recorded minus predicted, over their standard deviation.
 
-        Where the telemetry holds or rounds values, only what that cannot explain counts; in ramps, only what differs
-        from all that is predicted within `excused_s`.
+        Where the telemetry holds or rounds values, only what that cannot explain counts.
         """
         values = prediction.level_m if self.pump == NO_PUMP else prediction.signals[self.name][self.pump]
         error = self.recorded - values[self.seconds.second]
-        if excused_s > 0:
-            low, high = (
-                near(values, 2 * excused_s + 1)[self.seconds.second] for near in (minimum_filter1d, maximum_filter1d)
-            )
-            is_ramp = np.isin(self.bins.regime, (START_RAMP, STOP_RAMP))[self.seconds.bin]
-            error = np.where(is_ramp, self.recorded - np.clip(self.recorded, low, high), error)
         sensor = prediction.plant.sensors[_channel(prediction.plant, self.name, self.pump)]
         if self.pattern is not None:
             held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
@@ -120,7 +115,9 @@ def pump_residuals(
             if traces.span_s > 1:
                 open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
             known = np.where(is_shown[pump], recorded[pump], np.nan)
-            one = _one_pump(name, pump, known, expected[pump], open_, regimes, noise, patterns.get(name))
+            one = _one_pump(
+                name, pump, known, expected[pump], open_, regimes, noise, station.materiality, patterns.get(name)
+            )
             if one is not None:
                 found.append(one)
     return found
@@ -176,6 +173,7 @@ def _one_pump(
     unresolved: Floats,
     regimes: Regimes,
     noise: Noise,
+    materiality: Materiality,
     pattern: Pattern | None,
 ) -> SignalResiduals | None:
     regime = regimes.of_pumps[pump]
@@ -193,6 +191,11 @@ def _one_pump(
     size = np.abs(np.where(counted, recorded, 0.0))
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
     late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
+    material = np.sqrt(
+        (_share(materiality, name) * np.hypot(seconds.means(size), 0.5 * rated)) ** 2
+        + (materiality.time_s * seconds.means(slope)) ** 2
+        + seconds.means(unresolved) ** 2
+    )
     deviation = np.sqrt(noise_alone**2 + (ZERO_TOLERANCE * rated) ** 2 / np.maximum(seconds.counts, 4.0) + late**2)
     return SignalResiduals(
         bins=seconds.bins(
@@ -203,6 +206,7 @@ def _one_pump(
             deviation=deviation,
             floor=(noise_alone / deviation) ** 2,
             tolerance=np.hypot(TOLERANCE * seconds.means(size), late) / deviation,
+            material=material / deviation,
         ),
         name=name,
         pump=pump,
@@ -211,6 +215,11 @@ def _one_pump(
         is_repeated=repeated(recorded)[seconds.second],
         pattern=pattern,
     )
+
+
+def _share(materiality: Materiality, name: AnalogueQuantity) -> float:
+    shares = {"flow_m3h": materiality.flow_share, "head_m": materiality.head_share}
+    return shares.get(name, materiality.power_share)
 
 
 def level_residuals(
@@ -223,8 +232,7 @@ def level_residuals(
 ) -> SignalResiduals:
     """Of the level."""
     counted = np.isfinite(traces.level_m)
-    if doubt.level_m is not None:
-        counted &= np.isfinite(doubt.level_m)
+    counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
@@ -239,15 +247,21 @@ def level_residuals(
     if doubt.level_m is not None:
         noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
         balance_m = np.hypot(balance_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces)[seconds.second]))
+    carried_m = rated_m3h / 3600.0 / station.sump.mean_area_m2 * LEVEL_TIME_S
+    materiality = station.materiality
+    late_m = materiality.time_s * seconds.means(np.abs(np.gradient(plain.level_m)))
+    material_m = np.sqrt(materiality.level_m**2 + (materiality.flow_share * carried_m) ** 2 + late_m**2)
+    deviation_m = np.sqrt(noise_m2 + balance_m**2)
     return SignalResiduals(
         bins=seconds.bins(
             LEVEL,
             NO_PUMP,
             regime,
             regimes.cycle,
-            deviation=np.sqrt(noise_m2 + balance_m**2),
-            floor=noise_m2 / (noise_m2 + balance_m**2),
-            tolerance=balance_m / np.sqrt(noise_m2 + balance_m**2),
+            deviation=deviation_m,
+            floor=noise_m2 / deviation_m**2,
+            tolerance=balance_m / deviation_m,
+            material=material_m / deviation_m,
         ),
         name="level_m",
         pump=NO_PUMP,
@@ -256,6 +270,15 @@ def level_residuals(
         is_repeated=repeated(traces.level_m)[seconds.second],
         pattern=patterns.get("level_m"),
     )
+
+
+def _after_gaps(is_row: Flags) -> Flags:
+    """(n,) whether rows were missing so lately that the observer of the level has not come back."""
+    place = np.arange(is_row.size)
+    last = np.maximum.accumulate(np.where(is_row, place, 0))
+    ends = np.r_[False, place[1:] - last[:-1] > GAP_S] & is_row
+    since_s = place - np.maximum.accumulate(np.where(ends, place, -FORGOTTEN_S))
+    return np.asarray(since_s < FORGOTTEN_S)
 
 
 def moved_m(traces: Traces) -> Floats:

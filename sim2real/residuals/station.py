@@ -21,7 +21,7 @@ class _Part(Protocol):
     @property
     def bins(self) -> Bins: ...
 
-    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats: ...
+    def of(self, prediction: Prediction) -> Floats: ...
 
 
 class StationResiduals:
@@ -37,6 +37,6 @@ class StationResiduals:
             self._parts.append(event_residuals(traces, station, regimes, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 
-    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:
-        """(bins,) residuals in units of noise; with transients in ramps excused that are over within some seconds."""
-        return np.concatenate([part.of(prediction, excused_s) for part in self._parts])
+    def of(self, prediction: Prediction) -> Floats:
+        """(bins,) residuals in units of noise."""
+        return np.concatenate([part.of(prediction) for part in self._parts])

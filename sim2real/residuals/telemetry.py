@@ -79,7 +79,7 @@ class TelemetryResiduals:
     patterns: tuple[Pattern, ...]
     cycles: int
 
-    def of(self, prediction: Prediction, excused_s: int = 0) -> Floats:  # noqa: ARG002 - has no ramps
+    def of(self, prediction: Prediction) -> Floats:
         """(patterns that count * cycles,) nothing where the plant holds or rounds so, else `STRENGTH`."""
         sensors = prediction.plant.sensors
         pumps = len(prediction.plant.pumps)
@@ -106,6 +106,7 @@ def telemetry_residuals(traces: Traces, station: Station, regimes: Regimes) -> T
             deviation=np.ones(cycle.size * count),
             floor=np.zeros(cycle.size * count),
             tolerance=np.zeros(cycle.size * count),
+            material=np.ones(cycle.size * count),
         ),
         patterns=patterns,
         cycles=cycle.size,

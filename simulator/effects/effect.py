@@ -31,33 +31,23 @@ def limits(low: float, high: float, unit: str) -> Any:
     return Field(ge=low, le=high, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
 
-RESOLVED_S = 1.0
-"""What is over sooner no sample a second shows. [s]"""
-
-
 class Effect(Table):
     """Base of the effects: one component of the station that behaves otherwise than the plain model.
 
     A subclass is one file: the equation and its source, parameters with range and unit, and `modify` or `force`.
     `neutral` names the parameters that are its strength, with the values at which it changes nothing, bit for bit.
-    `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_shaped`
-    says that the field knows other forms of it also while nothing is switched, as of the shape of a sump.
+    `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open.
     """
 
     component: ClassVar[Component]
     neutral: ClassVar[dict[str, float]]
     has_one_form: ClassVar[bool] = False
-    is_shaped: ClassVar[bool] = False
 
     name: str
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Parameters of the plant under this effect."""
         return parameters
-
-    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - most do not depend on the plant
-        """Whether values of each second can show it on this plant; not what is over within a second."""
-        return True
 
     def force(self, forcing: Forcing, time_s: Floats) -> None:
         """Work into the forcing of a block that begins at `time_s[0]`; for what changes with time."""

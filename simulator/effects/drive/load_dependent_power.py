@@ -29,7 +29,6 @@ class LoadDependentPower(Effect):
 
     component: ClassVar[Component] = "drive"
     neutral: ClassVar[dict[str, float]] = {"share": 0.0}
-    is_shaped: ClassVar[bool] = True
 
     name: Literal["load_dependent_power"] = "load_dependent_power"
     share: Annotated[float, limits(0.0, 1.0, "1")]

@@ -29,7 +29,6 @@ class MotorSlip(Effect):
 
     component: ClassVar[Component] = "drive"
     neutral: ClassVar[dict[str, float]] = {"slip": 0.0}
-    is_shaped: ClassVar[bool] = True
 
     name: Literal["motor_slip"] = "motor_slip"
     slip: Annotated[float, limits(0.0, 0.15, "1")]

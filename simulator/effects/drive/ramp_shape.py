@@ -3,11 +3,8 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters
-
-BENT = 0.05
-"""Departure of the power from 1, or of the bow from 0, from which a ramp is bent."""
 
 
 class RampShape(Effect):
@@ -47,7 +44,3 @@ class RampShape(Effect):
             speed_lag_s=parameters.speed_lag_s + self.lag_s,
             ramp_bow=max(parameters.ramp_bow, self.bow),
         )
-
-    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
-        """Whether the ramp is bent, or late by a second or more."""
-        return abs(self.power - 1.0) > BENT or self.bow > BENT or self.lag_s >= RESOLVED_S

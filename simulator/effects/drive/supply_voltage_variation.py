@@ -37,7 +37,6 @@ class SupplyVoltageVariation(Effect):
 
     component: ClassVar[Component] = "drive"
     neutral: ClassVar[dict[str, float]] = {"daily_amplitude": 0.0, "fast_amplitude": 0.0}
-    is_shaped: ClassVar[bool] = True
 
     name: Literal["supply_voltage_variation"] = "supply_voltage_variation"
     daily_amplitude: Annotated[float, limits(0.0, 0.2, "1")] = 0.0

@@ -36,7 +36,6 @@ class AirPocket(Effect):
 
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"head_m": 0.0}
-    is_shaped: ClassVar[bool] = True
 
     name: Literal["air_pocket"] = "air_pocket"
     head_m: Annotated[float, limits(0.0, 20.0, "m")]

@@ -26,7 +26,6 @@ class FrictionBias(Effect):
 
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"factor": 1.0}
-    is_shaped: ClassVar[bool] = True
 
     name: Literal["friction_bias"] = "friction_bias"
     factor: Annotated[float, limits(0.2, 5.0, "1")]

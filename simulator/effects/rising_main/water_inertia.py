@@ -3,9 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
-
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, MainNumber, limits
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -40,10 +38,3 @@ class WaterInertia(Effect):
         return parameters.with_mains(
             lambda main: replace(main, inertia_s2_m2=main.inertia_s2_m2 + self.inertia_s2_m2), self.main
         )
-
-    def is_seen(self, parameters: PlantParameters) -> bool:
-        """Whether the time constant I Q / H of a pump at its duty point is a second or more."""
-        flow_m3h = parameters.rated_flow_m3h
-        c0, c1, c2 = parameters.curves.T
-        head_m = c0 + (c1 + c2 * flow_m3h) * flow_m3h
-        return bool(np.any(self.inertia_s2_m2 * flow_m3h / 3600.0 >= RESOLVED_S * head_m))

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.protocols.quantities import AnalogueQuantity
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters
 
 
@@ -36,7 +36,3 @@ class ChannelDelay(Effect):
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Delay the channel."""
         return parameters.with_sensors(lambda sensor: replace(sensor, delay_s=self.delay_s), self.channel)
-
-    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
-        """Whether the delay is a second or more."""
-        return self.delay_s >= RESOLVED_S

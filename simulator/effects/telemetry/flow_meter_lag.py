@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters, followed_share
 
 
@@ -33,7 +33,3 @@ class FlowMeterLag(Effect):
         return parameters.with_sensors(
             lambda sensor: replace(sensor, followed=followed_share(self.lag_s)), "flow_m3h"
         )
-
-    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
-        """Whether the lag is a second or more."""
-        return self.lag_s >= RESOLVED_S

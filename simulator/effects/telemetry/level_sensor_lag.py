@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from wetwell.simulator.effects.effect import RESOLVED_S, Component, Effect, limits
+from wetwell.simulator.effects.effect import Component, Effect, limits
 from wetwell.simulator.parameters import PlantParameters, followed_share
 
 
@@ -32,7 +32,3 @@ class LevelSensorLag(Effect):
         """Damp the level."""
         followed = followed_share(self.lag_s)
         return parameters.with_sensors(lambda sensor: replace(sensor, followed=followed), "level_m")
-
-    def is_seen(self, parameters: PlantParameters) -> bool:  # noqa: ARG002 - the same on every plant
-        """Whether the lag is a second or more."""
-        return self.lag_s >= RESOLVED_S

@@ -40,7 +40,6 @@ class SumpAreaProfile(Effect):
 
     component: ClassVar[Component] = "sump"
     neutral: ClassVar[dict[str, float]] = {"bottom_factor": 1.0, "top_factor": 1.0}
-    is_shaped: ClassVar[bool] = True
 
     name: Literal["sump_area_profile"] = "sump_area_profile"
     bottom_factor: Annotated[float, limits(0.1, 4.0, "1")]

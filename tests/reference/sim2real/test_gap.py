@@ -7,6 +7,7 @@ import pytest
 
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
+from wetwell.protocols.station.materiality import Materiality
 from wetwell.protocols.station.station_file import EffectTable, load_station
 from wetwell.services.batch.gap import diagnose_file, replay_file
 from wetwell.services.stations import find_scenario
@@ -70,9 +71,9 @@ def test_a_cutoff_of_a_second_or_two_a_ramp_is_told_beside_a_rougher_main(alpha)
     assert [effect.name for effect in report.effects] == ["friction_bias", "flow_low_cutoff"]
 
 
-def test_a_delay_under_a_second_is_not_told_beside_a_lag(alpha):
+def test_a_delay_that_matters_to_nobody_is_not_told_beside_a_lag(alpha):
     lag = {"name": "flow_meter_lag", "lag_s": 6.0}
-    delay = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.3}
+    delay = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.05}
     report = diagnose(record(alpha, [lag, delay]), alpha).report()
     assert [effect.name for effect in report.effects] == ["flow_meter_lag"]
 
@@ -117,10 +118,14 @@ def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     assert report.where[0].component == "flow_meter"
 
 
-def test_inertia_that_is_over_within_a_second_is_no_gap(alpha):
-    report = diagnose(record(alpha, [{"name": "water_inertia", "inertia_s2_m2": 250.0}]), alpha).report()
-    assert (report.verdict, report.effects) == ("none", ())
-    assert report.gap.before > 1.1
+@pytest.mark.parametrize(("head_share", "verdict"), [(0.01, "effect"), (0.1, "none")])
+def test_what_matters_is_up_to_the_station(alpha, head_share, verdict):
+    """A head that is .8 m off is a gap for those who care for a per cent, and none for a tenth of it."""
+    station = alpha.model_copy(update={"materiality": Materiality(head_share=head_share)})
+    diagnosis = diagnose(record(alpha, [{"name": "head_sensor_offset", "offset_m": 0.8}]), station)
+    assert diagnosis.verdict == verdict
+    assert sum(one.probability for one in diagnosis.posterior) == pytest.approx(1.0)
+    assert (diagnosis.component_probability.get("head_sensor", 0.0) > 0.5) == (verdict == "effect")
 
 
 def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):

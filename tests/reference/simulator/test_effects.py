@@ -14,9 +14,7 @@ from scipy.optimize import brentq, fsolve
 
 from wetwell.protocols.station.control import Control
 from wetwell.protocols.station.station_file import EffectTable
-from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.inflow.recorded import RecordedInflow
-from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -419,21 +417,3 @@ def test_supply_voltage_variation_is_seen_in_the_power_alone(quiet_alpha):
     np.testing.assert_allclose(rows["pump1_power_kw"], expected, rtol=1e-12)
     for column in set(plain) - {f"{truth}pump{i}_power_kw" for truth in ("", "truth_") for i in (1, 2, 3)}:
         assert plain[column].tobytes() == rows[column].tobytes(), column
-
-
-@pytest.mark.parametrize(
-    ("seen", "unseen"),
-    [
-        ({"name": "flow_meter_lag", "lag_s": 3.0}, {"lag_s": 0.4}),
-        ({"name": "level_sensor_lag", "lag_s": 3.0}, {"lag_s": 0.4}),
-        ({"name": "channel_delay", "channel": "flow_m3h", "delay_s": 3.0}, {"delay_s": 0.4}),
-        ({"name": "ramp_shape", "lag_s": 3.0}, {"lag_s": 0.4}),
-        ({"name": "ramp_shape", "power": 1.3}, {"power": 1.001}),
-        ({"name": "ramp_shape", "bow": 0.5}, {"bow": 0.001}),
-        ({"name": "water_inertia", "inertia_s2_m2": 2000.0}, {"inertia_s2_m2": 100.0}),
-    ],
-)
-def test_what_is_over_within_a_second_is_not_seen(alpha, seen, unseen):
-    plant = plant_parameters(alpha)
-    assert EFFECTS[seen["name"]].model_validate(seen).is_seen(plant)
-    assert not EFFECTS[seen["name"]].model_validate(seen | unseen).is_seen(plant)

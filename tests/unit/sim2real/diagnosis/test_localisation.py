@@ -26,6 +26,7 @@ def bins_of(signals, regime):
         deviation=np.where(np.repeat(signals, count) == HEAD, HEAD_DEVIATION, 1.0),
         floor=np.zeros(size),
         tolerance=np.zeros(size),
+        material=np.zeros(size),
     )
 
 

@@ -54,7 +54,7 @@ def test_a_timer_may_begin_after_the_event_before(alpha, delay_s, since_s, above
     residuals = EventResiduals(
         bins=Bins(
             **dict.fromkeys(("regime", "cycle", "pump", "second"), np.zeros(1, dtype=np.int64)),
-            **dict.fromkeys(("deviation", "floor", "tolerance"), one),
+            **dict.fromkeys(("deviation", "floor", "tolerance", "material"), one),
             signal=np.array([START_LEVEL]),
         ),
         number=np.array([0]),

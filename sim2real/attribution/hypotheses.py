@@ -1,0 +1,135 @@
+"""Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.trials import Each
+from wetwell.sim2real.likelihood.cells import Cells
+from wetwell.sim2real.likelihood.covariance import Form, no_form
+from wetwell.sim2real.likelihood.evidence import Evidence, evidence, evidence_of_none
+from wetwell.sim2real.likelihood.flexible import flexible_factor
+from wetwell.sim2real.likelihood.posterior import Weight
+from wetwell.sim2real.residuals.asinh_loss import residuals_of, slopes_of
+from wetwell.simulator.effects.effect import Effect
+
+HOPELESS = (0.5, 50.0)
+"""Share of what the best of some fits explains, and sum of squares beyond that, by which a fit may be behind it."""
+FLEXED = 4
+"""Sets, the best first, beside which something unknown is weighed: it needs what explains most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hypothesis:
+    """A fit with its evidence; `is_possible` tells whether each of its effects matters."""
+
+    fit: Fit
+    evidence: Evidence
+    form: Form
+    is_possible: bool
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of its effects, in order of the alphabet."""
+        return tuple(sorted(self.fit.names))
+
+
+class Hypotheses:
+    """All that was weighed, one hypothesis for each set of names: the best.
+
+    Parameters
+    ----------
+    fitter : Fitter
+    cells : Cells
+        Of the residuals that it fits.
+    each : callable
+        Weighs fits, perhaps side by side.
+    """
+
+    def __init__(self, fitter: Fitter, cells: Cells, each: Each) -> None:
+        self._fitter, self._cells, self._each = fitter, cells, each
+        self._plain = self._means(fitter.plain)
+        none = evidence_of_none(cells, self._plain)
+        self._none = Hypothesis(fit=fitter.plain, evidence=none, form=no_form(cells), is_possible=True)
+        self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
+        self._factors: dict[tuple[str, ...], float] = {}
+
+    @property
+    def possible(self) -> list[Hypothesis]:
+        """Those that may be true, the most probable recording first; that of no effects is among them."""
+        found = [one for one in self._best.values() if one.is_possible]
+        return sorted(found, key=lambda one: -one.evidence.log)
+
+    def add(self, fits: Sequence[Fit]) -> None:
+        """Weigh fits, but for those that explain far less than others, and keep the best of each set of names."""
+        costs = [self._fitter.cost(fit) for fit in fits]
+        least, plain = min(costs, default=0.0), self._fitter.cost(self._fitter.plain)
+        most = min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain)
+        hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
+        for one in self._each(self._weighed, hopeful):
+            known = self._best.get(one.effects)
+            if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
+                self._best[one.effects] = one
+
+    def of(self, effects: Sequence[str]) -> Hypothesis:
+        """The hypothesis of some effects."""
+        return self._best[tuple(sorted(effects))]
+
+    def rule_out(self, effects: Sequence[str]) -> None:
+        """Take a set for impossible: one of its effects may as well not be there."""
+        names = tuple(sorted(effects))
+        self._best[names] = replace(self._best[names], is_possible=False)
+
+    def weights(self) -> list[Weight]:
+        """What the posterior is made of."""
+        possible = self.possible
+        flexed = [*possible[:FLEXED], *(one for one in possible[FLEXED:] if one is self._none)]
+        flexed = [one for one in flexed if one.effects not in self._factors]
+        self._factors |= zip((one.effects for one in flexed), self._each(self._flexible, flexed), strict=True)
+        return [
+            Weight(effects=one.effects, log=one.evidence.log, log_flexible=self._factors.get(one.effects, -np.inf))
+            for one in possible
+        ]
+
+    def _flexible(self, one: Hypothesis) -> float:
+        return flexible_factor(self._cells, one.evidence.residuals, one.form)
+
+    def _means(self, fit: Fit) -> Floats:
+        return self._cells.means(residuals_of(fit.residuals))
+
+    def _weighed(self, fit: Fit) -> Hypothesis:
+        cells, residuals = self._cells, self._means(fit)
+        signatures = [self._signature(fit, member, residuals) for member in range(len(fit.names))]
+        slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
+        form = self._form(fit, signatures)
+        found = evidence(cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form)
+        is_possible = all(self._matters(one) for one in signatures)
+        return Hypothesis(fit=fit, evidence=found, form=form, is_possible=is_possible)
+
+    def _signature(self, fit: Fit, member: int, residuals: Floats) -> Floats:
+        """(cells,) what one of its effects does beside the others; nothing where these cannot stand without it."""
+        if len(fit.names) == 1:
+            return self._plain - residuals
+        fewer = self._fitter.without(fit, member)
+        return np.zeros(residuals.size) if fewer is None else self._means(fewer) - residuals
+
+    def _form(self, fit: Fit, signatures: Sequence[Floats]) -> Form:
+        cells = self._cells
+        swings = np.zeros(cells.group.size)
+        counts = np.bincount(cells.block)
+        for effect, signature in zip(fit.effects, signatures, strict=True):
+            if type(effect).force is not Effect.force:
+                swings += (np.bincount(cells.block, signature**2) / counts)[cells.block]
+        return Form(
+            signature=np.sqrt(np.sum(np.square(signatures), axis=0)),
+            swinging=np.sqrt(swings),
+        )
+
+    def _matters(self, signature: Floats) -> bool:
+        """Whether an effect does more than what is material, in some group."""
+        cells = self._cells
+        squares = cells.group_sums(signature**2) / np.bincount(cells.group)
+        return bool(np.any(squares > cells.group_material**2))

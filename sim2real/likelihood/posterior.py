@@ -1,0 +1,134 @@
+"""Probabilities of none, unknown and of sets of effects, given a recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.special import logsumexp
+
+Verdict = Literal["effect", "none", "unknown"]
+
+NONE_PRIOR = 0.3
+"""Probability that nothing of the library acts, before anything is seen. [1]"""
+UNKNOWN_PRIOR = 0.3
+"""Probability that something acts that the library does not hold, alone or beside effects of it. [1]"""
+FURTHER_PRIOR = 0.02
+"""Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
+TEMPER = 0.3
+"""Power of the likelihood: bins are not as independent as it takes them to be. [1]"""
+CREDIBLE = 0.95
+"""Probability within which sets are not told apart. [1]"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetProbability:
+    """Probability of one answer; `effects` are in order of the alphabet, empty for `none` and `unknown`."""
+
+    effects: tuple[str, ...]
+    verdict: Verdict
+    probability: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weight:
+    """A set of effects, none of them for `none`, with its evidence.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        In order of the alphabet.
+    log : float
+        Logarithm of its evidence.
+    log_flexible : float
+        Of how much more probable the recording is if something unknown acts beside it; minus infinity where that
+        was not computed, since the set is far behind.
+    """
+
+    effects: tuple[str, ...]
+    log: float
+    log_flexible: float
+
+
+def posterior_of(weights: Sequence[Weight], library: int) -> tuple[SetProbability, ...]:
+    r"""Probabilities of the answers, best first; they sum to 1.
+
+    $$P(S) \propto (1 - u)\,\pi_S\,L_S^\eta, \qquad P(\text{unknown}) \propto u \sum_S \pi_S\,(L_S F_S)^\eta, \qquad
+    \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
+
+    with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q, `TEMPER` η and
+    n effects in the library.
+
+    Parameters
+    ----------
+    weights : sequence of Weight
+        One of them that of no effects.
+    library : int
+        Number of effects that are tested.
+
+    References
+    ----------
+    .. [1] P. Grünwald, T. van Ommen, Inconsistency of Bayesian inference for misspecified linear models, and a
+       proposal for repairing it, Bayesian Analysis 12, 2017 (the power of the likelihood).
+
+    Examples
+    --------
+    >>> far = Weight(effects=("ragging",), log=-90.0, log_flexible=0.0)
+    >>> best = posterior_of([Weight(effects=(), log=0.0, log_flexible=-9.0), far], 25)[0]
+    >>> best.verdict, round(best.probability, 2)
+    ('none', 0.97)
+    """
+    priors = np.array([_log_prior(len(weight.effects), library) for weight in weights])
+    sets = priors + TEMPER * np.array([weight.log for weight in weights])
+    unknown = priors + TEMPER * np.array([weight.log + weight.log_flexible for weight in weights])
+    logs = np.r_[np.log(1.0 - UNKNOWN_PRIOR) + sets, np.log(UNKNOWN_PRIOR) + logsumexp(unknown)]
+    shares = np.exp(logs - logsumexp(logs))
+    found = [
+        SetProbability(
+            effects=weight.effects, verdict="effect" if weight.effects else "none", probability=float(share)
+        )
+        for weight, share in zip(weights, shares[:-1], strict=True)
+    ]
+    found.append(SetProbability(effects=(), verdict="unknown", probability=float(shares[-1])))
+    return tuple(sorted(found, key=lambda one: -one.probability))
+
+
+def _log_prior(effects: int, library: int) -> float:
+    if effects == 0:
+        return float(np.log(NONE_PRIOR))
+    return float(np.log((1.0 - NONE_PRIOR) / max(library, 1)) + (effects - 1) * np.log(FURTHER_PRIOR))
+
+
+def verdict_of(posterior: Sequence[SetProbability]) -> Verdict:
+    """The most probable verdict, all sets of effects together."""
+    totals: dict[Verdict, float] = {"none": 0.0, "unknown": 0.0, "effect": 0.0}
+    for one in posterior:
+        totals[one.verdict] += one.probability
+    return max(totals, key=lambda verdict: totals[verdict])
+
+
+def best_set(posterior: Sequence[SetProbability]) -> tuple[str, ...]:
+    """The most probable set of effects; empty without any."""
+    return next((one.effects for one in posterior if one.verdict == "effect"), ())
+
+
+def equivalents(posterior: Sequence[SetProbability], effects: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """For each effect of a set those that take its place in other sets which the data do not rule out.
+
+    Parameters
+    ----------
+    posterior : sequence of SetProbability
+        Best first.
+    effects : sequence of str
+    """
+    sets = [one for one in posterior if one.verdict == "effect"]
+    total, told = sum(one.probability for one in sets), 0.0
+    found: dict[str, list[str]] = {name: [] for name in effects}
+    for one in sets:
+        if told >= CREDIBLE * total:
+            break
+        told += one.probability
+        gone, come = set(effects) - set(one.effects), set(one.effects) - set(effects)
+        if len(gone) == len(come) == 1:
+            found[gone.pop()].append(come.pop())
+    return {name: tuple(others) for name, others in found.items()}
