@@ -39,10 +39,10 @@ BLOCKS = ((0, 8), (100, 49))
 class PlcProtocol(asyncio.Protocol):
     """Answers every read of registers: 1.0 in each float, a heartbeat that follows the clock."""
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:  # noqa: D102
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport: Any = transport
 
-    def data_received(self, data: bytes) -> None:  # noqa: D102
+    def data_received(self, data: bytes) -> None:
         transaction, _, _, unit, function, address, count = struct.unpack(">HHHBBHH", data[:12])
         words = bytearray(b"\x3f\x80\x00\x00" * (count // 2 + 1))[: 2 * count]
         if address == 0:

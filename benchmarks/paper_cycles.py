@@ -58,7 +58,7 @@ class NominalNullFTest(RunDetector):
         super().__init__(station, datasheet)
         self._fits: dict[int, list[Floats]] = {}
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         curves = zip(*(_curves(run) for run in runs), strict=True)
         fits = []
         for curve in curves:
@@ -66,7 +66,7 @@ class NominalNullFTest(RunDetector):
             fits.append(np.linalg.lstsq(basis, head_m, rcond=None)[0])
         self._fits[pump] = fits
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         logs = []
         for (basis, head_m), fit in zip(_curves(run), self._fits[run.pump], strict=True):
             moving = np.hstack([basis, basis * (run.time_s / run.time_s[-1])[:, np.newaxis]])
@@ -96,10 +96,10 @@ class Cycles(RunDetector):
         super().__init__(station, datasheet)
         self.runs: list[Run] = []
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         self.runs += runs if pump == 0 else []
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         self.runs += [run] if run.pump == 0 else []
         return "normal"
 

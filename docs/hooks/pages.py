@@ -8,6 +8,9 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parent))
+import notebooks
+import schemas
+
 import reference
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +40,14 @@ def on_files(files: Files, config: Any) -> Files:
         files.append(File.generated(config, page, content=_inside(text, (ROOT / source).parent)))
     for page, content in reference.pages().items():
         files.append(File.generated(config, f"reference/{page}", content=content))
+    for page, made in schemas.schema_pages().items():
+        files.append(File.generated(config, f"reference/{page}", content=made))
+    for page, content in notebooks.notebook_pages().items():
+        files.append(
+            File.generated(
+                config, f"notebooks/{page}", content=_inside(content, ROOT / "docs" / "notebooks", depth=1)
+            )
+        )
     if MERMAID.is_file():
         files.append(File.generated(config, "assets/mermaid.min.js", content=MERMAID.read_bytes()))
     return files

@@ -7,15 +7,14 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Literal, get_args, get_origin
 
 import names
+import python_api
 import typer
-from pydantic import BaseModel
 
 import wetwell.protocols.messages
 from wetwell.protocols.messages.message import Message
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.cli import app
 from wetwell.services.reports.part_tables import part_table
-from wetwell.services.runtime.settings import Settings
 from wetwell.simulator.effects import effect_table
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.inflow import INFLOWS
@@ -25,7 +24,7 @@ def pages() -> dict[str, str]:
     """Markdown of each page, by file name."""
     return {
         "commands.md": "# Commands\n\n" + "\n".join(_command(typer.main.get_command(app), "wetwell")),
-        "settings.md": _settings(),
+        "python.md": python_api.python_page(),
         "messages.md": _messages(),
         "registers.md": _registers(),
         "effects.md": _parts("Effects", effect_table()),
@@ -68,33 +67,8 @@ def _default(option: Any) -> str:
     return f"`{option.default}`" if is_plain else ""
 
 
-def _settings() -> str:
-    text = [
-        "# Settings",
-        "",
-        "In a TOML file that `--config` or `WETWELL_CONFIG` names, or in the environment as `WETWELL_SECTION__KEY`.",
-        "Later ones win: defaults, file, environment, flags. `wetwell config check FILE`, `wetwell config show`.",
-        "",
-    ]
-    for section, field in Settings.model_fields.items():
-        table = field.annotation
-        text += [f"## `[{section}]`", "", _summary(table), ""]
-        text += [_table(("key", "default", "rule"), list(_keys(table, "")))]
-    return "\n".join(text)
-
-
 def _summary(model: Any) -> str:
     return (model.__doc__ or "").split("Attributes\n")[0].strip()
-
-
-def _keys(table: Any, prefix: str) -> Iterator[tuple[str, str, str]]:
-    rules = table.model_json_schema()["properties"]
-    for key, field in table.model_fields.items():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            yield from _keys(field.annotation, f"{prefix}{key}.")
-            continue
-        default = "" if field.default is None else f"`{field.default}`"
-        yield f"`{prefix}{key}`", default, _rule(rules[key])
 
 
 def _rule(schema: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, ValidationError, WithJsonSchema
 
 from wetwell.protocols.errors import WetwellError, first_fault
 from wetwell.protocols.timestamps import MAX_STAMP_NS, from_iso, to_iso
@@ -28,6 +28,7 @@ Stamp = Annotated[
     BeforeValidator(_stamp),
     Field(ge=-MAX_STAMP_NS, le=MAX_STAMP_NS),
     PlainSerializer(to_iso, return_type=str),
+    WithJsonSchema({"type": "string", "format": "date-time"}),
 ]
 """Nanoseconds since 1970 in code, ISO 8601 text in JSON."""
 

@@ -65,15 +65,24 @@ class Reading:
         RecordingError
             As `read_recording`, and if it is of another station, or of another number of pumps.
         """
-        recording = self.read(path)
-        self.name_for(recording, station.name, path)
+        return self.taken_for(self.read(path), station, path)
+
+    def taken_for(self, recording: Recording, station: Station, place: Path | str) -> Recording:
+        """The recording as one of a station, whose name it carries from now on.
+
+        Raises
+        ------
+        RecordingError
+            If it is of another station, or of another number of pumps.
+        """
+        self.name_for(recording, station.name, place)
         if recording.pumps != len(station.pump):
             raise RecordingError(
-                f"{path}: has {recording.pumps} pumps, station '{station.name}' has {len(station.pump)}"
+                f"{place}: has {recording.pumps} pumps, station '{station.name}' has {len(station.pump)}"
             )
         return replace(recording, station=station.name)
 
-    def name_for(self, recording: Recording, station: str | None, path: Path) -> str:
+    def name_for(self, recording: Recording, station: str | None, place: Path | str) -> str:
         """Name of the station that a recording is of: the one that is given, or else its own.
 
         Raises
@@ -85,10 +94,10 @@ class Reading:
         """
         name = recording.station if station is None else station
         if name is None:
-            raise ConfigError(f"{path}: does not say its station: give --station")
+            raise ConfigError(f"{place}: does not say its station: give --station")
         if not self.as_station and recording.station not in {None, name}:
             way = f"--as-station takes it for one of '{name}'"
-            raise RecordingError(f"{path}: is of station '{recording.station}', not of '{name}' ({way})")
+            raise RecordingError(f"{place}: is of station '{recording.station}', not of '{name}' ({way})")
         return name
 
 

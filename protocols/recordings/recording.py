@@ -146,8 +146,32 @@ def read_recording(path: Path, time_zone: ZoneInfo | None = None) -> Recording:
         value is not of its column's kind, or a stamp has no zone; one line with file, column and rule.
     """
     table, origin = _read_table(path)
+    return recording_of(table, path, time_zone, origin)
+
+
+def recording_of(
+    table: pa.Table, place: Path | str, time_zone: ZoneInfo | None = None, origin: Origin | None = None
+) -> Recording:
+    """Recording in a table with the columns of one.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+    place : Path or str
+        What the table is called in an error.
+    time_zone : ZoneInfo, optional
+        Of the clock whose stamps have no zone; those that have one keep it.
+    origin : Origin, optional
+        Station and what a value stands for; by default what the metadata of the table say.
+
+    Raises
+    ------
+    RecordingError
+        As `read_recording`, but of the file.
+    """
+    origin = Origin.of_metadata(table.schema.metadata or {}) if origin is None else origin
     if "time" not in table.column_names:
-        raise RecordingError(f"{path}: column 'time' is missing")
+        raise RecordingError(f"{place}: column 'time' is missing")
     columns: dict[str, Floats] = {}
     truth: dict[str, npt.NDArray[Any]] = {}
     ignored: list[str] = []
@@ -155,13 +179,13 @@ def read_recording(path: Path, time_zone: ZoneInfo | None = None) -> Recording:
         if name == "time":
             continue
         if name in STATION_QUANTITIES or pump_of(name):
-            columns[name] = _numbers(table[name], name, path)
+            columns[name] = _numbers(table[name], name, place)
         elif name.startswith(TRUTH_PREFIX):
             truth[name] = table[name].to_numpy()
         else:
             ignored.append(name)
     recording = Recording(
-        time_ns=_stamps(table["time"], time_zone, path),
+        time_ns=_stamps(table["time"], time_zone, place),
         columns=columns,
         truth=truth,
         ignored=tuple(ignored),
@@ -169,9 +193,9 @@ def read_recording(path: Path, time_zone: ZoneInfo | None = None) -> Recording:
         value=origin.value,
     )
     if recording.pumps == 0:
-        raise RecordingError(f"{path}: no pump column such as 'pump1_flow_m3h' found")
+        raise RecordingError(f"{place}: no pump column such as 'pump1_flow_m3h' found")
     if len(recording) == 0:
-        raise RecordingError(f"{path}: has no rows")
+        raise RecordingError(f"{place}: has no rows")
     return recording
 
 
@@ -227,7 +251,7 @@ def _csv_header(path: Path) -> tuple[str, list[str]]:
     return mark, header
 
 
-def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
+def _numbers(column: pa.ChunkedArray, name: str, path: Path | str) -> Floats:
     try:
         values: Floats = column.cast(pa.float64()).to_numpy()
     except pa.ArrowException as error:
@@ -235,7 +259,7 @@ def _numbers(column: pa.ChunkedArray, name: str, path: Path) -> Floats:
     return values
 
 
-def _stamps(column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path) -> Integers:
+def _stamps(column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path | str) -> Integers:
     if pa.types.is_timestamp(column.type):
         if column.null_count:
             row = int(np.argmax(column.is_null().to_numpy())) + 1
@@ -246,7 +270,7 @@ def _stamps(column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path) -> 
             raise RecordingError(f"{path}: column 'time': {error}") from error
         is_local = np.full(stamps.size, column.type.tz is None)
     else:
-        texts = column.to_numpy()
+        texts = column.cast(pa.string()).to_numpy()
         try:
             stamps = np.array([from_iso(text) for text in texts], dtype=np.int64)
         except (TypeError, ValueError):
@@ -258,7 +282,7 @@ def _stamps(column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path) -> 
 
 
 def _utc(
-    stamps_ns: Integers, is_local: Flags, column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path
+    stamps_ns: Integers, is_local: Flags, column: pa.ChunkedArray, time_zone: ZoneInfo | None, path: Path | str
 ) -> Integers:
     """Stamps of which some are those of a local clock, in UTC."""
     local = np.flatnonzero(is_local)
@@ -313,14 +337,19 @@ def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
     try:
         with atomic_file(path) as file, contextlib.ExitStack() as stack:
             write = _block_writer(file, suffix, stack)
-            yield lambda block: write(_table(block, suffix))
+            yield lambda block: write(
+                table_of(block) if suffix == ".parquet" else _table(block, to_iso_array(block.time_ns))
+            )
     except pa.ArrowException as error:
         raise RecordingError(f"{path}: cannot be written: {error}") from error
 
 
-def _table(recording: Recording, suffix: str) -> pa.Table:
-    time: Any = recording.time_ns
-    time = pa.array(time, pa.timestamp("ns", tz="UTC")) if suffix == ".parquet" else to_iso_array(time)
+def table_of(recording: Recording) -> pa.Table:
+    """Arrow table of a recording; `time` in ns, UTC; station and value in the metadata."""
+    return _table(recording, pa.array(recording.time_ns, pa.timestamp("ns", tz="UTC")))
+
+
+def _table(recording: Recording, time: Any) -> pa.Table:
     origin = Origin(station=recording.station, value=recording.value)
     table = pa.table({"time": time, **recording.columns, **recording.truth})
     return table.replace_schema_metadata(origin.metadata)

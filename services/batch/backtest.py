@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.evaluation.backtest import Outcome, outcome, summary
-from wetwell.detector.evaluation.methods import DETECTORS, detector_class
+from wetwell.detector.evaluation.methods import DETECTORS
 from wetwell.detector.evaluation.scores import in_order_of_time, without_truth
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.atomic_file import atomic_file
@@ -26,6 +26,7 @@ from wetwell.protocols.station.station_file import Station, load_station
 from wetwell.protocols.timestamps import LEARNING_S
 from wetwell.services.batch.dataset import MANIFEST, read_manifest
 from wetwell.services.batch.journal import Journal, fingerprint, open_journal
+from wetwell.services.batch.own_methods import Method, method_identity, method_named
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.reports.backtest_page import backtest_page
 from wetwell.simulator.scenario import Scenario
@@ -103,7 +104,7 @@ class SimulatedRecording:
 
 
 def detector_names(text: str) -> list[str]:
-    """Names of detectors in a text with commas, each once; `all` stands for every one.
+    """Names of detectors in a text with commas, each once; `all` stands for every one, `FILE.py:CLASS` for one's own.
 
     Raises
     ------
@@ -117,7 +118,7 @@ def detector_names(text: str) -> list[str]:
     """
     names = list(DETECTORS) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
-        detector_class(name)
+        method_named(name)
     return names
 
 
@@ -184,7 +185,7 @@ def run_backtest(
     WetwellError
         If none could; one line.
     """
-    how = [version("wetwell"), list(detectors), learning_s]
+    how = [version("wetwell"), list(map(method_identity, detectors)), learning_s]
     keys = [fingerprint(how, source.station.model_dump(mode="json"), source.identity()) for source in sources]
     kept = {line["key"]: line["outcomes"] for line in journal.lines} if journal else {}
     done = {number: OUTCOMES.validate_python(kept[key]) for number, key in enumerate(keys) if key in kept}
@@ -273,21 +274,42 @@ def judge(source: Source, detectors: Sequence[str], learning_s: float = LEARNING
     RecordingError
         If the recording has no truth, or is not of the station.
     """
-    recording = source.load()
+    return scored(source.load(), source.name, source.station, detectors_named(detectors), learning_s)
+
+
+def detectors_named(names: Iterable[str]) -> dict[str, Method]:
+    """Method of each name."""
+    return {name: method_named(name) for name in names}
+
+
+def scored(
+    recording: Recording,
+    place: str,
+    station: Station,
+    detectors: Mapping[str, Method],
+    learning_s: float = LEARNING_S,
+) -> dict[str, Outcome]:
+    """Outcome of each detector on a recording with truth; `place` is what an error calls it.
+
+    Raises
+    ------
+    RecordingError
+        If the recording has no truth.
+    """
     for column in (f"truth_pump{pump}_state" for pump in range(1, recording.pumps + 1)):
         if column not in recording.truth:
-            raise RecordingError(f"{source.name}: column '{column}' is missing, so nothing can be scored")
-    told = verdicts_on(recording, source.station, detectors)
+            raise RecordingError(f"{place}: column '{column}' is missing, so nothing can be scored")
+    told = verdicts_on(recording, station, detectors)
     truth = in_order_of_time(recording)
     return {name: outcome(verdicts, truth, spent_s, learning_s) for name, (verdicts, spent_s) in told.items()}
 
 
 def verdicts_on(
-    recording: Recording, station: Station, detectors: Sequence[str]
+    recording: Recording, station: Station, detectors: Mapping[str, Method]
 ) -> dict[str, tuple[list[Verdict], float]]:
     """Verdicts of each detector, and the time that it took; the detectors see no truth column. [s]."""
     datasheet = datasheet_of(station)
-    judges = {name: detector_class(name)(station.name, datasheet) for name in detectors}
+    judges = {name: method(station.name, datasheet) for name, method in detectors.items()}
     verdicts: dict[str, list[Verdict]] = {name: [] for name in detectors}
     spent_s = dict.fromkeys(detectors, 0.0)
     for block in blocks(without_truth(recording), datasheet.pumps):

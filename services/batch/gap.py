@@ -18,7 +18,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import prepared, write_station
 from wetwell.services.reports.gap_page import gap_page
 from wetwell.sim2real.calibration.validation import Validation, validate
-from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
 from wetwell.sim2real.recording.preparation import PreparationReport
@@ -52,18 +52,12 @@ def diagnose_file(
     RecordingError
         If the recording cannot be used, or the folder not be written.
     """
-    for name in [*(only or ()), *without]:
-        if name not in EFFECTS:
-            raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
+    check_effects([*(only or ()), *without])
     rows, preparation = prepared(recording, None, station, reading)
     try:
-        with ThreadPoolExecutor(THREADS) as pool:
-            diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
-        closed_loop = _closed_loop(rows, station, diagnosis.station)
+        report, diagnosis = diagnose_rows(station, rows, preparation, only=only, without=without, progress=progress)
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error
-    notes = _notes(preparation, diagnosis.traces.rate_s)
-    report = diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), notes)
     page = gap_page(report, diagnosis)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -77,6 +71,42 @@ def diagnose_file(
         with atomic_file(out / name) as file:
             file.write(text.encode())
     return report
+
+
+def check_effects(names: Iterable[str]) -> None:
+    """Refuse effects that there are not.
+
+    Raises
+    ------
+    ConfigError
+        Names the first.
+    """
+    for name in names:
+        if name not in EFFECTS:
+            raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
+
+
+def diagnose_rows(
+    station: Station,
+    rows: Recording,
+    preparation: PreparationReport,
+    *,
+    only: Iterable[str] | None = None,
+    without: Iterable[str] = (),
+    progress: Callable[[float], None] = lambda _: None,
+) -> tuple[GapReport, Diagnosis]:
+    """Report of a diagnosis, and the diagnosis.
+
+    Raises
+    ------
+    ValueError
+        If the recording cannot be diagnosed.
+    """
+    with ThreadPoolExecutor(THREADS) as pool:
+        diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
+    closed_loop = _closed_loop(rows, station, diagnosis.station)
+    notes = _notes(preparation, diagnosis.traces.rate_s)
+    return diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), notes), diagnosis
 
 
 def replay_file(

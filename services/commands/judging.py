@@ -55,7 +55,9 @@ def detect(
     told = judge(plant, rows, out, html)
     found = told["episodes"]
     shown = (
-        [one.model_dump(mode="json", exclude={"schema_name"}) for one in found] if as_json else episode_rows(found)
+        [one.model_dump(mode="json", exclude={"schema_name"}) for one in found]
+        if as_json
+        else episode_rows(found, plant.pump_labels)
     )
     print_result(told | {"episodes": shown if as_json or shown else "none"}, as_json=as_json)
 
@@ -87,7 +89,8 @@ def backtest(
         typer.Option("--history", metavar="DIR", help="Score a history by what crews found; with --station NAME."),
     ] = None,
     detectors: Annotated[
-        str, typer.Option(metavar="NAMES", help="With commas between; `all` for every one.")
+        str,
+        typer.Option(metavar="NAMES", help="With commas between; `all` for every one, FILE.py:CLASS for your own."),
     ] = "wetwell,paper_f_test,paper_tangent,paper_f_shift,paper_tangent_segments",
     learning_h: Annotated[
         float, typer.Option("--learning-h", min=0.0, help="Runs that end in these first hours are not scored.")

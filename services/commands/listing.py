@@ -1,4 +1,4 @@
-"""What there is: stations, settings, registers, effects, faults."""
+"""What there is: stations, settings, registers, effects, faults, schemas."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -153,6 +153,20 @@ def inflows(*, as_json: JsonOption = False) -> None:
     from wetwell.simulator.inflow import INFLOWS
 
     _print_parts("inflows", INFLOWS, as_json=as_json)
+
+
+@app.command(cls=about("--name"), rich_help_panel=ADMINISTER)
+def schema(
+    name: Annotated[str | None, typer.Option("--name", metavar="NAME", help="Such as station.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the JSON Schema of a file or a message, for editors; without a name list what there is."""
+    from wetwell.services.schemas.registry import SCHEMAS, schema_named
+
+    if name is not None:
+        return print_result(schema_named(name), as_json=True)
+    rows = [{"schema": key, "of": words} for key, (words, _) in SCHEMAS.items()]
+    return print_result({"schemas": rows}, as_json=as_json)
 
 
 def _print_parts(name: str, parts: Mapping[str, "type[BaseModel]"], *, as_json: bool) -> None:

@@ -17,8 +17,8 @@ NAMES = 130
 """Room for the names of the assets. [px]"""
 
 
-def episode_rows(episodes: Sequence[Episode]) -> list[dict[str, object]]:
-    """One row an episode, for people.
+def episode_rows(episodes: Sequence[Episode], labels: Sequence[str] = ()) -> list[dict[str, object]]:
+    """One row an episode, for people; where `labels` say what they call the pumps, that stands beside a number.
 
     Examples
     --------
@@ -31,7 +31,7 @@ def episode_rows(episodes: Sequence[Episode]) -> list[dict[str, object]]:
     """
     return [
         {
-            "asset": episode.asset,
+            "asset": _named(episode.asset, labels),
             "state": episode.state,
             "stage": episode.stage,
             "from": to_iso(episode.since),
@@ -42,6 +42,12 @@ def episode_rows(episodes: Sequence[Episode]) -> list[dict[str, object]]:
         }
         for episode in episodes
     ]
+
+
+def _named(asset: str, labels: Sequence[str]) -> str:
+    kind, _, number = asset.partition(":")
+    label = labels[int(number) - 1] if kind == "pump" and int(number) <= len(labels) else number
+    return asset if label == number else f"{asset} ({label})"
 
 
 def episode_page(station: str, episodes: Sequence[Episode], first_ns: int, last_ns: int) -> str:

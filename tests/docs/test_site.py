@@ -28,11 +28,11 @@ def test_every_page_of_docs_is_on_the_site(site):
 
 def test_the_reference_knows_every_command_and_setting(site):
     commands = (site / "reference" / "commands.html").read_text(encoding="utf-8")
-    settings = (site / "reference" / "settings.html").read_text(encoding="utf-8")
+    settings = (site / "reference" / "settings-keys.html").read_text(encoding="utf-8")
     assert all(
         f"wetwell {name}" in commands for name in ("up", "detector rebaseline", "gap diagnose", "station check")
     )
-    assert all(name in settings for name in ("state_dir", "endpoint", "word_order", "costs.pull_pump"))
+    assert all(name in settings for name in ("state_dir", "endpoint", "word_order", "pull_pump"))
 
 
 def test_nothing_is_loaded_from_elsewhere(site):

@@ -8,8 +8,8 @@ from wetwell.protocols.messages.verdict import State
 class AlwaysNormal(RunDetector):
     """Tells every run normal."""
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         pass
 
-    def _told(self, run: Run) -> State:  # noqa: ARG002
+    def told(self, run: Run) -> State:  # noqa: ARG002
         return "normal"

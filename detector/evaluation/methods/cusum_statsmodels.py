@@ -24,10 +24,10 @@ class CusumStatsmodels(RunDetector):
         super().__init__(station, datasheet)
         self._learnt_m: list[Floats] = [np.empty((0, 2)) for _ in range(datasheet.pumps)]
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         self._learnt_m[pump] = np.concatenate([run.segments.residual_m for run in runs])
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         series_m = np.concatenate([self._learnt_m[run.pump], run.segments.residual_m])
         pump, system = (
             breaks_cusumolsresid(residual_m, ddof=1)[1] < ALPHA for residual_m in (series_m - series_m.mean(axis=0)).T

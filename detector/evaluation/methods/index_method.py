@@ -36,10 +36,10 @@ class IndexMethod(RunDetector):
     def _residuals(self, run: Run) -> tuple[Floats, Floats]:
         """ψ_p and ψ_s of a run."""
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         self._healthy[pump].extend(attribution_index(*self._residuals(run)) for run in runs)
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         psi_p, psi_s = self._residuals(run)
         if not len(psi_p):
             return "unknown"

@@ -29,10 +29,10 @@ class PaperFShift(RunDetector):
         super().__init__(station, datasheet)
         self._means_m: list[Floats] = [np.empty((0, 2)) for _ in range(datasheet.pumps)]
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         self._means_m[pump] = np.array([run.segments.residual_m.mean(axis=0) for run in runs])
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         learnt_m = self._means_m[run.pump]
         count = len(learnt_m)
         variance = learnt_m.var(axis=0, ddof=1) * (1.0 + 1.0 / count)

@@ -23,10 +23,10 @@ class PaperFTest(RunDetector):
        F-test.
     """
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         pass
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         pump = pump_curve_f_test(run.time_s, run.flow_m3h, run.head_m, run.speed_ratio).log_p
         system = system_curve_f_test(run.time_s, run.total_flow_m3h, run.head_m).log_p
         if min(pump, system) >= LOG_ALPHA:

@@ -31,9 +31,9 @@ class PaperTangentSegments(IndexMethod):
         super().__init__(station, datasheet)
         self._learnt = np.full((datasheet.pumps, 4), np.nan)
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         self._learnt[pump] = np.mean(np.concatenate([_segments(run) for run in runs], axis=1), axis=1)
-        super()._learn(pump, runs)
+        super().learn(pump, runs)
 
     def _residuals(self, run: Run) -> tuple[Floats, Floats]:
         now, learnt = _segments(run), self._learnt[run.pump][:, np.newaxis]

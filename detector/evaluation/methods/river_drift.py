@@ -33,14 +33,14 @@ class RiverDrift(RunDetector):
     def _new(self) -> Any:
         raise NotImplementedError
 
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         segments_m = np.concatenate([run.segments.residual_m for run in runs])
         self._centre_m[pump] = segments_m.mean(axis=0)
         self._segment_sd_m[pump] = segments_m.std(axis=0, ddof=1)
         self._run_sd_m[pump] = np.array([run.segments.residual_m.mean(axis=0) for run in runs]).std(axis=0, ddof=1)
         self._drifts(pump, segments_m)
 
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         away = (
             abs(run.segments.residual_m.mean(axis=0) - self._centre_m[run.pump])
             > AWAY_SIGMAS * self._run_sd_m[run.pump]

@@ -20,6 +20,8 @@ ALPHA = 1e-3
 class RunDetector(ABC):
     """One hard verdict at the end of each run: what a method says of it, or `learning`, or `unknown` without data.
 
+    A method is a class with `learn` and `told`, which are given runs; what it keeps is its own affair.
+
     Unlike the detector, a baseline takes whatever comes in the first six hours as healthy, and has no early verdicts,
     no memory between pumps and no probabilities: `probability` holds the told state with 1.
 
@@ -53,11 +55,11 @@ class RunDetector(ABC):
         return tuple(self._judge(run, run.window_ns[1]) for run in self._runs.finish())
 
     @abstractmethod
-    def _learn(self, pump: int, runs: list[Run]) -> None:
+    def learn(self, pump: int, runs: list[Run]) -> None:
         """Take the runs of the learning phase of a pump (from 0); called once for each."""
 
     @abstractmethod
-    def _told(self, run: Run) -> State:
+    def told(self, run: Run) -> State:
         """State of a run with at least 25 steady samples, after learning."""
 
     def _judge(self, run: Run, time_ns: int) -> Verdict:
@@ -82,9 +84,9 @@ class RunDetector(ABC):
                 if len(run.time_s) >= MIN_SEGMENTS * SEGMENT_SAMPLES:
                     learnt.append(run)
                 return "learning"
-            self._learn(run.pump, learnt)
+            self.learn(run.pump, learnt)
             self._learning[run.pump] = None
-        return self._told(run) if len(run.time_s) >= SEGMENT_SAMPLES else "unknown"
+        return self.told(run) if len(run.time_s) >= SEGMENT_SAMPLES else "unknown"
 
 
 def state_of(*, pump: bool, system: bool) -> State:

@@ -10,7 +10,7 @@ from wetwell.detector.evaluation.methods import DETECTORS, detector_class
 from wetwell.detector.stream.block import blocks
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.batch.backtest import verdicts_on
+from wetwell.services.batch.backtest import detectors_named, verdicts_on
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -42,7 +42,9 @@ def recording(alpha):
 
 @pytest.fixture(scope="module")
 def told(alpha, recording):
-    return {name: verdicts for name, (verdicts, _) in verdicts_on(recording, alpha, INSTALLED).items()}
+    return {
+        name: verdicts for name, (verdicts, _) in verdicts_on(recording, alpha, detectors_named(INSTALLED)).items()
+    }
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -72,7 +74,7 @@ def test_all_judge_the_same_runs(told):
 def test_a_feed_without_head_is_unknown(alpha, recording):
     blind = {column: values[:4000] for column, values in recording.columns.items() if not column.endswith("head_m")}
     short = type(recording)(time_ns=recording.time_ns[:4000], columns=blind)
-    for name, (verdicts, _) in verdicts_on(short, alpha, INSTALLED).items():
+    for name, (verdicts, _) in verdicts_on(short, alpha, detectors_named(INSTALLED)).items():
         told = {verdict.state for verdict in verdicts}
         assert told <= {"learning", "unknown"}, name
         assert "unknown" in told, name
@@ -85,7 +87,7 @@ def test_permuted_truth_changes_no_verdict(alpha, recording, told):
         columns=recording.columns,
         truth={column: values[order] for column, values in recording.truth.items()},
     )
-    for name, (verdicts, _) in verdicts_on(lying, alpha, INSTALLED).items():
+    for name, (verdicts, _) in verdicts_on(lying, alpha, detectors_named(INSTALLED)).items():
         assert verdicts == told[name], name
 
 

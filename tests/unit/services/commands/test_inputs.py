@@ -97,7 +97,17 @@ def test_whatever_prints_a_result_prints_it_as_json():
 
 
 def test_an_input_has_one_name_everywhere():
-    meanings = {"--station", "--recording", "--scenario", "--config", "--plc", "--alarm", "--source", "--stations"}
+    meanings = {
+        "--station",
+        "--recording",
+        "--scenario",
+        "--config",
+        "--plc",
+        "--alarm",
+        "--source",
+        "--stations",
+        "--name",
+    }
     arguments = [(name, p.name) for name, c in commands() for p in c.params if p.param_type_name == "argument"]
     assert arguments == []
     subjects = {command.option for _, command in commands() if hasattr(command, "option")}

@@ -1,0 +1,92 @@
+"""The schemas by name: of files that people write, and of what programs read."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pydantic import BaseModel, TypeAdapter
+
+from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.modbus.device_map import DeviceFile
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES
+from wetwell.protocols.recordings.importers.mapping import TagMapping
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.runtime.settings import Settings
+from wetwell.services.schemas.described import described_schema
+from wetwell.sim2real.diagnosis.report import GapReport
+from wetwell.sim2real.recording.preparation import Preparation
+from wetwell.simulator.effects import AnyEffect
+from wetwell.simulator.scenario import Scenario
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def _station() -> dict[str, Any]:
+    """Station file; a table `[[effect]]` is one of the effects of the library, with their parameters."""
+    schema = described_schema(Station)
+    effects = TypeAdapter(AnyEffect).json_schema(ref_template="#/$defs/{model}")
+    schema["$defs"] |= effects.pop("$defs")
+    schema["$defs"]["EffectTable"] = effects | {"description": "An effect beyond the plain model."}
+    return schema
+
+
+def _recording() -> dict[str, Any]:
+    """A row of a recording; the columns are the keys."""
+    time = {"type": "string", "format": "date-time", "description": "ISO 8601 with a Z or an offset"}
+    station = {name: _value(one.unit, one.description) for name, one in STATION_QUANTITIES.items()}
+    pumps = {
+        rf"^pump[1-9]\d*_{name}$": _value(one.unit, one.description.replace("{pump}", "i"))
+        for name, one in PUMP_QUANTITIES.items()
+    }
+    truth = {r"^truth_": {"description": "What only a simulator can know; no diagnosis reads it"}}
+    return {
+        "title": "Recording",
+        "description": "A row of a recording: CSV, CSV.gz or Parquet. Empty or NaN is no value. Pumps count from 1.",
+        "type": "object",
+        "properties": {"time": time, **station},
+        "patternProperties": pumps | truth,
+        "required": ["time"],
+    }
+
+
+def _value(unit: str, description: str) -> dict[str, Any]:
+    return {"type": ["number", "null"], "description": description} | ({"unit": unit} if unit else {})
+
+
+def _read(model: type[BaseModel]) -> Callable[[], dict[str, Any]]:
+    return lambda: described_schema(model)
+
+
+def _written(model: type[BaseModel]) -> Callable[[], dict[str, Any]]:
+    return lambda: described_schema(model, "serialization")
+
+
+SCHEMAS: Mapping[str, tuple[str, Callable[[], dict[str, Any]]]] = {
+    "station": ("station file, TOML", _station),
+    "scenario": ("scenario file, TOML", _read(Scenario)),
+    "settings": ("settings of the services, TOML", _read(Settings)),
+    "recording": ("row of a recording, CSV or Parquet", _recording),
+    "mapping": ("mapping of an export, TOML", _read(TagMapping)),
+    "preparation": ("preparation of field data, TOML", _read(Preparation)),
+    "plc": ("PLCs that the gateway polls, TOML", _read(DeviceFile)),
+    "gap-report": ("report.json of a diagnosis", _written(GapReport)),
+    "verdict": ("line of verdicts.jsonl, message on the bus", _written(Verdict)),
+    "sample": ("sample, message on the bus", _written(Sample)),
+    "alarm": ("alarm, message on the bus", _written(Alarm)),
+}
+"""What each describes, and how it is made."""
+
+
+def schema_named(name: str) -> dict[str, Any]:
+    """JSON Schema, draft 2020-12, of a file or a message.
+
+    Raises
+    ------
+    ConfigError
+        If there is none of this name.
+    """
+    if name not in SCHEMAS:
+        raise ConfigError(f"schema '{name}' is none of {', '.join(SCHEMAS)}")
+    return {"$schema": DIALECT} | SCHEMAS[name][1]()
