@@ -16,9 +16,15 @@ from wetwell.services.api.sources import RecordingSource, StationSource, rows_of
 from wetwell.services.batch.field_data import write_station
 from wetwell.services.batch.gap import check_effects, diagnose_rows
 from wetwell.services.reports.charts import bar_chart
-from wetwell.services.reports.gap_page import VERDICT_WORDS, gap_page
+from wetwell.services.reports.gap_page import gap_page
 from wetwell.sim2real.diagnosis.report import FoundEffect, GapReport
 from wetwell.sim2real.recording.preparation import Preparation, prepare
+
+VERDICT_WORDS = {
+    "none": "No gap beyond the noise of the sensors.",
+    "unknown": "There is a gap that no effect of the library explains.",
+    "effect": "The gap is explained by these effects.",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
