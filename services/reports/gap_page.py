@@ -1,4 +1,4 @@
-"""The page of a diagnosis: map of the gap, traces before and after, the residual, the ranking, the parameters."""
+"""The page of a diagnosis: what an engineer reads first, pictures of it, and the statistics folded."""
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from wetwell.services.reports.charts import (
     Section,
     Series,
     bar_chart,
+    folded,
     heat_map,
     line_chart,
     page,
@@ -15,6 +16,7 @@ from wetwell.services.reports.charts import (
     scatter,
     table,
 )
+from wetwell.services.reports.gap_lead import FULL_SPEED, lead
 from wetwell.sim2real.diagnosis.covariates import best_covariate
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.diagnosis.report import DetectorVerdicts, GapReport
@@ -28,43 +30,66 @@ DRAWN_CANDIDATES = 8
 SHOWN_S = 1800
 SHOWN_ROWS = 60
 """Traces are drawn over so many seconds, and over so many rows at least."""
-VERDICT_WORDS = {
-    "none": "No gap beyond the noise of the sensors.",
-    "unknown": "There is a gap that no effect of the library explains.",
-    "effect": "The gap is explained by the effects below.",
-}
+DRAWN_DUTIES = 400
+"""Duties that are drawn, spread over the recording."""
 
 
 def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
     """Self-contained HTML page of a diagnosis."""
     gap = report.gap
-    verdict = [
-        paragraph(VERDICT_WORDS[report.verdict]),
+    statistics = [
+        paragraph(
+            "The gap is in units of the sensors' noise: 1 is noise alone. The shrinkage is the share of the gap over "
+            "the noise that the effects close, on cycles that they were not fitted to."
+        ),
         table(
             ["gap on held-out cycles", "before", "after", "floor", "shrinkage", "95 % interval"],
             [["all signals", gap.before, gap.after, gap.floor, gap.shrinkage, _interval(gap.shrinkage_ci)]],
         ),
         table(["signal", "before", "after"], [[name, one.before, one.after] for name, one in gap.by_signal.items()]),
-        *(paragraph(f"Note: {note}.") for note in report.notes),
-        paragraph(f"Next: {report.next_experiment}"),
     ]
-    sections = [Section("Verdict", "".join(verdict))]
-    if report.where:
-        sections.append(Section("Where the gap lies", _map(report)))
+    words = [
+        paragraph(lead(report, diagnosis)),
+        paragraph(f"What to do: {report.next_experiment}"),
+        *(paragraph(f"Note: {note}.") for note in report.notes),
+    ]
+    sections = [Section("Verdict", "".join(words))]
+    if {"flow_m3h", "head_m"} <= diagnosis.traces.signals.keys():
+        sections.append(Section("Head over flow at full speed", _duty(diagnosis)))
+    sections.append(Section("Measured and simulated", _traces(diagnosis)))
     if report.effects:
         sections.append(Section("Parameters", _parameters(report)))
-    sections.append(Section("Measured and simulated", _traces(diagnosis)))
-    if report.where:
-        sections.append(Section("Residual", _residual(report, diagnosis)))
-    sections.append(Section("Ranking of single effects", _ranking(report)))
     if report.not_tested:
         rows = [[one.effect, one.reason] for one in report.not_tested]
         sections.append(Section("Not tested", table(["effect", "why the recording cannot show it"], rows)))
+    if report.where:
+        statistics += [_map(report), _residual(report, diagnosis)]
+    statistics.append(_ranking(report))
+    sections.append(Section("Statistics", folded("Sizes in units of noise, residual, ranking", "".join(statistics))))
     if report.closed_loop is not None:
         sections.append(Section("Closed loop", _closed_loop(report)))
     if report.detector is not None:
         sections.append(Section("Detector", _detector(report.detector)))
     return page(f"Gap between simulation and reality: station {report.station}", sections)
+
+
+def _duty(diagnosis: Diagnosis) -> str:
+    """Measured and simulated duties at full speed, thinned."""
+    traces, replay = diagnosis.traces, diagnosis.replay
+    shown: list[tuple[str, Traces | Prediction]] = [("measured", traces), ("simulated before", replay.run())]
+    if added := effects_of(diagnosis.station)[len(replay.own) :]:
+        shown.append(("simulated after", replay.run(added)))
+    highest_hz = traces.frequency_hz.max()
+    is_full = (traces.frequency_hz >= FULL_SPEED * highest_hz) & (highest_hz > 0.0) & traces.is_row
+    pump, second = np.nonzero(is_full)
+    chosen = np.linspace(0, pump.size - 1, min(DRAWN_DUTIES, pump.size)).astype(np.int64)
+    at = pump[chosen], second[chosen]
+    return scatter(
+        "Head over flow of each pump at full speed",
+        [Series(label, values.signals["flow_m3h"][at], values.signals["head_m"][at]) for label, values in shown],
+        x_label="flow in m³/h",
+        y_label="head in m",
+    )
 
 
 def _map(report: GapReport) -> str:
@@ -137,7 +162,10 @@ def _residual(report: GapReport, diagnosis: Diagnosis) -> str:
 def _ranking(report: GapReport) -> str:
     best = report.candidates[:DRAWN_CANDIDATES]
     bars = bar_chart(
-        "Shrinkage by each effect alone", [c.name for c in best], {"shrinkage": [c.shrinkage for c in best]}
+        "Share of the gap that each effect closes alone",
+        [c.name for c in best],
+        {"shrinkage": [c.shrinkage for c in best]},
+        y_label="share",
     )
     rows = [[c.name, c.score, c.shrinkage, _interval(c.shrinkage_ci)] for c in best]
     return bars + table(["effect", "score", "shrinkage", "95 % interval"], rows)

@@ -7,13 +7,14 @@ scheme. Every chart has a title and a description for screen readers.
 from wetwell.services.reports.charts.bar_chart import bar_chart
 from wetwell.services.reports.charts.heat_map import heat_map
 from wetwell.services.reports.charts.line_chart import Series, Span, line_chart, scatter
-from wetwell.services.reports.charts.page import Section, page, paragraph, table
+from wetwell.services.reports.charts.page import Section, folded, page, paragraph, table
 
 __all__ = [
     "Section",
     "Series",
     "Span",
     "bar_chart",
+    "folded",
     "heat_map",
     "line_chart",
     "page",

@@ -38,6 +38,17 @@ def paragraph(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
+def folded(summary: str, body: str) -> str:
+    """Ready-made HTML that a reader opens when it is wanted.
+
+    Examples
+    --------
+    >>> folded("Statistics", paragraph("r"))
+    '<details><summary>Statistics</summary><p>r</p></details>'
+    """
+    return f"<details><summary>{escape(summary)}</summary>{body}</details>"
+
+
 def page(title: str, sections: Iterable[Section]) -> str:
     """Self-contained HTML page: no script, no font, no image from elsewhere; also well-formed XML."""
     body = "".join(f"<section><h2>{escape(s.heading)}</h2>{s.body}</section>" for s in sections)
