@@ -16,7 +16,8 @@ from wetwell.services.api.sources import RecordingSource, StationSource, rows_of
 from wetwell.services.batch.field_data import write_station
 from wetwell.services.batch.gap import check_effects, diagnose_rows
 from wetwell.services.reports.charts import bar_chart
-from wetwell.services.reports.gap_page import VERDICT_WORDS, gap_page
+from wetwell.services.reports.gap_lead import lead
+from wetwell.services.reports.gap_page import gap_page
 from wetwell.sim2real.diagnosis.report import FoundEffect, GapReport
 from wetwell.sim2real.recording.preparation import Preparation, prepare
 
@@ -31,12 +32,15 @@ class Diagnosis(Result):
         All figures, as `report.json` of `wetwell gap diagnose` has them.
     station : Station
         With the effects that were found.
+    sentence : str
+        What, where, how large and how sure, in words.
     page : str
         The report as an HTML page.
     """
 
     report: GapReport
     station: Station = field(repr=False)
+    sentence: str
     page: str = field(repr=False)
 
     @property
@@ -81,7 +85,7 @@ class Diagnosis(Result):
         gap = self.report.gap
         found = ", ".join(effect.name for effect in self.effects) or "no effect"
         figures = f"gap {gap.before:.3g} before, {gap.after:.3g} after, {gap.floor:.3g} is noise alone"
-        texts = (VERDICT_WORDS[self.verdict], f"{found}: {figures}", f"Next: {self.report.next_experiment}")
+        texts = (self.sentence, f"{found}: {figures}", f"Next: {self.report.next_experiment}")
         return "".join(f"<p>{escape(text)}</p>" for text in texts) + html_table(self.to_arrow(), rows=5)
 
 
@@ -121,4 +125,4 @@ def diagnose(
         report, found = diagnose_rows(plant, *prepare(rows, Preparation()), only=tried, without=left_out)
     except ValueError as error:
         raise RecordingError(f"recording: {error}") from error
-    return Diagnosis(report=report, station=found.station, page=gap_page(report, found))
+    return Diagnosis(report=report, station=found.station, sentence=lead(report, found), page=gap_page(report, found))

@@ -73,6 +73,8 @@ def gap_trial(
     import shlex
 
     from wetwell.services.batch.executors import check_scheduler
+
+    check_scheduler(scheduler)
     from wetwell.services.trial.looked_at import check_seed
     from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds, parse_rates, parse_values
     from wetwell.services.trial.result import brief
@@ -80,7 +82,6 @@ def gap_trial(
     from wetwell.sim2real.trial.cases import StoragePlan
     from wetwell.sim2real.trial.families import PLANTS
 
-    check_scheduler(scheduler)
     check_seed(seed, is_looked_at=looked_at)
     rates_s = parse_rates(every)
     if days is None:
@@ -105,9 +106,12 @@ def gap_trial(
     print_batch(result if as_json else brief(result, out), as_json=as_json)
 
 
-@app.command("families")
+@app.command("families", cls=about("--trial"))
 def gap_families(
-    trials: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of trials that are scored.")],
+    trials: Annotated[
+        list[Path],
+        typer.Option("--trial", metavar="DIR", help="Folder of a trial that is scored; may be given again."),
+    ],
     learnt_on: Annotated[
         str, typer.Option("--learnt-on", help="Families that constants were learnt on; with commas.")
     ] = "",

@@ -11,7 +11,7 @@ from wetwell.sim2real.attribution.attribution import Attribution, attribute
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.diagnosis.experiments import next_experiment
-from wetwell.sim2real.diagnosis.findings import found_effects, ranking, where_it_lies
+from wetwell.sim2real.diagnosis.findings import found_effects, noise_check, ranking, where_it_lies
 from wetwell.sim2real.diagnosis.limitations import limitations
 from wetwell.sim2real.diagnosis.localisation import localise
 from wetwell.sim2real.diagnosis.report import (
@@ -80,6 +80,7 @@ class Diagnosis:
                 for one in self.posterior
             ),
             component_probability=self.component_probability,
+            noise_check=noise_check(self.attribution, self.bins),
             candidates=self.candidates,
             gap=self.gap,
             closed_loop=closed_loop,

@@ -5,7 +5,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.attribution import Attribution
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, RankedCandidate, Where
+from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, NoiseCheck, RankedCandidate, Where
 from wetwell.sim2real.diagnosis.shrinkage import cell_gap, gap_of
 from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.asinh_loss import squares_of
@@ -53,6 +53,20 @@ def ranking(found: Attribution, bins: Bins, rng: np.random.Generator) -> tuple[R
             RankedCandidate(name=fit.names[0], score=score, shrinkage=gap.shrinkage, shrinkage_ci=gap.shrinkage_ci)
         )
     return tuple(sorted(ranked, key=lambda one: -one.score))
+
+
+def noise_check(found: Attribution, bins: Bins) -> tuple[NoiseCheck, ...]:
+    """Whether what is left under the answer is as large as noise and a right model make it, by signal and regime."""
+    squares = squares_of(found.after)
+    return tuple(
+        NoiseCheck(
+            signal=SIGNALS[signal],
+            regime=REGIMES[regime],
+            mean_square=float(squares[cell].mean()),
+            noise_share=float(bins.floor[cell].mean()),
+        )
+        for signal, regime, cell in bins.cells(np.ones(bins.size, dtype=np.bool_))
+    )
 
 
 def where_it_lies(

@@ -111,6 +111,18 @@ class UntestedEffect(_Part):
     reason: str
 
 
+class NoiseCheck(_Part):
+    """Mean square of the residuals of a signal in a regime under the answer; 1 is all that a right model may be off.
+
+    Between `noise_share`, what the sensors alone make, and 1 where the answer is right and the noise is known.
+    """
+
+    signal: str
+    regime: str
+    mean_square: Short
+    noise_share: Short
+
+
 class AnswerProbability(_Part):
     """Probability of one answer: `none`, `unknown`, or a set of effects."""
 
@@ -129,6 +141,7 @@ class GapReport(_Part):
     effects: tuple[FoundEffect, ...]
     posterior: tuple[AnswerProbability, ...] = ()
     component_probability: dict[str, Short] = {}
+    noise_check: tuple[NoiseCheck, ...] = ()
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
     closed_loop: ClosedLoopComparison | None

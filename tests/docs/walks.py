@@ -159,6 +159,8 @@ wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz"""
     ),
 )
 LEFT_OUT_PAGES = {
+    "docs/maintenance.md": "needs a crew's visits over days; "
+    "tests/integration/services/detector/test_maintenance.py enters acts",
     "README.md": "make check runs this test; make up is `wetwell up`, which a walk runs",
     "docs/real-station.md": "its recording states no licence and is not here; benchmarks/real_station.py reads it",
 }

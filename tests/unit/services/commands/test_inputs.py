@@ -107,6 +107,7 @@ def test_an_input_has_one_name_everywhere():
         "--source",
         "--stations",
         "--name",
+        "--trial",
     }
     arguments = [(name, p.name) for name, c in commands() for p in c.params if p.param_type_name == "argument"]
     assert arguments == []
