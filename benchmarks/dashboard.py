@@ -1,12 +1,15 @@
 """Cost of the control-room page: one JSON object on standard output.
 
-    python benchmarks/dashboard.py [--stations 1000] [--seconds 20] [--followers 200]
+    python benchmarks/dashboard.py [--stations 1000] [--seconds 20] [--followers 200] [--days 90] [--only-past]
 
 Router and dashboard run as processes of their own on free ports of this machine. The server's share of a core is its
 time on the processor over the time on the wall, while so many stations send a sample a second and one page follows
 the overview. The browser (Debian's chromium, by playwright) opens the overview and one station; of first paints the
-least and the median of several are told, each with an empty cache. Without chromium its figures are null. Last,
-so many followers look at one station: their delay is from the stamp of a sample to the frame that has it.
+least and the median of several are told, each with an empty cache. Without chromium its figures are null. Then
+so many followers look at one station: their delay is from the stamp of a sample to the frame that has it. Last, a
+historian has so many days of a station (the same simulated day of scenario nominal, seed 1, one sample a second, with
+a verdict for each run and a change of state each ten days), and the page of them all is opened: `drawn` is from the
+navigation until its trends are drawn, `all_s` until energy and changes of state are there too.
 """
 
 import argparse
@@ -19,8 +22,10 @@ import socket
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +36,24 @@ from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.keys import model_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus, connect_client
 from wetwell.protocols.messages.sample import PumpReading, Sample
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
+from wetwell.services.historian.hours import Hours
+from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import DAY_NS, Batch, EventRow
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.lifecycle import ticks
-from wetwell.services.stations import find_station
+from wetwell.services.stations import find_scenario, find_station
+from wetwell.simulator.simulation import Simulation
 
 CHROMIUM = Path("/usr/bin/chromium")
 WARM_UP_S = 5.0
 PAINTS = 7
+STATION = "alpha"
+DRAWN = "() => /[0-9]{2,} points/.test(document.querySelector('#trend-note')?.textContent) && performance.now()"
+TRANSFERRED = "performance.getEntriesByType('resource').reduce((all, each) => all + each.transferSize, 0)"
+ALL_DRAWN = """() => document.querySelector('.is-kpi tbody tr')
+  && document.querySelectorAll('.is-episodes .changes button').length && performance.now()"""
 
 
 def free_port() -> int:
@@ -216,6 +231,97 @@ async def measured(stations: int, seconds: float, followers: int) -> dict[str, A
     }
 
 
+def keep_days(folder: Path, days: int) -> int:
+    """Fill a historian's folder with days of one station; how many verdicts it got."""
+    store = FolderStore(folder)
+    recording = Simulation(find_station("alpha"), find_scenario("nominal"), 1).advance(86_400)
+    day = Samples.of_recording(recording)
+    start_ns = int(day.time_ns[0])
+    hours = Hours.of_samples(day, start_ns, start_ns + DAY_NS)
+    verdicts = 0
+    for number in range(days):
+        shift_ns = number * DAY_NS
+        store.archive.write_samples(STATION, start_ns + shift_ns, replace(day, time_ns=day.time_ns + shift_ns))
+        store.live.write_hours(STATION, replace(hours, hour_ns=hours.hour_ns + shift_ns))
+        events = [verdict_row(start_ns + shift_ns + second * 10**9, number) for second in range(0, 86_400, 450)]
+        store.write(Batch(events=events))
+        verdicts += len(events)
+    store.close()
+    return verdicts
+
+
+def verdict_row(time_ns: int, day: int) -> EventRow:
+    """A verdict as long as those of the detector are."""
+    state: State = "system_fault" if day // 10 % 2 else "normal"
+    verdict = Verdict(
+        time=time_ns,
+        station=STATION,
+        pump=1 + time_ns // (450 * 10**9) % 3,
+        state=state,
+        probability={state: 1.0},
+        evidence={"figures": [round(1e-3 * number, 3) for number in range(200)]},
+        window=(time_ns - 300 * 10**9, time_ns),
+    )
+    return EventRow("verdicts", STATION, time_ns, verdict.encode())
+
+
+def page_of_days(days: int) -> dict[str, Any] | None:
+    """Times of the page of so many days, each with an empty cache of the browser."""
+    if not CHROMIUM.exists():
+        return None
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - may be missing
+
+    endpoint, port = f"tcp/127.0.0.1:{free_port()}", free_port()
+    paint_ms, drawn_ms, all_ms, sizes = [], [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        verdicts = keep_days(Path(folder), days)
+        with (
+            wetwell("router", "--zenoh", endpoint),
+            wetwell("historian", "--zenoh", endpoint, "--data", folder),
+            wetwell("dashboard", "--zenoh", endpoint, "--page", f"127.0.0.1:{port}"),
+            sync_playwright() as tools,
+        ):
+            url = f"http://127.0.0.1:{port}/station/{STATION}"
+            wait_for_station(url)
+            flags = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
+            browser = tools.chromium.launch(executable_path=str(CHROMIUM), args=flags)
+            for _ in range(PAINTS):
+                context = browser.new_context(viewport={"width": 1600, "height": 1000})
+                page = context.new_page()
+                page.goto(f"{url}?span={days}d")
+                drawn_ms.append(page.wait_for_function(DRAWN).json_value())
+                all_ms.append(page.wait_for_function(ALL_DRAWN).json_value())
+                paint_ms.append(page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime"))
+                sizes.append(
+                    page.evaluate(
+                        "performance.getEntriesByType('resource').reduce((all, one) => all + one.transferSize, 0)"
+                    )
+                )
+                context.close()
+            browser.close()
+    return {
+        "days": days,
+        "verdicts": verdicts,
+        "first_paint_least_s": round(min(paint_ms) / 1000, 3),
+        "drawn_least_s": round(min(drawn_ms) / 1000, 3),
+        "drawn_median_s": round(statistics.median(drawn_ms) / 1000, 3),
+        "all_least_s": round(min(all_ms) / 1000, 3),
+        "all_median_s": round(statistics.median(all_ms) / 1000, 3),
+        "transferred_with_history_kb": round(max(sizes) / 1000, 1),
+    }
+
+
+def wait_for_station(url: str) -> None:
+    """Until the page knows the station from the historian."""
+    until_s = time.monotonic() + 120.0
+    while time.monotonic() < until_s:
+        with contextlib.suppress(httpx.TransportError):
+            if httpx.get(url, timeout=30.0).status_code == 200:
+                return
+        time.sleep(0.2)
+    raise SystemExit(f"{url}: nobody knows the station")
+
+
 async def share_of_a_core(pid: int, seconds: float) -> float:
     """Time on the processor over time on the wall."""
     before_s, start_s = processor_s(pid), time.monotonic()
@@ -228,8 +334,13 @@ def main() -> None:
     parser.add_argument("--stations", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--followers", type=int, default=200)
+    parser.add_argument("--days", type=int, default=90, choices=(7, 30, 90))
+    parser.add_argument("--only-past", action="store_true")
     arguments = parser.parse_args()
-    figures = asyncio.run(measured(arguments.stations, arguments.seconds, arguments.followers))
+    figures: dict[str, Any] = {}
+    if not arguments.only_past:
+        figures = asyncio.run(measured(arguments.stations, arguments.seconds, arguments.followers))
+    figures["past"] = page_of_days(arguments.days)
     figures["machine"] = {
         "processors": os.cpu_count(),
         "load": os.getloadavg()[0],

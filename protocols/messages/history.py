@@ -8,7 +8,7 @@ from wetwell.protocols.messages.message import Message, Number, Stamp
 from wetwell.protocols.messages.verdict import Severity, Stage, State, Trend
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 
-Kind = Literal["samples", "verdicts", "alarms", "episodes", "maintenance", "kpi", "stations"]
+Kind = Literal["samples", "verdicts", "changes", "alarms", "episodes", "maintenance", "kpi", "stations"]
 
 LONGEST_NS = MAX_STAMP_NS - 2 * 86_400 * NS_PER_S
 """Times further from 1970 are not kept; it is in the year 2262."""
@@ -22,7 +22,8 @@ class HistoryQuery(Message):
     the samples themselves, oldest first, up to `points`, with the columns `seq` and `quality` (0 good, 1 uncertain,
     2 bad); the answer then says whether there are `more`. Of `kpi` hours come, or if they are more than `points`
     days, and of these the last `points`. Of verdicts, alarms and acts of maintenance the last `points` come, of
-    episodes those that reach into the span. `stations`, asked about the
+    episodes those that reach into the span. `changes` are the verdicts of which state, asset or stage is another than
+    before, without their evidence, and for each pump the one that stood at `start`. `stations`, asked about the
     station `_site`, gives a message for each station, with the times of its `first` and `last` sample; a stamp that
     lies more than a day ahead of all others is not the last one until ten of that time are there.
     """

@@ -51,7 +51,8 @@ def historian(data: DataOption = None, zenoh: ZenohOption = None, config: Config
 def history(
     station: StationNameOption = "alpha",
     kind: Annotated[
-        Literal["samples", "verdicts", "alarms", "episodes", "maintenance", "kpi", "stations"], typer.Option()
+        Literal["samples", "verdicts", "changes", "alarms", "episodes", "maintenance", "kpi", "stations"],
+        typer.Option(),
     ] = "kpi",
     last: Annotated[
         str | None, typer.Option(metavar="TIME", help="So long before the newest sample: 90s, 10m, 2h.")

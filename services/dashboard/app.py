@@ -7,6 +7,8 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import Request
@@ -14,20 +16,18 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.keys import SITE
 from wetwell.services.dashboard.assets import Asset, Assets
-from wetwell.services.dashboard.client import (
-    RefusalError,
-    act_on_alarm,
-    enter_act,
-    history,
-    recording_pieces,
-    set_plant_clock,
-)
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.login import Login, holder_in
+from wetwell.services.dashboard.past.client import act_on_alarm, enter_act, history, recording_pieces, set_plant_clock
+from wetwell.services.dashboard.past.journal import bands, is_kept, journal
+from wetwell.services.dashboard.past.trends import trends_text
+from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.dashboard.reports import find_report, report_names
-from wetwell.services.dashboard.site_view import SiteView
+from wetwell.services.dashboard.view.metrics import StationMetrics
+from wetwell.services.dashboard.view.site_view import SiteView
 
 GZIP_BYTES = 1000
 GZIP_LEVEL = 5
@@ -54,20 +54,30 @@ class AppState:
             raise RefusalError(503, "no connection to the bus yet")
         return self.bus
 
+    async def is_known(self, name: str) -> bool | None:
+        """Whether a station was heard, or the historian knows it; None while nobody can be asked."""
+        station = self.view.stations.get(name)
+        if station is not None and station.is_known:
+            return True
+        return await is_kept(self.bus, name) if self.bus is not None else None
+
 
 def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
     """Web application over a state, behind a `Guard`."""
-    pages, answers, login = _Pages(), _Answers(app_state), Login(tokens_file)
-    shells = ("/", "/station/{station}", "/alarms", "/reports", "/health")
+    pages, answers, login = _Pages(app_state), _Answers(app_state), Login(tokens_file)
+    shells = ("/", "/alarms", "/reports", "/health")
     return Starlette(
         routes=[
             *(Route(path, pages.shell) for path in shells),
+            Route("/station/{station}", pages.station),
             Route("/static/{version}/{name:path}", pages.static),
             Route("/favicon.ico", pages.favicon),
             Route("/events", answers.events),
             Route("/api/stations", answers.stations),
             Route("/api/stations/{station}", answers.station),
             Route("/api/stations/{station}/history", answers.history),
+            Route("/api/stations/{station}/trends", answers.trends),
+            Route("/api/stations/{station}/bands", answers.bands),
             Route("/api/stations/{station}/recording.csv", answers.recording),
             Route("/api/stations/{station}/episodes", answers.episodes),
             Route("/api/stations/{station}/maintenance", answers.maintenance),
@@ -77,6 +87,8 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
             Route("/api/who", login.who),
             Route("/api/login", login.enter, methods=["POST"]),
             Route("/api/alarms", answers.alarms),
+            Route("/api/alarms/journal", answers.journal),
+            Route("/metrics", answers.metrics),
             Route("/api/health", answers.health),
             Route("/api/reports", answers.reports),
             Route("/reports/{name:path}", answers.report),
@@ -89,11 +101,17 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
 class _Pages:
     """The files of the page."""
 
-    def __init__(self) -> None:
+    def __init__(self, app_state: AppState) -> None:
+        self._state = app_state
         self._assets = Assets()
 
     async def shell(self, request: Request) -> Response:
         return _asset(request, self._assets.shell, "no-cache")
+
+    async def station(self, request: Request) -> Response:
+        """The shell, with 404 for a station that nobody knows; its page goes on looking for it."""
+        is_known = await self._state.is_known(request.path_params["station"])
+        return _asset(request, self._assets.shell, "no-cache", 404 if is_known is False else 200)
 
     async def static(self, request: Request) -> Response:
         asset = self._assets.files.get(request.path_params["name"])
@@ -110,6 +128,8 @@ class _Answers:
 
     def __init__(self, app_state: AppState) -> None:
         self._state = app_state
+        self._registry = CollectorRegistry()
+        self._registry.register(StationMetrics(app_state.view))
 
     async def events(self, request: Request) -> Response:
         return StreamingResponse(
@@ -122,7 +142,34 @@ class _Answers:
         return _json(request, self._state.view.site_state())
 
     async def station(self, request: Request) -> Response:
-        return _json(request, self._state.view.station_state(request.path_params["station"]))
+        name = request.path_params["station"]
+        text = self._state.view.station_state(name)
+        if text is None:
+            if not await self._state.is_known(name):
+                raise RefusalError(404, f"there is no station '{name}'")
+            text = self._state.view.empty_state(name)
+        return _json(request, text)
+
+    async def trends(self, request: Request) -> Response:
+        asked = dict(request.query_params) | {"kind": "samples"}
+        answer = await history(self._state.asked(), request.path_params["station"], asked)
+        if answer.error:
+            raise RefusalError(502, answer.error)
+        return _json(request, trends_text(answer))
+
+    async def bands(self, request: Request) -> Response:
+        found = await bands(self._state.asked(), request.path_params["station"], request.query_params)
+        return _json(request, json.dumps(found))
+
+    async def journal(self, request: Request) -> Response:
+        query = dict(request.query_params)
+        station = query.pop("station", "")
+        stations = [station] if station else [*self._state.view.stations, SITE]
+        return _json(request, json.dumps(await journal(self._state.asked(), stations, query)))
+
+    async def metrics(self, request: Request) -> Response:  # noqa: ARG002 - a handler takes its request
+        text = await asyncio.to_thread(generate_latest, self._registry)
+        return Response(text, media_type=CONTENT_TYPE_PLAIN_0_0_4, headers={"cache-control": "no-store"})
 
     async def alarms(self, request: Request) -> Response:
         return _json(request, self._state.view.alarms())
@@ -192,13 +239,14 @@ async def _refuse(_: Request, error: Exception) -> Response:
     return JSONResponse({"error": str(error)}, error.status if isinstance(error, RefusalError) else 500)
 
 
-def _asset(request: Request, asset: Asset, caching: str) -> Response:
+def _asset(request: Request, asset: Asset, caching: str, status: int = 200) -> Response:
     headers = {"etag": asset.etag, "cache-control": caching, "vary": "accept-encoding"}
-    if request.headers.get("if-none-match") == asset.etag:
+    if status == 200 and request.headers.get("if-none-match") == asset.etag:
         return Response(status_code=304, headers=headers)
+    content = asset.content
     if _takes_gzip(request):
-        return Response(asset.compressed, media_type=asset.media_type, headers=headers | {"content-encoding": "gzip"})
-    return Response(asset.content, media_type=asset.media_type, headers=headers)
+        content, headers = asset.compressed, headers | {"content-encoding": "gzip"}
+    return Response(content, status, media_type=asset.media_type, headers=headers)
 
 
 def _json(request: Request, text: str) -> Response:

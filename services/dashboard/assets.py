@@ -14,6 +14,8 @@ TYPES = {
     "LICENSE": "text/plain; charset=utf-8",
 }
 SHELL = "index.html"
+CATALOGUES = "js/words/"
+"""Other languages: a browser asks for the one that it needs."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Assets:
         for name, content in sorted(contents.items()):
             digest.update(name.encode() + b"\0" + content)
         self.version = digest.hexdigest()[:12]
-        modules = sorted(name for name in contents if name.startswith("js/"))
+        modules = sorted(name for name in contents if name.startswith("js/") and not name.startswith(CATALOGUES))
         preloads = "\n".join(f'<link rel="modulepreload" href="/static/{self.version}/{name}">' for name in modules)
         shell = contents.pop(SHELL).replace(b"{version}", self.version.encode())
         self.shell = _asset(SHELL, shell.replace(b"<!-- modules -->", preloads.encode()))

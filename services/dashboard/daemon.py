@@ -8,9 +8,11 @@ from wetwell.protocols.bus.keys import SITE
 from wetwell.services.dashboard.app import AppState, dashboard_app
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.feed import Feed
-from wetwell.services.dashboard.site_view import SiteView
+from wetwell.services.dashboard.view.metrics import StationMetrics
+from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
 from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.health.board import BOARD
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.exposure import check_exposure, is_loopback
@@ -42,6 +44,7 @@ async def serve_dashboard(settings: Settings) -> None:
 async def _run(settings: Settings, listener: socket.socket) -> None:
     tokens_file = settings.security.tokens_file
     app_state = AppState(SiteView(settings.dashboard.stale_s), EventStreams(), settings.dashboard.reports)
+    BOARD.others.append(StationMetrics(app_state.view))
     is_local = tokens_file is None and is_loopback(settings.dashboard.host)
     app = dashboard_app(app_state, tokens_file, is_local=is_local)
     async with web_server(app, listener, app_state.streams):

@@ -15,9 +15,9 @@ from wetwell.protocols.bus.keys import (
     status_key,
     verdict_key,
 )
-from wetwell.services.dashboard.backfill import ChartBackfill
 from wetwell.services.dashboard.event_streams import EventStreams
-from wetwell.services.dashboard.site_view import SiteView
+from wetwell.services.dashboard.past.backfill import ChartBackfill
+from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.runtime.lifecycle import ticks
 
 log = logging.getLogger(__name__)
@@ -63,9 +63,9 @@ class Feed:
             self._bus.ask(sample_key("*"), timeout_s=FIRST_S), self._bus.ask(sample_block_key("*"), timeout_s=FIRST_S)
         )
         for payload in samples:
-            self._view.handle_sample(payload)
+            self._view.handle_sample(payload, is_kept=True)
         for payload in blocks:
-            self._view.handle_sample_block(payload)
+            self._view.handle_sample_block(payload, is_kept=True)
         async with asyncio.TaskGroup() as group:
             for subscription, handle in self._messages:
                 group.create_task(_each(subscription, handle))

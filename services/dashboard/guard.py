@@ -31,7 +31,7 @@ _HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), geolocation=(), microphone=()",
 }
-_GUARDED = ("/events", "/api/", "/reports/")
+_GUARDED = ("/events", "/api/", "/reports/", "/metrics")
 _OPEN = ("/api/login", "/api/who")
 
 

@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-from wetwell.services.dashboard.client import RefusalError
+from wetwell.services.dashboard.refusal import RefusalError
 
 SUFFIX = ".html"
 DEEPEST = 3

@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Mapping
+from typing import Any
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.history import History, HistoryQuery, Kind
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.historian.changes import changes_of
 from wetwell.services.historian.episodes import episodes_between
 from wetwell.services.historian.hours import Hours, joined_hours
 from wetwell.services.historian.rows import HOUR_NS
@@ -35,21 +37,33 @@ def _answer(store: Store, station: str, query: HistoryQuery) -> History:
         )
     if station not in spans:
         return History(station=station, kind=query.kind, error=f"station '{station}' is not known")
-    if query.kind == "episodes":
-        found = episodes_between(store, station, query.start, query.end)[-query.points :]
-        return History(station=station, kind="episodes", messages=tuple(one.model_dump(mode="json") for one in found))
+    if query.kind in ("samples", "kpi"):
+        return _of_span(store, spans[station], query)
+    return History(station=station, kind=query.kind, messages=_messages(store, station, query))
+
+
+def _messages(store: Store, station: str, query: HistoryQuery) -> tuple[dict[str, Any], ...]:
+    """Messages of a kind, oldest first."""
+    if query.kind == "changes":
+        return changes_of(store, station, query.start, query.end, query.points)
     if query.kind in ("verdicts", "alarms", "maintenance"):
-        payloads = store.events(query.kind, station, query.start, query.end, query.points)
-        messages = [json.loads(payload) for payload in payloads]
+        messages = [
+            json.loads(each) for each in store.events(query.kind, station, query.start, query.end, query.points)
+        ]
         if query.kind == "maintenance":  # of each act the last that was told of it
             messages = list({message["id"]: message for message in messages}.values())
-        return History(station=station, kind=query.kind, messages=tuple(messages))
-    span = spans[station]
+        return tuple(messages)
+    found = episodes_between(store, station, query.start, query.end)[-query.points :]
+    return tuple(one.model_dump(mode="json") for one in found)
+
+
+def _of_span(store: Store, span: StationSpan, query: HistoryQuery) -> History:
+    """Columns of the part of a span that was kept."""
     start_ns, end_ns = max(query.start, span.first_ns), min(query.end, span.last_ns + 1)
     if start_ns >= end_ns:
-        return History(station=station, kind=query.kind)
+        return History(station=span.station, kind=query.kind)
     of_kind = _of_kpi if query.kind == "kpi" else _of_raw if query.raw else _of_samples
-    return of_kind(store, station, start_ns, end_ns, query.points)
+    return of_kind(store, span.station, start_ns, end_ns, query.points)
 
 
 def _of_station(store: Store, span: StationSpan) -> dict[str, str | None]:

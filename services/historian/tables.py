@@ -7,6 +7,7 @@ from wetwell.protocols.timestamps import to_iso
 
 _SHOWN = {
     "verdicts": ("time", "pump", "state"),
+    "changes": ("time", "pump", "state", "asset", "stage"),
     "alarms": ("time", "id", "priority", "state", "by", "text"),
     "episodes": ("asset", "state", "stage", "from", "to", "advice", "cost"),
     "maintenance": ("time", "asset", "act", "found", "by", "result"),

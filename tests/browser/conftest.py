@@ -7,16 +7,17 @@ import socket
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import httpx
 import pytest
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import expect, sync_playwright
 
 CHROMIUM = Path("/usr/bin/chromium")
 SCREENSHOTS = Path(__file__).parents[2] / "build" / "screenshots"
-DEADLINE_S = 30.0
+DEADLINE_S = 120.0
+expect.set_options(timeout=60_000)
 SEE_CHARTS = """
 let original = null;
 window.charts = [];
@@ -44,6 +45,19 @@ start_s = 25_200
 end_s = 27_000
 after = "hold"
 """
+
+CLOGGING = (
+    SCENARIO.partition("[[fault]]")[0]
+    + """
+[[fault]]
+kind = "pipe_clogging"
+friction_rise = 0.5
+static_rise_m = 0.3
+start_s = 25_200
+end_s = 27_000
+after = "hold"
+"""
+)
 
 
 def pytest_collection_modifyitems(items):
@@ -94,6 +108,12 @@ class Site:
     endpoint: str
     port: int
     folder: Path
+    processes: dict[str, subprocess.Popen[str]] = field(default_factory=dict)
+
+    def kill(self, name):
+        """End a part at once, as a power cut does."""
+        self.processes[name].kill()
+        self.processes[name].wait()
 
     @property
     def acts(self):
@@ -112,23 +132,40 @@ class Site:
             yield process
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """All daemons of a site, and a simulated station with a blockage of pump 2; its level is always too high."""
-    folder = tmp_path_factory.mktemp("site")
+@contextlib.contextmanager
+def whole_site(folder, scenario_text):
+    """All daemons of a site, and a simulated station; its level is always too high."""
     scenario = folder / "quick.toml"
-    scenario.write_text(SCENARIO)
+    scenario.write_text(scenario_text)
     place = Site(f"tcp/127.0.0.1:{free_port()}", free_port(), folder)
     common = ["--zenoh", place.endpoint]
     of_alarms = {"WETWELL_ALARMS__STATE_DIR": str(folder / "alarms"), "WETWELL_ALARMS__HIGH_LEVEL_M": "0.1"}
-    with (
-        wetwell("router", *common),
-        wetwell("historian", *common, "--data", str(folder / "history")),
-        wetwell("alarms", *common, **of_alarms),
-        wetwell("detector", *common),
-        place.dashboard(place.port),
-        wetwell("simulator", "--scenario", str(scenario), *common),
-    ):
+    commands = {
+        "router": ["router", *common],
+        "historian": ["historian", *common, "--data", str(folder / "history")],
+        "alarms": ["alarms", *common],
+        "detector": ["detector", *common],
+        "simulator": ["simulator", "--scenario", str(scenario), *common],
+    }
+    with contextlib.ExitStack() as stack:
+        for name, command in commands.items():
+            if name == "simulator":
+                place.processes["dashboard"] = stack.enter_context(place.dashboard(place.port))
+            place.processes[name] = stack.enter_context(wetwell(*command, **(of_alarms if name == "alarms" else {})))
+        yield place
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A site whose pump 2 is blocked after seven hours of its time."""
+    with whole_site(tmp_path_factory.mktemp("site"), SCENARIO) as place:
+        yield place
+
+
+@pytest.fixture
+def clogged_site(tmp_path):
+    """A site of its own for one test, which may kill its parts: its main clogs after seven hours of its time."""
+    with whole_site(tmp_path, CLOGGING) as place:
         yield place
 
 

@@ -5,22 +5,19 @@ import re
 import signal
 from importlib.resources import files
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from playwright.sync_api import expect
 
-from wetwell.protocols.recordings.recording import read_recording
-from wetwell.protocols.timestamps import from_iso
 from wetwell.services.security.tokens import new_token
 
 pytestmark = pytest.mark.check
 
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
-SLOW_MS = 30_000
+SLOW_MS = 60_000
 MANY_IN_THE_FIRST_CHART = """async () => {
   const end = Date.now() + 20000;
-  const isThere = () => charts[0].data[0].length > 1000;
+  const isThere = () => charts.some((each) => each.root.isConnected && each.data[0].length > 1000);
   while (!isThere() && Date.now() < end) await new Promise((go) => setTimeout(go, 50));
   return isThere();
 }"""
@@ -61,21 +58,26 @@ def test_who_wants_no_motion_gets_none(site, open_page) -> None:
 
 def test_a_blockage_turns_the_right_pump_red_and_tells_why(site, open_page, screenshots) -> None:
     page = open_page(f"{site.url}/station/alpha?pump=2")
-    expect(page.locator('.pump[data-state="pump_fault"] .name')).to_have_text(["Pump 2"], timeout=60_000)
+    expect(page.locator('.pump[data-state="pump_fault"] .name')).to_have_text(["Pump 2"], timeout=120_000)
     pump = page.locator('.pump[data-state="pump_fault"]')
     theme = (files("wetwell.services") / "reports" / "theme.css").read_text(encoding="utf-8")
     red = re.search(r"--urgent: light-dark\(#(\w{6})", theme)[1]
-    colour = pump.locator("circle").evaluate("node => getComputedStyle(node).stroke")
-    assert colour == f"rgb({int(red[:2], 16)}, {int(red[2:4], 16)}, {int(red[4:], 16)})"
+    rgb = f"rgb({int(red[:2], 16)}, {int(red[2:4], 16)}, {int(red[4:], 16)})"
+    expect(pump.locator("circle")).to_have_css("stroke", rgb)  # once the stage is "act"
     expect(pump.locator(".condition")).to_have_text("pump fault")
     expect(page.locator("#station-state")).to_have_attribute("data-state", "pump_fault")
     expect(page.locator(".curve.now.fault")).to_have_count(1)
     expect(page.locator(".plane .label").first).to_have_text("pump curve, moved")
-    change = page.get_by_role("list", name="Changes of state, newest first").get_by_role("button", name="pump fault")
-    change.first.click()
-    evidence = page.locator(".evidence")
-    for word in ("pull the pump", "onset", "loss of speed", "F-test, pump", "I_W", "cheapest", "pump curve"):
-        expect(evidence).to_contain_text(word)
+    cause = page.locator(".is-cause")
+    expect(cause.locator(".cause")).to_have_text([re.compile("^pump 2: ")])
+    for word in ("Pump 2 is at fault since", "loss of", ", limit ", "pull the pump", "Expected cost; cheapest"):
+        expect(cause).to_contain_text(word)
+    expect(cause.locator(".severity")).to_be_visible()
+    expect(cause.locator(".evidence")).to_be_hidden()
+    cause.get_by_text("Statistics").click()
+    for word in ("onset", "F-test, pump", "I_W", "pump curve"):
+        expect(cause.locator(".evidence")).to_contain_text(word)
+    assert page.locator(".well .main.fault").count() == 0
     page.screenshot(path=screenshots / "station.png", full_page=True)
     overview = open_page(f"{site.url}/?state=fault")
     line = overview.get_by_role("row").filter(has_text="alpha")
@@ -105,47 +107,18 @@ def test_acknowledging_by_name_works_and_survives_a_reload(site, open_page, scre
 def test_the_address_holds_the_view(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha")
     page.get_by_role("group", name="Pump").get_by_role("button", name="Pump 3").click()
-    page.get_by_role("button", name="24h").click()
+    page.get_by_role("button", name="24 h").click()
     page.get_by_label("Theme").select_option("dark")
-    expect(page.locator(".is-history .chart canvas")).to_be_visible()
-    assert "pump=3" in page.url
-    assert "span=24h" in page.url
-    assert "theme=dark" in page.url
+    expect(page).to_have_url(re.compile("pump=3"))
+    expect(page).to_have_url(re.compile("span=24h"))
+    expect(page).to_have_url(re.compile("theme=dark"))
     page.reload()
-    expect(page.get_by_role("button", name="Pump 3")).to_have_attribute("aria-pressed", "true", timeout=SLOW_MS)
-    expect(page.get_by_role("button", name="24h")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_role("button", name="Pump 3")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_role("button", name="24 h")).to_have_attribute("aria-pressed", "true")
     assert page.evaluate("document.documentElement.dataset.theme") == "dark"
-    assert "recording.csv" in page.get_by_role("link", name="download as recording").get_attribute("href")
-
-
-def test_the_historian_fills_the_chart_of_the_past_and_the_download(site, open_page, tmp_path) -> None:
-    page = open_page(f"{site.url}/station/alpha")
-    expect(page.locator("#station-time")).to_have_text(re.compile(" (?!00).*UTC"), timeout=SLOW_MS)
-    page.get_by_role("button", name="24h").click()
-    note = page.get_by_text("Drag to zoom")
-    expect(note).to_have_text(re.compile(r"\d{2,} points"), timeout=SLOW_MS)
-    whole = note.inner_text()
-    over = page.locator(".is-history .u-over")
-    over.scroll_into_view_if_needed()
-    box = over.bounding_box()
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.5 * box["height"], steps=5)
-    page.mouse.up()
-    expect(page).to_have_url(re.compile("from=.*&to="))
-    expect(note).not_to_have_text(whole)
-    expect(note).to_have_text(re.compile(r"\d{2,} points"))
-    page.get_by_label("Quantity").select_option("flow_m3h")
-    expect(page.locator(".is-history .u-legend")).to_contain_text("pump 3")
-    with page.expect_download() as download:
-        page.get_by_role("link", name="download as recording").click()
-    path = tmp_path / download.value.suggested_filename
-    download.value.save_as(path)
-    recording = read_recording(path)
-    span = parse_qs(urlsplit(page.url).query)
-    assert from_iso(span["from"][0]) <= recording.time_ns[0] < recording.time_ns[-1] < from_iso(span["to"][0])
-    assert len(recording.time_ns) > 1000
-    assert recording.pumps == 3
+    expect(page.get_by_role("link", name="download as recording")).to_have_attribute(
+        "href", re.compile(r"recording\.csv")
+    )
 
 
 def test_the_page_comes_back_when_the_server_does(site, open_page, unused_port) -> None:
@@ -191,7 +164,9 @@ def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_po
         ("/", "dark"),
         ("/station/alpha", "light"),
         ("/station/alpha", "dark"),
+        ("/station/alpha?span=24h", "light"),
         ("/alarms", "dark"),
+        ("/alarms?show=journal", "light"),
         ("/reports", "light"),
         ("/health", "light"),
     ],

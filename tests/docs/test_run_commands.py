@@ -1,4 +1,4 @@
-"""Commands of README and docs, really run in the order of the page, each page in a folder of its own."""
+"""Commands of README and docs, really run in the order of the page, each page in its own folder; what they print."""
 
 import os
 import re
@@ -19,13 +19,22 @@ PORTS = ("7447", "8080", "5020", "9100")
 PATIENCE_S = 240
 
 
+def blocks(page: Path, language: str) -> list[str]:
+    """Fenced blocks of a page in a language, without the indent of a list."""
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```", text, flags=re.MULTILINE | re.DOTALL)
+    return [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in found]
+
+
 def commands(page: Path) -> list[str]:
     """Commands of the shell blocks of a page, each with the text that it reads."""
-    blocks = re.findall(r"^( *)```sh\n(.*?)^ *```", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-    texts = [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in blocks]
-    return [
-        found[0] for text in texts for found in re.finditer(r"^.*<<'(\w+)'\n(?:.*\n)*?\1$|^.+$", text, re.MULTILINE)
-    ]
+    line_or_text = re.compile(r"^.*<<'(\w+)'\n(?:.*\n)*?\1$|^.+$", re.MULTILINE)
+    return [found[0] for block in blocks(page, "sh") for found in line_or_text.finditer(block)]
+
+
+def lines_of(text: str) -> list[str]:
+    """Lines of a text without their spacing, which tables fit to their longest row."""
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
 
 
 def pages_with_commands() -> Iterator[str]:
@@ -58,6 +67,7 @@ def test_commands_run(walk: Walk, tmp_path: Path) -> None:
     lines = [line for page in walk.pages for line in commands(ROOT / page)]
     lines = [line for line in lines if not f"{line}\n".startswith(tuple(walk.left_out))]
     started: list[tuple[subprocess.Popen[bytes], Path]] = []
+    printed: list[str] = []
     try:
         if walk.given:
             run(walk.given, tmp_path, environment)
@@ -73,12 +83,17 @@ def test_commands_run(walk: Walk, tmp_path: Path) -> None:
                 started.append((process, said))
             else:
                 code = next((code for beginning, code in walk.codes.items() if line.startswith(beginning)), 0)
-                run(run_line, tmp_path, environment, code, PATIENCE_S if line.startswith(walk.patient) else 0.0)
+                patience_s = PATIENCE_S if line.startswith(walk.patient) else 0.0
+                printed += lines_of(run(run_line, tmp_path, environment, code, patience_s))
         for process, said in started:
             wait_for_a_word(process, said)
     finally:
         codes = [code_at_the_end(process) for process, _ in reversed(started)]
     assert codes == [0] * len(started), [said.read_text() for _, said in started]
+    if walk.shows_output:
+        shown = [line for page in walk.pages for block in blocks(ROOT / page, "text") for line in lines_of(block)]
+        assert shown
+        assert [line for line in shown if line not in printed] == [], "\n".join(printed)
 
 
 def code_at_the_end(process: subprocess.Popen[bytes]) -> int:
@@ -128,8 +143,8 @@ def environment_of(folder: Path, ports: dict[str, str]) -> dict[str, str]:
     }
 
 
-def run(line: str, folder: Path, environment: dict[str, str], code: int = 0, patience_s: float = 0.0) -> None:
-    """Run a line of a page; where it may be too early, until it succeeds."""
+def run(line: str, folder: Path, environment: dict[str, str], code: int = 0, patience_s: float = 0.0) -> str:
+    """What a line of a page prints; where it may be too early, it is run until it succeeds."""
     deadline = time.monotonic() + patience_s
     while True:
         done = subprocess.run(
@@ -142,6 +157,6 @@ def run(line: str, folder: Path, environment: dict[str, str], code: int = 0, pat
             check=False,
         )
         if done.returncode == code:
-            return
+            return done.stdout
         assert time.monotonic() < deadline, f"{line}\n{done.stdout}{done.stderr}"
         time.sleep(0.5)

@@ -39,6 +39,8 @@ class Walk:
         Beginnings of commands that are not run, with the reason.
     codes : mapping
         Exit codes of commands that do not end with 0, by their beginnings.
+    shows_output : bool
+        Whether the `text` blocks of the pages are what the commands print, line by line.
     """
 
     pages: tuple[str, ...]
@@ -49,15 +51,17 @@ class Walk:
     changed: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     codes: Mapping[str, int] = field(default_factory=dict)
+    shows_output: bool = False
 
 
 WALKS = (
-    Walk(("docs/add-a-station.md",), services=("wetwell up",)),
+    Walk(("docs/add-a-station.md",), services=("wetwell up",), shows_output=True),
     Walk(
         ("docs/tutorial-connect-a-plc.md",),
         services=("wetwell plc", "wetwell router", "wetwell gateway --plc", "wetwell detector", "wetwell dashboard"),
         patient=("wetwell gateway read", "wetwell doctor"),
         codes={"wetwell doctor": 1},  # without historian and alarms it warns
+        shows_output=True,
     ),
     Walk(
         ("docs/tutorial-first-fault.md", "docs/alarms.md", "docs/grafana.md", "docs/operations.md"),
@@ -81,8 +85,8 @@ WALKS = (
         left_out={"WETWELL_SECURITY__TOKENS_FILE": "opens a port to the network; test_dashboard.py"},
     ),
     Walk(("docs/command-line.md",)),
-    Walk(("docs/convert.md",)),
-    Walk(("docs/tutorial-your-own-export.md",)),
+    Walk(("docs/convert.md",), shows_output=True),
+    Walk(("docs/tutorial-your-own-export.md",), shows_output=True),
     Walk(("docs/gateway.md",), before=("wetwell plc",), patient=("wetwell gateway read",)),
     Walk(
         ("docs/fleet.md",),

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from wetwell.services.runtime.health.metrics import METRICS
@@ -31,6 +31,8 @@ class Entry:
 class HealthBoard(Collector):
     """Figures by station and service; the same that go into the status messages. Any thread may read.
 
+    `others` are further collectors of this process, for the same page.
+
     Parameters
     ----------
     clock : callable
@@ -48,6 +50,7 @@ class HealthBoard(Collector):
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
+        self.others: list[Collector] = []
         self._entries: dict[tuple[str, str], Entry] = {}
         self._lock = threading.Lock()
 
@@ -84,7 +87,7 @@ class HealthBoard(Collector):
         if entry.dropped_s is not None and now_s - entry.dropped_s <= DROP_S:
             yield "too slow, messages were dropped within the last minute"
 
-    def collect(self) -> Iterable[GaugeMetricFamily]:
+    def collect(self) -> Iterable[Metric]:
         """Figures as Prometheus takes them."""
         with self._lock:
             entries = sorted(self._entries.items())
@@ -95,6 +98,8 @@ class HealthBoard(Collector):
                 if figure in entry.figures:
                     family.add_metric(labels, entry.figures[figure])
             yield family
+        for other in self.others:
+            yield from other.collect()
 
 
 def figure_faults(figures: dict[str, float], max_sample_age_s: float) -> list[str]:

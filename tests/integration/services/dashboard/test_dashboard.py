@@ -28,7 +28,7 @@ from wetwell.services.dashboard.app import AppState, dashboard_app
 from wetwell.services.dashboard.daemon import serve_dashboard
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.feed import Feed
-from wetwell.services.dashboard.site_view import ROWS, SiteView
+from wetwell.services.dashboard.view.site_view import ROWS, SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
 from wetwell.services.runtime.settings import DashboardSettings, Settings
 from wetwell.services.security.tokens import new_token
@@ -151,7 +151,7 @@ def test_what_is_no_act_is_told(body, rule) -> None:
 
 def test_without_a_bus_or_an_answer_that_is_told(monkeypatch) -> None:
     assert acting(app_state_with(), ACT.encode()).status_code == 503
-    monkeypatch.setattr("wetwell.services.dashboard.client.ANSWER_S", 0.01)
+    monkeypatch.setattr("wetwell.services.dashboard.past.client.ANSWER_S", 0.01)
     silent = acting(app_state_with(MemoryBus()), ACT.encode())
     assert (silent.status_code, silent.json()["error"]) == (504, "the alarm service does not answer")
     span = "kind=samples&start=2025-01-01&end=2025-01-02"
@@ -215,7 +215,7 @@ def test_what_is_no_question_to_the_historian_is_told(query) -> None:
 
 @pytest.mark.parametrize("form", ["messages", "columns"])
 def test_a_recording_is_put_together_from_pages_and_can_be_read(tmp_path, monkeypatch, form) -> None:
-    monkeypatch.setattr("wetwell.services.dashboard.client.ROWS_A_QUESTION", 100)
+    monkeypatch.setattr("wetwell.services.dashboard.past.client.ROWS_A_QUESTION", 100)
     rows = 250
     every = [json.loads(a_sample(second).encode()) for second in range(rows)]
 
@@ -351,7 +351,7 @@ def past_of(payload):
 @contextlib.asynccontextmanager
 async def looked_at(bus, monkeypatch):
     """The state of an app that hears station alpha since second 2000 and beta, with a page that is open on alpha."""
-    monkeypatch.setattr("wetwell.services.dashboard.backfill.SETTLED_S", 0.0)
+    monkeypatch.setattr("wetwell.services.dashboard.past.backfill.SETTLED_S", 0.0)
     app_state = app_state_with(bus)
     publishers = {name: bus.publisher(sample_key(name)) for name in ("alpha", "beta")}
     events = app_state.streams.listen("alpha")
@@ -366,7 +366,8 @@ async def looked_at(bus, monkeypatch):
 
 
 def rows_of(app_state, station="alpha"):
-    return json.loads(app_state.view.station_state(station))["rows"]
+    text = app_state.view.station_state(station)
+    return [] if text is None else json.loads(text)["rows"]
 
 
 def test_charts_of_a_station_that_is_looked_at_begin_with_what_the_historian_has(monkeypatch) -> None:
@@ -401,7 +402,7 @@ def test_charts_of_a_station_that_is_looked_at_begin_with_what_the_historian_has
     "answer", [None, b"{}", History(station="alpha", kind="samples", error="disk full").encode()]
 )
 def test_charts_begin_with_what_comes_where_no_historian_tells_more_and_ask_again(monkeypatch, answer) -> None:
-    monkeypatch.setattr("wetwell.services.dashboard.backfill.AGAIN_S", 0.3)
+    monkeypatch.setattr("wetwell.services.dashboard.past.backfill.AGAIN_S", 0.3)
 
     async def run():
         bus = MemoryBus()
@@ -632,7 +633,7 @@ def test_an_act_of_maintenance_goes_to_the_detector_and_its_record_comes_back(mo
     assert expected.items() <= told.json().items()
     refused = asyncio.run(run("pump:9"))
     assert (refused.status_code, refused.json()["error"]) == (400, "asset: got 'pump:9'")
-    monkeypatch.setattr("wetwell.services.dashboard.client.ANSWER_S", 0.01)
+    monkeypatch.setattr("wetwell.services.dashboard.past.client.ANSWER_S", 0.01)
     silent = maintained(app_state_with(MemoryBus()), b'{"asset": "main", "act": "flushed", "by": "Ada"}')
     assert (silent.status_code, silent.json()["error"]) == (504, "the detector does not answer")
 

@@ -14,7 +14,8 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
-from wetwell.services.dashboard.client import RefusalError, set_plant_clock
+from wetwell.services.dashboard.past.client import set_plant_clock
+from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.runtime.settings import AlarmSettings, Settings
 from wetwell.services.simulator import daemon
 from wetwell.services.simulator.daemon import PlantStart, serve_simulator

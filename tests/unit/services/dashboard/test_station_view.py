@@ -13,9 +13,9 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.dashboard.sample_row import past_rows, sample_row, thinned
-from wetwell.services.dashboard.site_view import ROWS, SiteView
-from wetwell.services.dashboard.station_view import LATE_SAMPLES, ROWS_A_FRAME
+from wetwell.services.dashboard.view.sample_row import past_rows, sample_row, thinned
+from wetwell.services.dashboard.view.site_view import ROWS, SiteView
+from wetwell.services.dashboard.view.station_view import LATE_SAMPLES, ROWS_A_FRAME
 from wetwell.services.stations import find_station
 
 
@@ -71,7 +71,7 @@ def test_of_many_samples_only_those_that_are_drawn_are_read_and_none_counts_as_l
 
 
 def test_names_that_somebody_makes_up_have_a_bound(view, monkeypatch):
-    monkeypatch.setattr("wetwell.services.dashboard.site_view.MOST_STATIONS", 3)
+    monkeypatch.setattr("wetwell.services.dashboard.view.site_view.MOST_STATIONS", 3)
     for number in range(10):
         view.handle_sample(sample(1, f"s{number}").encode())
         view.handle_presence(Presence(f"wetwell/p{number}/alive/detector", is_alive=True))
@@ -245,10 +245,49 @@ def test_silence_becomes_no_data_and_ends_with_the_next_sample(view) -> None:
     assert frame_of(view, 20.25)["state"] == "normal"
 
 
-def test_a_fault_ranks_above_silence_and_the_worst_pump_counts(view) -> None:
+def test_the_worst_pump_counts_and_without_samples_it_is_no_data_whatever_was_said(view) -> None:
     view.handle_verdict(verdict(1, "pump_fault", pump=2).encode())
     view.handle_verdict(verdict(1, "normal", pump=1).encode())
-    assert frame_of(view, 20.0)["state"] == "pump_fault"
+    view.handle_sample(sample(1).encode())
+    assert frame_of(view, 0.25)["state"] == "pump_fault"
+    assert frame_of(view, 20.0)["state"] == "no_data"
+
+
+def test_a_sample_of_unknown_age_is_old_until_another_comes(view) -> None:
+    view.handle_sample(sample(1).encode(), is_kept=True)
+    frame = frame_of(view, 0.25)
+    assert (frame["stale"], frame["age_s"]) == (True, None)
+    view.handle_sample(sample(2).encode())
+    frame = frame_of(view, 0.5)
+    assert not frame["stale"]
+    assert frame["age_s"] < 1.0
+
+
+def test_the_age_of_samples_goes_on_with_the_clock(view) -> None:
+    view.handle_sample(sample(1).encode())
+    view.advance(0.25)
+    view.advance(30.0)
+    assert json.loads(view.station_state("alpha"))["age_s"] == 30.0
+
+
+def test_a_station_of_which_nothing_was_heard_is_none(view) -> None:
+    assert view.station_state("alpha") is None
+    assert json.loads(view.empty_state("alpha"))["quality"] is None
+    view.handle_presence(Presence("wetwell/alpha/alive/detector", is_alive=True))
+    assert view.station_state("alpha") is not None
+
+
+def test_every_station_learns_which_services_of_the_site_live(view) -> None:
+    view.handle_sample(sample(1).encode())
+    view.advance(0.25)
+    view.handle_presence(Presence("wetwell/_site/alive/historian", is_alive=True))
+    assert frame_of(view, 0.5)["site"] == ["historian"]
+    view.handle_presence(Presence("wetwell/_site/alive/historian", is_alive=False))
+    assert frame_of(view, 0.75)["site"] == []
+    view.handle_presence(Presence("wetwell/_site/alive/alarms", is_alive=True))
+    view.handle_sample(sample(1, "beta").encode())
+    view.advance(1.0)
+    assert json.loads(view.station_state("beta"))["site"] == ["alarms"]
 
 
 def test_the_overview_sends_what_has_changed_only(view) -> None:

@@ -1,0 +1,1 @@
+"""What the page asks of the other services: history, recordings, acts."""

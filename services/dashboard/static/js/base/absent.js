@@ -1,0 +1,17 @@
+// A service that is not there is said where its content would be.
+
+import { html } from "./dom.js";
+import { t } from "./words.js";
+
+const SAYS = {
+  detector: t("The detector is not running: nobody judges this station now. What stands here is what it said last."),
+  historian: t("The historian is not running: nothing of the past can be shown, and nothing is kept."),
+  alarms: t("The alarm service is not running: no alarm is raised, and an empty list means nothing."),
+  source: t("No samples come: what stands here is old. See the alarms, and check PLC, gateway and network."),
+};
+
+/** A line that is seen only while a service is away. */
+export function absence(service) {
+  const element = html("p", { class: "absent", role: "status", "data-service": service, hidden: true }, SAYS[service]);
+  return { element, show: (isThere) => { if (element.hidden !== isThere) element.hidden = isThere; } };
+}

@@ -1,0 +1,45 @@
+// Alarms of one station: those that stand, and of a range of the past those that stood in it.
+
+import { alarmList } from "../alarms/alarm_list.js";
+import { absence } from "../base/absent.js";
+import { html, panel } from "../base/dom.js";
+import { csvOf, download } from "../base/export.js";
+import { lasting, moment, words } from "../base/format.js";
+import { t } from "../base/words.js";
+
+export function alarmPanel({ station, range, past }) {
+  const away = absence("alarms");
+  const list = alarmList({ withStation: false });
+  const rows = html("tbody");
+  const table = html("table", { hidden: true }, html("caption", {}, t("Alarms of the range")),
+    html("thead", {}, html("tr", {}, ...[t("Alarm"), t("Priority"), t("Raised"), t("Lasted")].map((word) => html("th", { scope: "col" }, word)))), rows);
+  const element = panel(t("Alarms"), away.element, html("div", { class: "scroll" }, list.element, table));
+  element.querySelector("header").append(html("button", { type: "button", onclick: exportShown }, t("download what is drawn")));
+  element.classList.add("is-alarms");
+  let bands = [];
+
+  function exportShown() {
+    const iso = (ms) => (ms == null ? "" : new Date(ms).toISOString());
+    download(`${station.name}-alarms.csv`, csvOf(["alarm", "priority", "from", "to", "text"], bands.map(({ id, priority, from, to, text }) => ({ alarm: id, priority, from: iso(from), to: iso(to), text }))));
+  }
+
+  function showRange() {
+    const [from, to] = range.limits();
+    bands = past.bands.alarms.filter((band) => band.from < to && (band.to ?? Infinity) > from).reverse();
+    table.hidden = range.isLive || !bands.length;
+    if (table.hidden) return;
+    rows.replaceChildren(...bands.slice(0, 100).map((band) => html("tr", {},
+      html("td", {}, html("button", { type: "button", class: "plain", onclick: () => range.pick(Math.min(to, Math.max(from, band.from))) }, band.text)), html("td", {}, words(band.priority)),
+      html("td", {}, moment(band.from)), html("td", {}, band.to ? lasting((band.to - band.from) / 1000) : t("still there")))));
+  }
+
+  return {
+    element,
+    update(changed) {
+      const isThere = station.has("alarms");
+      away.show(isThere);
+      if (["alarms", "services", "begin"].some((name) => changed.has(name))) list.show([...station.alarms.values()].filter((alarm) => alarm.state !== "normal"), { isWatched: isThere });
+      if (changed.has("bands") || changed.has("range")) showRange();
+    },
+  };
+}

@@ -1,0 +1,39 @@
+// How far a fault has gone: in words, and as a bar beside its limits.
+
+import { html, svg } from "../base/dom.js";
+import { figure, signed } from "../base/format.js";
+import { kindOf } from "../base/states.js";
+import { t } from "../base/words.js";
+
+export const QUANTITIES = {
+  speed_loss_percent: { word: t("loss of speed"), unit: "%", digits: 1 },
+  friction_rise_percent: { word: t("more friction"), unit: "%", digits: 1 },
+  static_head_rise_m: { word: t("more static head"), unit: "m", digits: 2 },
+  wear_head_percent: { word: t("loss of head by wear"), unit: "%", digits: 1 },
+};
+const WIDTH = 420;
+
+const formOf = (quantity) => QUANTITIES[quantity] ?? { word: t(String(quantity).replaceAll("_", " ")), unit: "", digits: 2 };
+
+export function severityWords({ quantity, value, interval, limit }) {
+  const { word, unit, digits } = formOf(quantity);
+  const range = interval ? ` (${signed(interval[0], digits)} ${t("to")} ${signed(interval[1], digits)})` : "";
+  const bound = limit == null ? "" : t(", limit {value} {unit}", { value: figure(limit, digits), unit });
+  return `${word} ${figure(value, digits)} ${unit}${range}${bound}`;
+}
+
+/** A bar from nothing to beyond the limit, with the interval as a whisker; half of the limit is where a visit is planned. */
+export function severityPicture(fault) {
+  const { quantity, value, interval, limit } = fault.severity;
+  const { word, unit, digits } = formOf(quantity);
+  const most = 1.15 * Math.max(limit ?? 0, Math.abs(value), ...(interval ?? []).map(Math.abs), 1e-9);
+  const x = (amount) => Math.max(0, (WIDTH * amount) / most);
+  const lines = limit == null ? [] : [[limit / 2, t("plan")], [limit, t("limit")]];
+  const drawing = svg("svg", { class: `severity is-${kindOf(fault)}`, viewBox: `0 -16 ${WIDTH} 62`, role: "img", "aria-label": severityWords(fault.severity) },
+    svg("rect", { class: "track", x: 0, y: 4, width: WIDTH, height: 16 }),
+    svg("rect", { class: "bar", x: 0, y: 4, width: x(value).toFixed(1), height: 16 }),
+    interval ? svg("path", { class: "whisker", d: `M${x(interval[0])} 12H${x(interval[1])}M${x(interval[0])} 7v10M${x(interval[1])} 7v10` }) : null,
+    ...lines.flatMap(([at, name]) => [svg("line", { class: "bound", x1: x(at), x2: x(at), y1: 0, y2: 24 }), svg("text", { x: x(at), y: -4, "text-anchor": at > most * 0.9 ? "end" : "middle" }, `${name} ${figure(at, digits)}`)]),
+    svg("text", { x: 0, y: 40 }, `${word}: ${figure(value, digits)} ${unit}`));
+  return html("div", {}, drawing);
+}

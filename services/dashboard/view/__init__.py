@@ -1,0 +1,1 @@
+"""What the page knows of the site and of each station, and what is new of it."""

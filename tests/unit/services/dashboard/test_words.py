@@ -1,0 +1,53 @@
+"""The catalogues of the page hold every text of it, and no other; so do those of what services say in words."""
+
+import re
+from importlib.resources import files
+
+import pytest
+
+from wetwell.detector.verdict.maintenance import _ADVICE, _CURED
+from wetwell.services.alarms.rules import RULES
+
+STATIC = files("wetwell.services") / "dashboard" / "static"
+LANGUAGES = ("de",)
+SERVICES_SAY = {*_ADVICE.values(), *_CURED, *(rule.advice for rule in RULES.values())}
+
+
+def modules(folder):
+    for entry in folder.iterdir():
+        if entry.is_dir() and entry.name != "words":
+            yield from modules(entry)
+        elif entry.name.endswith(".js"):
+            yield entry.read_text(encoding="utf-8")
+
+
+def page_texts():
+    found = {text for module in modules(STATIC / "js") for text in re.findall(r'\bt\("((?:[^"\\]|\\.)*)"', module)}
+    shell = (STATIC / "index.html").read_text(encoding="utf-8")
+    return found | set(re.findall(r"data-t>([^<]+)<", shell))
+
+
+def catalogue(language):
+    lines = (STATIC / "js" / "words" / f"{language}.js").read_text(encoding="utf-8")
+    return dict(re.findall(r'^  "((?:[^"\\]|\\.)*)": "((?:[^"\\]|\\.)*)",$', lines, re.MULTILINE))
+
+
+def test_the_page_has_texts():
+    assert len(page_texts()) > 250
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_catalogue_lacks_no_text_and_holds_no_other(language):
+    wanted = page_texts() | SERVICES_SAY
+    assert sorted(wanted - catalogue(language).keys()) == []
+    assert sorted(catalogue(language).keys() - wanted) == []
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_translation_has_the_same_values_in_it(language):
+    different = [text for text, told in catalogue(language).items() if places(text) != places(told)]
+    assert different == []
+
+
+def places(text):
+    return sorted(re.findall(r"\{\w+\}", text))
