@@ -9,14 +9,15 @@ from wetwell.sim2real.replay.replay import Prediction
 
 FULL_SPEED = 0.995
 """Share of a pump's highest frequency from which it runs at full speed."""
-UNITS = {"flow_m3h": ("flow", "m³/h"), "head_m": ("head", "m"), "power_kw": ("power", "kW")}
+NAMES_OF = {"flow_m3h": ("flow", "m³/h"), "head_m": ("head", "m"), "power_kw": ("power", "kW")}
 
 
 def lead(report: GapReport, diagnosis: Diagnosis) -> str:
     """One or two sentences, with sizes in physical units."""
     before = differences(diagnosis.traces, diagnosis.replay.run())
     sizes = ", ".join(
-        f"{UNITS[name][0]} {value:+.3g} {UNITS[name][1]} ({share:+.1%})" for name, (value, share) in before.items()
+        f"{NAMES_OF[name][0]} {value:+.3g} {NAMES_OF[name][1]} ({share:+.1%})"
+        for name, (value, share) in before.items()
     )
     seen = f" At full speed the station differs from its simulator on average by: {sizes}." if sizes else ""
     where = report.where[0].component.replace("_", " ") if report.where else "station"
@@ -50,7 +51,7 @@ def differences(traces: Traces, predicted: Prediction) -> dict[str, tuple[float,
     for name, measured in traces.signals.items():
         said = predicted.signals[name]
         rows = is_full & np.isfinite(measured) & np.isfinite(said)
-        if name in UNITS and rows.any():
+        if name in NAMES_OF and rows.any():
             mean = float(np.mean(measured[rows] - said[rows]))
             found[name] = mean, mean / max(abs(float(np.mean(said[rows]))), 1e-9)
     return found

@@ -30,6 +30,11 @@ DRAWN_CANDIDATES = 8
 SHOWN_S = 1800
 SHOWN_ROWS = 60
 """Traces are drawn over so many seconds, and over so many rows at least."""
+VERDICT_WORDS = {
+    "none": "No gap beyond the noise of the sensors.",
+    "unknown": "There is a gap that no effect of the library explains.",
+    "effect": "The gap is explained by the effects below.",
+}
 DRAWN_DUTIES = 400
 """Duties that are drawn, spread over the recording."""
 
