@@ -45,7 +45,8 @@ format: $(VENV)/.dev  ## Bring all files into form
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(VENV)/.dev  ## Build the documentation site in build/site, with its links checked
+docs: $(VENV)/.dev  ## Build the documentation site in build/site, with its links, and how hard its pages are to read, checked
+	$(BIN)/python .ci/readability.py
 	@mkdir -p build/mermaid
 	@test -d build/mermaid/package || (cd build/mermaid && npm pack --silent mermaid@11 > /dev/null && tar xzf mermaid-*.tgz) || \
 	  echo "diagrams will be shown as text: npm or its registry is not there"
