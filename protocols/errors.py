@@ -30,7 +30,7 @@ def first_fault(error: "ValidationError") -> str:
 
     Examples
     --------
-    >>> from pydantic import BaseModel, Field
+    >>> from pydantic import BaseModel, Field, ValidationError
     >>> class Sump(BaseModel):
     ...     area_m2: float = Field(gt=0)
     >>> try:

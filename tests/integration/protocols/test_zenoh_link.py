@@ -179,9 +179,9 @@ def test_a_reader_that_is_far_too_slow_loses_nothing_that_publishers_keep(endpoi
     want = [b"%05d" % number for number in range(5_000)]
 
     async def read_late() -> tuple[list[bytes], int]:
-        messages = follower.subscribe("wetwell/alpha/sample", capacity=200)
         publisher.put(b"first")
-        assert await next_batch(messages) == [b"first"]
+        messages = follower.subscribe("wetwell/alpha/sample", history=1, capacity=200)
+        assert await asyncio.wait_for(messages.receive(), LIMIT_S) == [b"first"]
         for payload in want:
             publisher.put(payload)
         await asyncio.to_thread(wait_until, lambda: messages.is_crowded)
@@ -198,9 +198,9 @@ def test_a_reader_that_is_far_too_slow_loses_nothing_that_publishers_keep(endpoi
 
 def test_what_nobody_has_any_more_is_counted_and_told(endpoint, caplog):
     async def read_late() -> int:
-        messages = follower.subscribe("wetwell/alpha/sample", capacity=200)
         publisher.put(b"first")
-        assert await next_batch(messages) == [b"first"]
+        messages = follower.subscribe("wetwell/alpha/sample", history=1, capacity=200)
+        assert await asyncio.wait_for(messages.receive(), LIMIT_S) == [b"first"]
         for number in range(5_000):
             publisher.put(b"%05d" % number)
         await asyncio.to_thread(wait_until, lambda: messages.is_crowded)
