@@ -43,6 +43,11 @@ class AssetBelief:
     log_static: float = 0.0
     wasted_kwh: dict[int, float] = field(default_factory=dict)
 
+    @property
+    def is_carried(self) -> bool:
+        """Whether the size that is carried is that of the fault which stands: what an early look told is not yet."""
+        return self.since_ns is not None and abs(self.track.size[0]) >= CLEARED_SHARE * self.told_size
+
     def tell(self, onset_ns: int, size: float) -> None:
         """Note that a run has shown the asset to be at fault, by so much."""
         if self.since_ns is None:

@@ -93,7 +93,7 @@ def believe(pump: AssetBelief, main: AssetBelief, weighed: Weighed, state: State
         return
     assets = ((pump, PUMP_STATES), (main, MAIN_STATES))
     is_headless = weighed.observation.system_in_pump != 0.0
-    changed = [(asset.since_ns is None) == (state in states) and state != "unknown" for asset, states in assets]
+    changed = [asset.is_carried != (state in states) and state != "unknown" for asset, states in assets]
     if not is_headless or state in PUMP_STATES or state == "normal":
         _believe_pump(pump, weighed, is_headless=is_headless, is_sure=changed[0])
     if weighed.point.friction_m > 0.0 and (not is_headless or state in MAIN_STATES or state == "normal"):
