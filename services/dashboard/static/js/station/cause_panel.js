@@ -8,13 +8,14 @@ import { STAGES, assetWords, faultsOf, icon, kindOf, stageOf, state } from "../b
 import { t } from "../base/words.js";
 import { moneyOf } from "./money.js";
 import { residualCharts } from "./residual_charts.js";
-import { severityPicture, severityWords } from "./severity.js";
+import { QUANTITIES, severityPicture, severityWords } from "./severity.js";
 import { statisticsOf } from "./statistics.js";
 
 /** Growth by the day; what its interval does not tell from none is none. */
-function growthWords({ per_day: perDay, interval }) {
-  if (interval[0] > 0) return t("it grows by {value} a day", { value: figure(perDay, 2) });
-  return interval[1] < 0 ? t("it shrinks by {value} a day", { value: figure(-perDay, 2) }) : t("no growth is seen");
+function growthWords({ per_day: perDay, interval }, quantity) {
+  const value = `${figure(Math.abs(perDay), 2)} ${QUANTITIES[quantity]?.unit ?? ""}`.trim();
+  if (interval[0] > 0) return t("it grows by {value} a day", { value });
+  return interval[1] < 0 ? t("it shrinks by {value} a day", { value }) : t("no growth is seen");
 }
 
 export function causePanel(view) {
@@ -87,7 +88,7 @@ export function causePanel(view) {
     const parts = [t("{asset} is at fault since {time}", { asset: words_.charAt(0).toUpperCase() + words_.slice(1), time: moment(millis(fault.since)) })];
     if (fault.severity) parts.push(severityWords(fault.severity));
     const { trend } = fault;
-    if (trend) parts.push(growthWords(trend));
+    if (trend) parts.push(growthWords(trend, fault.severity?.quantity));
     if (trend?.reaches_limit) parts.push(t("the limit is reached on {day}{interval}", { day: day(millis(trend.reaches_limit)), interval: trend.interval_at?.every(Boolean) ? ` (${day(millis(trend.interval_at[0]))} – ${day(millis(trend.interval_at[1]))})` : "" }));
     const stage = STAGES[fault.stage];
     return `${parts.join(", ")}.${stage ? ` ${stage.word.charAt(0).toUpperCase()}${stage.word.slice(1)}: ${stage.says}.` : ""}`;

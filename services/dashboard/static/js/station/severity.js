@@ -12,6 +12,7 @@ export const QUANTITIES = {
   wear_head_percent: { word: t("loss of head by wear"), unit: "%", digits: 1 },
 };
 const WIDTH = 420;
+const LABEL = 100; // two words with a figure that are nearer than this would lie on each other
 
 const formOf = (quantity) => QUANTITIES[quantity] ?? { word: t(String(quantity).replaceAll("_", " ")), unit: "", digits: 2 };
 
@@ -28,12 +29,14 @@ export function severityPicture(fault) {
   const { word, unit, digits } = formOf(quantity);
   const most = 1.15 * Math.max(limit ?? 0, Math.abs(value), ...(interval ?? []).map(Math.abs), 1e-9);
   const x = (amount) => Math.max(0, (WIDTH * amount) / most);
-  const lines = limit == null ? [] : [[limit / 2, t("plan")], [limit, t("limit")]];
+  const isNarrow = limit != null && x(limit / 2) < LABEL;
+  const anchor = (at) => (isNarrow ? "start" : at > most * 0.9 ? "end" : "middle");
+  const lines = limit == null ? [] : [[limit / 2, isNarrow ? "" : `${t("plan")} ${figure(limit / 2, digits)}`], [limit, `${t("limit")} ${figure(limit, digits)}`]];
   const drawing = svg("svg", { class: `severity is-${kindOf(fault)}`, viewBox: `0 -16 ${WIDTH} 62`, role: "img", "aria-label": severityWords(fault.severity) },
     svg("rect", { class: "track", x: 0, y: 4, width: WIDTH, height: 16 }),
     svg("rect", { class: "bar", x: 0, y: 4, width: x(value).toFixed(1), height: 16 }),
     interval ? svg("path", { class: "whisker", d: `M${x(interval[0])} 12H${x(interval[1])}M${x(interval[0])} 7v10M${x(interval[1])} 7v10` }) : null,
-    ...lines.flatMap(([at, name]) => [svg("line", { class: "bound", x1: x(at), x2: x(at), y1: 0, y2: 24 }), svg("text", { x: x(at), y: -4, "text-anchor": at > most * 0.9 ? "end" : "middle" }, `${name} ${figure(at, digits)}`)]),
+    ...lines.flatMap(([at, name]) => [svg("line", { class: "bound", x1: x(at), x2: x(at), y1: 0, y2: 24 }), svg("text", { x: x(at), y: -4, "text-anchor": anchor(at) }, name)]),
     svg("text", { x: 0, y: 40 }, `${word}: ${figure(value, digits)} ${unit}`));
   return html("div", {}, drawing);
 }
