@@ -11,7 +11,7 @@ PYTEST := $(BIN)/pytest -q --numprocesses=3 --dist=worksteal --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: help up test check lint types imports kernels format docs requirements clean sbom audit image
+.PHONY: help up test check soak lint types imports kernels format docs requirements clean sbom audit image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -21,11 +21,14 @@ up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C 
 
 test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard each commit
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint imports types kernels
-	$(PYTEST) -m "not check"
+	$(PYTEST) -m "not check and not soak"
 
 check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
 	$(BIN)/pytest -q --durations=10 -m check tests/browser  # alone: a page that is watched must keep up with its site
 	$(PYTEST) -m check --ignore=tests/browser
+
+soak: $(VENV)/.dev  ## Twenty starts of the whole service, cold and warm, on a machine that is loaded on purpose
+	$(BIN)/pytest -q -m soak
 
 lint: $(VENV)/.dev  ## ruff
 	$(BIN)/ruff check .

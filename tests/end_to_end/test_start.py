@@ -95,7 +95,7 @@ def test_a_start_says_nothing_and_loses_nothing_and_a_second_one_goes_on(tmp_pat
     assert not (tmp_path / "data-2").exists()
 
 
-@pytest.mark.check
+@pytest.mark.soak
 @pytest.mark.timeout(6_000)
 def test_twenty_starts_on_a_loaded_machine_cold_and_warm_are_all_healthy(tmp_path: Path) -> None:
     with load(2 * (os.cpu_count() or 1)):
