@@ -56,7 +56,12 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
     if version > VERSION:
         raise StoreError(f"{path}: version {version} is newer than {VERSION}, which this program knows")
     if version == 0:
-        database.executescript(_LIVE_TABLES)
+        try:
+            database.executescript(_LIVE_TABLES)
+        except sqlite3.OperationalError:
+            database.rollback()
+            if _version(database) != VERSION:  # else another has made them meanwhile
+                raise
     elif version == 1:
         with alone():
             if _version(database) == 1:  # else another has done it meanwhile
