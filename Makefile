@@ -24,10 +24,10 @@ test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard ea
 	$(PYTEST) -m "not check and not soak"
 
 check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
-	$(BIN)/pytest -q --durations=10 -m check tests/browser  # alone: a page that is watched must keep up with its site
-	$(PYTEST) -m check --ignore=tests/browser
+	$(BIN)/pytest -q --durations=10 -m "check and not soak" tests/browser  # alone: a page that is watched must keep up with its site
+	$(PYTEST) -m "check and not soak" --ignore=tests/browser
 
-soak: $(VENV)/.dev  ## Twenty starts of the whole service, cold and warm, on a machine that is loaded on purpose
+soak: $(VENV)/.dev  ## What needs the machine alone: kills at 600 times life; twenty starts, with a load on purpose
 	$(BIN)/pytest -q -m soak
 
 lint: $(VENV)/.dev  ## ruff

@@ -154,6 +154,7 @@ def test_nothing_is_lost_or_told_otherwise_when_each_process_is_killed_in_turn(a
     assert_as_undisturbed(alpha, tmp_path)
 
 
+@pytest.mark.soak
 @pytest.mark.timeout(900)
 def test_nor_when_detector_and_historian_are_killed_together_at_600_times_life(alpha, tmp_path):
     """The gap of both is in what the simulator keeps; the detector's is asked of a historian that starts too."""
