@@ -136,8 +136,8 @@ def compare(make: Callable[[], Store], pool: list[Sample], acts: list[Act], span
     with contextlib.closing(make()) as store:
         found, *others = all_told(store, pool, acts, spans, blocks_too=True)
     times_ns = [time_ns for time_ns, _ in keys]
-    # Of few samples with pauses of days the end is not sure, and a block over a pause is one row: days may be put away
-    # at another time. What was stored is the same all the same.
+    # Of few samples with pauses of days the end is not sure, and a block over a pause is one row: days may be put
+    # away at another time. What was stored is the same all the same.
     has_pause = max(times_ns, default=0) - min(times_ns, default=0) > DAY_NS
     assert has_pause or others == [stations, kpi]
     for mixed, alone in zip(found, expected, strict=True):
