@@ -2,6 +2,7 @@
 
 Columns: `time` (ISO 8601 with a Z or an offset), `level_m`, optional `inflow_m3h`, and for each pump i from 1
 `pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
+What a crew did is in `by_hand` (1 while it commands the pumps), `valve_open` and `inlet_open` (0 while shut).
 Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
 """
 
@@ -30,6 +31,7 @@ from wetwell.protocols.local_time import to_utc
 from wetwell.protocols.messages.readings import PumpRow, Row
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import (
+    HAND_COLUMNS,
     PUMP_ANALOGUES,
     PUMP_QUANTITIES,
     STATION_QUANTITIES,
@@ -178,7 +180,7 @@ def recording_of(
     for name in table.column_names:
         if name == "time":
             continue
-        if name in STATION_QUANTITIES or pump_of(name):
+        if _is_measured(name):
             columns[name] = _numbers(table[name], name, place)
         elif name.startswith(TRUTH_PREFIX):
             truth[name] = table[name].to_numpy()
@@ -199,6 +201,10 @@ def recording_of(
     return recording
 
 
+def _is_measured(name: str) -> bool:
+    return name in STATION_QUANTITIES or name in HAND_COLUMNS or pump_of(name) > 0
+
+
 def _suffix(path: Path) -> str:
     for suffix in SUFFIXES:
         if path.name.endswith(suffix):
@@ -215,7 +221,7 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
             table = pa.parquet.read_table(path)
             return table, Origin.of_metadata(table.schema.metadata or {})
         mark, header = _csv_header(path)
-        types = {name: pa.float64() for name in header if name in STATION_QUANTITIES or pump_of(name)}
+        types = {name: pa.float64() for name in header if _is_measured(name)}
         table = pa.csv.read_csv(
             path,
             read_options=pa.csv.ReadOptions(use_threads=False, skip_rows=int(bool(mark))),

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.sim2real.experiments.reported import ProposedAct, RefusedAct
 from wetwell.simulator.effects.effect import Component
 
 Short = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
@@ -131,6 +132,14 @@ class AnswerProbability(_Part):
     probability: Short
 
 
+class DiagnosedRecording(_Part):
+    """One of the recordings that were diagnosed as one: when it began, how long it is, and whether a crew acted."""
+
+    begin: str
+    hours: Short
+    is_by_hand: bool
+
+
 class GapReport(_Part):
     """What `wetwell gap diagnose` writes."""
 
@@ -152,4 +161,7 @@ class GapReport(_Part):
     value: StoredValue = "instant"
     not_tested: tuple[UntestedEffect, ...] = ()
     notes: tuple[str, ...] = ()
+    recordings: tuple[DiagnosedRecording, ...] = ()
+    experiments: tuple[ProposedAct, ...] = ()
+    refused: tuple[RefusedAct, ...] = ()
     next_experiment: str

@@ -4,18 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.recording.by_hand import ByHand, by_hand_of
 from wetwell.sim2real.recording.checks import check_pumps
 from wetwell.sim2real.recording.drives import Drives, drives_between
 from wetwell.sim2real.recording.duty import Intervals, drives_of_means
 from wetwell.sim2real.recording.rows import EACH_SECOND_S, Rows, rows_of
 
 MIN_STARTS = 6
+BETWEEN = -1
+"""Part of seconds that lie between two recordings, or two parts of one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +44,10 @@ class Traces:
         Without NaN.
     signals : dict of (pumps, n) arrays
         Of `PUMP_METERS` those that are measured, and move.
+    by_hand : ByHand
+        What a crew did.
+    part : (n,) array
+        Which of several recordings a second is of, from 0; `BETWEEN` of none.
     """
 
     start_ns: int
@@ -52,6 +59,8 @@ class Traces:
     level_m: Floats
     inflow_m3h: Floats | None
     signals: dict[AnalogueQuantity, Floats]
+    by_hand: ByHand
+    part: Integers
 
     @property
     def seconds(self) -> int:
@@ -79,7 +88,7 @@ class Traces:
         return int(self.frequency_hz.shape[0])
 
 
-def traces_of(recording: Recording, station: Station) -> Traces:
+def traces_of(recording: Recording, station: Station, least_starts: int = MIN_STARTS) -> Traces:
     """Recording on whole seconds; rows between are dropped, seconds between rows have no value.
 
     Parameters
@@ -87,12 +96,14 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     recording : Recording
         Prepared: times rise.
     station : Station
+    least_starts : int
+        Of pumps; an experiment needs fewer than what stands alone.
 
     Raises
     ------
     ValueError
         If the numbers of pumps differ, the recording is shorter than half an hour or too slow, has no frequency,
-        nothing to be held against, or fewer than six starts.
+        nothing to be held against, or too few starts.
     """
     pumps = len(station.pump)
     check_pumps(recording, station)
@@ -100,10 +111,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     signals: dict[AnalogueQuantity, Floats] = {name: rows.of_pumps(name, pumps) for name in PUMP_METERS}
     signals = {name: rows.news(values) for name, values in signals.items() if _moves(values)}
     drives = _drives_of(rows, station)
-    running = drives.frequency_hz > 0.0
-    starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
-    if starts < MIN_STARTS:
-        raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {MIN_STARTS}")
+    check_starts(drives.frequency_hz, least_starts)
     level_m = rows.news(rows.column("level_m"))
     if not signals and not _moves(level_m):
         raise ValueError(
@@ -119,7 +127,23 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         level_m=level_m if _moves(level_m) else np.full(rows.seconds, np.nan),
         inflow_m3h=rows.inflow_m3h(),
         signals=signals,
+        by_hand=by_hand_of(recording, rows.second, rows.seconds),
+        part=np.zeros(rows.seconds, dtype=np.int64),
     )
+
+
+def check_starts(frequency_hz: Floats, least: int) -> None:
+    """Refuse what has too few starts of pumps to tell anything.
+
+    Raises
+    ------
+    ValueError
+        Says how many, and how many it takes.
+    """
+    running = frequency_hz > 0.0
+    starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
+    if starts < least:
+        raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {least}")
 
 
 def _drives_of(rows: Rows, station: Station) -> Drives:

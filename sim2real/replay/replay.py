@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.orders import SHUT_LOSS
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
@@ -80,7 +81,7 @@ class Replay:
         self.station = station
         self.own = tuple(own)
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
-        self._forcing = healthy_forcing(inflow_m3h, traces.pumps, len(station.mains))
+        self._forcing = self._healthy(inflow_m3h)
         self._kept: tuple[_Run, ...] = ()
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
@@ -199,6 +200,7 @@ class Replay:
             observer.level_m,
             observer.level_gain,
             observer.inflow_gain,
+            traces.by_hand.is_inlet_shut,
             1 if observer.level_m is not traces.level_m and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
             level_m,
@@ -234,14 +236,18 @@ class Replay:
         squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
         return np.minimum(squares, MOST_SQUARE), np.log(variance_m2)
 
+    def _healthy(self, inflow_m3h: Floats) -> Forcing:
+        """Forcing without faults, the valves of the mains as the crew had them."""
+        forcing = healthy_forcing(inflow_m3h, self.traces.pumps, len(self.station.mains))
+        forcing.friction_factor[:, self.traces.by_hand.is_valve_shut] *= SHUT_LOSS
+        return forcing
+
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""
         delay_s = plant.sensors[INFLOW].delay_s
         if not writing and delay_s == 0.0:
             return self._forcing
-        forcing = healthy_forcing(
-            later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps, len(self.station.mains)
-        )
+        forcing = self._healthy(later(self._forcing.inflow_m3h, -delay_s))
         for effect in writing:
             effect.force(forcing, self.traces.time_s)
         return forcing
