@@ -16,7 +16,23 @@ class _Part(BaseModel):
 
 
 class OrderedStep(_Part):
-    """A step of an act: as `wetwell.protocols.orders.Step`; null is no limit, and no speeds the controller's own."""
+    """A step of an act; it ends by time or by level, and the next begins.
+
+    Parameters
+    ----------
+    longest_s : float
+        How long it may last. [s]
+    speed_ratio : list of float, optional
+        Speed of each pump as a share of nominal, 0 to stand; null leaves them to the controller. [1]
+    low_m : float, optional
+        It ends when the level falls to this; null is no limit. [m]
+    high_m : float, optional
+        It ends when the level rises to this; null is no limit. [m]
+    is_valve_shut : bool
+        Whether the valves of the mains are shut meanwhile.
+    is_inlet_shut : bool
+        Whether the inlet is shut meanwhile.
+    """
 
     longest_s: Short
     speed_ratio: tuple[Short, ...] | None
@@ -39,10 +55,32 @@ class OrderedStep(_Part):
 
 
 class ProposedAct(_Part):
-    """An act that would tell apart what is left: what it brings in bits, what it costs, and its steps.
+    """An act that would tell apart what is left, with what it is expected to bring and to cost.
 
-    `truth_probability` is the expected probability of the true set afterwards; `costs_m3` the water that is pumped by
-    hand or held back, `extra_kwh` the energy beyond that of the controller, `price` in the currency of `[costs]`.
+    Parameters
+    ----------
+    act : str
+        Name of the act.
+    sentence : str
+        What to do, for those who do it.
+    separates : list of list of str
+        Sets of effects that it tells from another one, 19 to 1 whichever is the truth.
+    information_bits : float
+        Expected fall of the entropy of the posterior. [bit]
+    truth_probability : float
+        Expected probability of the true set afterwards. [1]
+    costs_m3 : float
+        Water that is pumped by hand, or held back in the sewer. [m³]
+    extra_kwh : float
+        Energy beyond what the controller takes for the same water. [kWh]
+    crew_h : float
+        Hours of all who are needed, ways included. [h]
+    length_h : float
+        Until the controller is alone again. [h]
+    price : float
+        Of energy and work, in the currency of `[costs]`.
+    steps : list of OrderedStep
+        What a program plays.
     """
 
     act: str
@@ -59,7 +97,15 @@ class ProposedAct(_Part):
 
 
 class RefusedAct(_Part):
-    """An act that may not be done at this station, and why."""
+    """An act that may not be done at this station.
+
+    Parameters
+    ----------
+    act : str
+        Name of the act.
+    reason : str
+        The rule that it would break.
+    """
 
     act: str
     reason: str
