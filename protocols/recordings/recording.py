@@ -3,6 +3,7 @@
 Columns: `time` (ISO 8601 with a Z or an offset), `level_m`, optional `inflow_m3h`, and for each pump i from 1
 `pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
 What a crew did is in `by_hand` (1 while it commands the pumps), `valve_open` and `inlet_open` (0 while shut).
+Columns that start with `covariate_` are those of a user: rain, tide, temperature.
 Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
 """
 
@@ -39,6 +40,7 @@ from wetwell.protocols.quantities import (
     pump_of,
     pumps_of,
 )
+from wetwell.protocols.recordings.covariates import covariate_of
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
 from wetwell.protocols.timestamps import from_iso, has_zone, to_iso_array
 
@@ -80,6 +82,12 @@ class Recording:
     def pumps(self) -> int:
         """Number of pumps that the columns speak of."""
         return pumps_of(self.columns)
+
+    @property
+    def covariates(self) -> dict[str, Floats]:
+        """(n,) values of the columns of a user, by their names without the prefix."""
+        named = ((covariate_of(column), values) for column, values in self.columns.items())
+        return {name: values for name, values in named if name is not None}
 
     def column(self, name: str) -> Floats:
         """(n,) values of a column, NaN throughout where it is absent."""
@@ -201,8 +209,9 @@ def recording_of(
     return recording
 
 
-def _is_measured(name: str) -> bool:
-    return name in STATION_QUANTITIES or name in HAND_COLUMNS or pump_of(name) > 0
+def _is_measured(column: str) -> bool:
+    is_ours = column in STATION_QUANTITIES or column in HAND_COLUMNS or pump_of(column) > 0
+    return is_ours or covariate_of(column) is not None
 
 
 def _suffix(path: Path) -> str:

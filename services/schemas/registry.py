@@ -56,7 +56,7 @@ def _recording() -> dict[str, Any]:
         rf"^pump[1-9]\d*_{name}$": _value(one.unit, one.description.replace("{pump}", "i"))
         for name, one in PUMP_QUANTITIES.items()
     }
-    hands = {name: {"type": ["number", "null"], "description": said} for name, said in HAND_COLUMNS.items()}
+    hands = {name: {"enum": [0, 1, None], "description": said} for name, said in HAND_COLUMNS.items()}
     truth = {r"^truth_": {"description": "What only a simulator can know; no diagnosis reads it"}}
     return {
         "title": "Recording",

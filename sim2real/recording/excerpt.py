@@ -97,4 +97,5 @@ def with_blanks(traces: Traces, parts: Sequence[Integers]) -> Traces:
         by_hand=traces.by_hand.taken(rows),
         part=np.where(is_blank, BETWEEN, traces.part[rows]),
         signals={name: np.where(is_cut, np.nan, taken(values, np.nan)) for name, values in traces.signals.items()},
+        columns={name: taken(values, np.nan) for name, values in traces.columns.items()},
     )

@@ -71,6 +71,10 @@ def joined(recordings: Sequence[Traces]) -> Traces:
             )
             for name in measured
         },
+        columns={
+            name: np.concatenate([part.columns.get(name, np.full(part.seconds, np.nan)) for part in parts])
+            for name in {name: None for part in parts for name in part.columns}
+        },
         by_hand=joined_hands([part.by_hand for part in parts]),
         part=np.repeat(np.arange(len(parts)), [part.seconds for part in parts]),
     )

@@ -1,11 +1,12 @@
 """A recording on whole seconds: what the replay is driven by and held against."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
+from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
@@ -48,6 +49,8 @@ class Traces:
         What a crew did.
     part : (n,) array
         Which of several recordings a second is of, from 0; `BETWEEN` of none.
+    columns : dict of (n,) arrays
+        Of a user, by name, without NaN: those that have values in most rows.
     """
 
     start_ns: int
@@ -61,11 +64,17 @@ class Traces:
     signals: dict[AnalogueQuantity, Floats]
     by_hand: ByHand
     part: Integers
+    columns: dict[str, Floats] = field(default_factory=dict)
 
     @property
     def seconds(self) -> int:
         """Length. [s]."""
         return int(self.level_m.shape[0])
+
+    @property
+    def clock_s(self) -> Floats:
+        """(n,) seconds since 1970, UTC. [s]."""
+        return self.start_ns / NS_PER_S + self.time_s
 
     @property
     def frequency_hz(self) -> Floats:
@@ -113,6 +122,7 @@ def traces_of(recording: Recording, station: Station, least_starts: int = MIN_ST
     drives = _drives_of(rows, station)
     check_starts(drives.frequency_hz, least_starts)
     level_m = rows.news(rows.column("level_m"))
+    courses = {name: rows.course(COVARIATE_PREFIX + name) for name in recording.covariates}
     if not signals and not _moves(level_m):
         raise ValueError(
             "flow, head, power and level have no values or never move: nothing to hold the simulator against"
@@ -125,10 +135,11 @@ def traces_of(recording: Recording, station: Station, least_starts: int = MIN_ST
         is_row=rows.is_row,
         drives=drives,
         level_m=level_m if _moves(level_m) else np.full(rows.seconds, np.nan),
-        inflow_m3h=rows.inflow_m3h(),
+        inflow_m3h=rows.course("inflow_m3h"),
         signals=signals,
         by_hand=by_hand_of(recording, rows.second, rows.seconds),
         part=np.zeros(rows.seconds, dtype=np.int64),
+        columns={name: course for name, course in courses.items() if course is not None},
     )
 
 

@@ -9,7 +9,7 @@ from wetwell.sim2real.residuals.bins import NO_PUMP, Bins
 
 USUAL = 0
 """Condition of a bin in which the controller was alone, or might have done the same."""
-SPEED_STEP = 0.05
+SAME_SPEED = 0.05
 """Speeds that differ by less, as shares of nominal, are one. [1]"""
 
 
@@ -37,4 +37,4 @@ def conditions_of(bins: Bins, traces: Traces, station: Station) -> Integers:
 
 
 def _steps(slowed: Floats) -> Integers:
-    return np.rint(slowed / SPEED_STEP).astype(np.int64)
+    return np.rint(slowed / SAME_SPEED).astype(np.int64)
