@@ -77,8 +77,8 @@ class PlantState(NamedTuple):
     now and before a step, and their means over the second. `correction` (terms, pumps) is what learnt corrections add
     to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past` (channels, m) and
     `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the order of their
-    starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first. `place` is that in the
-    orders of an operator.
+    starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first. `place` is that in
+    the orders of an operator.
     """
 
     station: Records[StationState]

@@ -17,7 +17,7 @@ BEFORE_SHUT_S = 60.0
 """Run before the valve is shut. [s]"""
 STANDING_S = 300.0
 """How long the wet well is watched with nothing coming in and nothing running. [s]"""
-RATIOS = (0.8, 0.9)
+RATIOS = (0.9, 0.8, 0.7)
 """Speeds that are tried, as shares of nominal. [1]"""
 PEOPLE_ON_SITE = 2
 TRAVEL_H = 1.0
@@ -36,6 +36,27 @@ def at_speeds(site: Site) -> Iterator[Act]:
                     f"{REPEATS} times.",
                     steps=(site.fill(site.brim_m), run) * REPEATS,
                 )
+
+
+def tour(site: Site) -> Iterator[Act]:
+    """One session of many duties: ever lower speeds, two pumps where there are two, and a low stop."""
+    for i in site.apart:
+        together = tuple(dict.fromkeys((i, *site.ready)))[:2]
+        low = replace(_run(site, 1.0, i), low_m=site.low_m)
+        others = [_run(site, 1.0, *together), low] if len(together) > 1 else [low]
+        for lowest in RATIOS[1:]:
+            ratios = [ratio for ratio in RATIOS if ratio >= lowest]
+            if lowest <= site.least_ratio:
+                continue
+            runs = [*(_run(site, ratio, i) for ratio in ratios), *others]
+            said = f"at {', '.join(f'{100 * ratio:g}' for ratio in ratios)} % of its speed"
+            pair = f", with pump {together[1] + 1}" if len(together) > 1 else ""
+            yield Act(
+                name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}",
+                sentence=f"Let the wet well fill before each run, and run pump {i + 1} {said}{pair}, and at last "
+                f"down to {site.low_m:.2f} m, under the stop level.",
+                steps=tuple(step for run in runs for step in (site.fill(site.brim_m), run)),
+            )
 
 
 def two_together(site: Site) -> Iterator[Act]:
@@ -115,6 +136,7 @@ def _run(site: Site, ratio: float, *pumps: int) -> Step:
 
 ACTS: tuple[Callable[[Site], Iterator[Act]], ...] = (
     at_speeds,
+    tour,
     two_together,
     idle,
     pumped_low,

@@ -23,6 +23,10 @@ from wetwell.simulator.simulation import Simulation
 AFTERWARDS_S = 300
 """Time that is recorded after an act, for what it leaves behind. [s]"""
 HOUR_S = 3600
+DRY_SHARE = 0.02
+"""Share of the largest flow of a pump under which it moves no water. [1]"""
+LONGEST_DRY_S = 90
+"""Longest time for which a pump may turn without moving water: it warms up. [s]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,8 +144,19 @@ def _broken(recording: Recording, site: Site, station: Station) -> str:
     if level_m.min() < least_m:
         return f"the level falls to {level_m.min():.2f} m, under {least_m:.2f} m"
     for i in range(1, recording.pumps + 1):
+        dry_s = _longest_dry_s(recording, i)
+        if dry_s > LONGEST_DRY_S:
+            return f"pump {i} turns for {dry_s} s without moving water, {LONGEST_DRY_S} s are allowed"
         starts = np.flatnonzero(np.diff(recording.column(f"pump{i}_running")) > 0.0)
         most = int(np.max(np.searchsorted(starts, starts + HOUR_S) - np.arange(starts.size), initial=0))
         if 0 < control.max_starts_per_hour < most:
             return f"pump {i} starts {most} times in an hour, {control.max_starts_per_hour} are allowed"
     return ""
+
+
+def _longest_dry_s(recording: Recording, pump: int) -> int:
+    """Longest time for which a pump turns and moves no water. [s]."""
+    flow_m3h = recording.truth[f"truth_pump{pump}_flow_m3h"]
+    is_dry = (recording.column(f"pump{pump}_frequency_hz") > 0.0) & (flow_m3h <= DRY_SHARE * flow_m3h.max())
+    edges = np.flatnonzero(np.diff(np.r_[False, is_dry, False]))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))

@@ -35,6 +35,8 @@ class Proposal:
         Expected reduction of the entropy of the posterior. [bit]
     truth_probability : float
         Expected probability of the true set afterwards.
+    resolves : bool
+        Whether the truth has `CREDIBLE` afterwards, but for sets that are together less probable than the rest of it.
     separates : tuple of tuple of str
         Sets that it tells from one another or from the rest, the most probable first.
     moved_m3, extra_kwh, crew_h, length_h : float
@@ -46,17 +48,13 @@ class Proposal:
     act: Act
     information_bits: float
     truth_probability: float
+    resolves: bool
     separates: tuple[tuple[str, ...], ...]
     moved_m3: float
     extra_kwh: float
     crew_h: float
     length_h: float
     price: float
-
-    @property
-    def resolves(self) -> bool:
-        """Whether the truth is expected to be known afterwards."""
-        return self.truth_probability >= CREDIBLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,8 +78,7 @@ def proposals_of(
 ) -> Proposals:
     """Weigh all acts that can be done at a station.
 
-    First come those after which the truth is expected to be known, the cheapest first; then the others, by what they
-    tell.
+    First come those that resolve what is left, the cheapest first; then the others, by what they tell.
 
     Parameters
     ----------
@@ -167,6 +164,7 @@ def _proposal(
         act=act,
         information_bits=information_bits(probability, after),
         truth_probability=float(probability @ np.diag(after)),
+        resolves=bool(probability @ (np.diag(after) >= CREDIBLE) >= CREDIBLE),
         separates=tuple(sets[k].names for k in _separated(after)),
         moved_m3=moved_m3,
         extra_kwh=extra_kwh,
