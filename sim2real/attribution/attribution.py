@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.changes import MOST_CHANGED, changed
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
@@ -102,7 +103,9 @@ def attribute(
     cells = cells_of(residuals.bins, condition, has_inflow=replay.traces.inflow_m3h is not None)
     hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
+    hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
+    hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     posterior = _posterior(fitter, hypotheses, len(singles))
     accepted: Fit | None = None
     equal: dict[str, tuple[str, ...]] = {}

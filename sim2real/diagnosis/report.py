@@ -77,12 +77,15 @@ class FoundEffect(_Part):
     equivalent : list of str
         Effects that these data cannot tell from it.
     parameters : dict of FittedParameter
-        By name.
+        By name; of what differs, the value in the last recording, and those before as `name@1` and so on.
+    differs : list of str
+        Parameters that differ between recordings; all others are shared by them.
     """
 
     name: str
     component: Component
     equivalent: tuple[str, ...]
+    differs: tuple[str, ...] = ()
     parameters: dict[str, FittedParameter]
 
 

@@ -82,6 +82,14 @@ class Traces:
         return self.drives.frequency_hz
 
     @property
+    def period(self) -> Integers:
+        """(n,) number of the recording that was left alone, from 0: acts by hand belong to what was before them."""
+        parts = range(int(self.part.max(initial=0)) + 1)
+        is_alone = [not self.by_hand.is_commanding[self.part == part].any() for part in parts]
+        number = np.maximum(np.cumsum(is_alone) - 1, 0)
+        return np.asarray(number[np.maximum.accumulate(np.maximum(self.part, 0))])
+
+    @property
     def is_each_second(self) -> bool:
         """Whether there is a row each second, but for some that were lost."""
         return self.rate_s <= EACH_SECOND_S

@@ -13,6 +13,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.changing import Acting, Changing, in_period
 from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.sim2real.replay.observer import Observer, constant_observer, forced_observer, hides_cycles, row_observer
 from wetwell.simulator.effects.effect import Effect
@@ -81,6 +82,7 @@ class Replay:
         self.traces = traces
         self.station = station
         self.own = tuple(own)
+        self.period = traces.period
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
         self._forcing = self._healthy(inflow_m3h, None)
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
@@ -91,14 +93,28 @@ class Replay:
         self._first_level_m = float(np.median(first)) if known.size else station.middle_level_m
         self.observer = self._observer()
 
-    def run(self, effects: Sequence[Effect] = ()) -> Prediction:
-        """Predict under effects.
+    def run(self, effects: Sequence[Acting] = ()) -> Prediction:
+        """Predict under effects; of those that change from period to period, the plant is that of the last.
 
         Raises
         ------
         ValueError
             If an effect does not fit the station.
         """
+        if not any(isinstance(effect, Changing) for effect in effects):
+            return self._predict([in_period(effect, 0) for effect in effects])
+        periods = [
+            self._predict([in_period(effect, k) for effect in effects]) for k in range(int(self.period[-1]) + 1)
+        ]
+        place = np.arange(self.period.size)
+        level_m = np.array([one.level_m for one in periods])[self.period, place]
+        signals = {
+            name: np.moveaxis(np.array([one.signals[name] for one in periods])[self.period, :, place], 0, 1)
+            for name in periods[-1].signals
+        }
+        return Prediction(level_m=level_m, signals=signals, plant=periods[-1].plant)
+
+    def _predict(self, effects: Sequence[Effect]) -> Prediction:
         acting = (*self.own, *effects)
         plant = self._plant(acting)
         run = self._run(acting, plant)
