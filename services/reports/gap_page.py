@@ -11,7 +11,7 @@ from wetwell.sim2real.diagnosis.report import AnswerProbability, GapReport
 
 DRAWN = 1e-3
 """Probability from which on an answer or a part is drawn."""
-ANSWERS = {"none": "no difference that matters", "unknown": "something unknown"}
+WORDS_OF = {"none": "no difference that matters", "unknown": "something unknown"}
 
 
 def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
@@ -48,7 +48,7 @@ def _posterior(report: GapReport) -> str:
 
 def answer_words(answer: AnswerProbability) -> str:
     """An answer in words."""
-    return ANSWERS.get(answer.verdict) or " and ".join(map(effect_words, answer.effects))
+    return WORDS_OF.get(answer.verdict) or " and ".join(map(effect_words, answer.effects))
 
 
 def _parameters(report: GapReport) -> str:
