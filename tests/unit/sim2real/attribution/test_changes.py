@@ -34,7 +34,7 @@ def test_each_period_has_its_own_strength(replay):
         assert np.array_equal(values[:, ~is_second], first.signals[name][:, ~is_second])
         assert np.array_equal(values[:, is_second], second.signals[name][:, is_second])
     assert np.array_equal(both.level_m, np.where(is_second, second.level_m, first.level_m))
-    assert both.plant == second.plant
+    assert both.plant.mains == second.plant.mains
 
 
 def test_a_strength_is_free_in_each_period_and_the_rest_is_shared(alpha):
