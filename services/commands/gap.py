@@ -194,9 +194,9 @@ def gap_diagnose(
     return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
 
 
-@app.command("experiment")
+@app.command("experiment", cls=about("--diagnosis"))
 def gap_experiment(
-    diagnosis: Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Folder that gap diagnose wrote.")],
+    diagnosis: Annotated[Path, typer.Option("--diagnosis", metavar="DIR", help="Folder that gap diagnose wrote.")],
     station: Annotated[
         str | None, typer.Option("--station", metavar="FILE", help="Whose costs and levels count instead.")
     ] = None,
