@@ -1,6 +1,6 @@
-"""Station-days by the hundred on a virtual clock, with accidents from a seed. A seed that fails, fails again:
+"""Station-days by the hundred on a virtual clock, with accidents from a seed. A seed that fails becomes a test by
 
-python benchmarks/simulation.py --first-seed SEED --sites 1
+python benchmarks/simulation.py --first-seed SEED --sites 1 --shrink
 """
 
 import pytest

@@ -152,6 +152,7 @@ class Refusing:
     def __init__(self) -> None:
         self.kept: list[Batch] = []
         self.refuses = True
+        self.damages = 0
 
     def write(self, batch: Batch) -> int:
         if self.refuses:
