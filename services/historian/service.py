@@ -4,7 +4,7 @@ import logging
 import re
 import threading
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from wetwell.protocols.bus.keys import SITE
@@ -72,7 +72,7 @@ class Historian:
         self._committed_at_ns: int | None = None
         self._is_failing = False
         self._commits = threading.Lock()
-        self._scrubbing: Iterator[None] = iter(())
+        self._scrubbing = store.scrub()
 
     def handle(self, kind: PayloadKind, payload: bytes) -> None:
         """Handle one payload; what is not of its kind is counted as `malformed` and left out."""

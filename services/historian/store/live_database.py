@@ -13,7 +13,7 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from wetwell.protocols.quantities import pumps_of_width
 from wetwell.services.historian.hours import Hours
@@ -30,6 +30,7 @@ from wetwell.services.historian.store.interface import (
 )
 from wetwell.services.historian.store.live_salvage import salvage
 from wetwell.services.historian.store.live_schema import prepare
+from wetwell.services.historian.store.refused_rows import RefusedRows
 from wetwell.services.historian.store.row_checksum import (
     hour_checksum,
     is_event_intact,
@@ -40,6 +41,8 @@ from wetwell.services.historian.store.row_checksum import (
 
 log = logging.getLogger(__name__)
 
+MOST_EVENTS = 1_000_000
+"""Messages of one kind that are looked through at once: more than a station tells in a day."""
 BUSY_S = 10.0
 """So long one process waits for another that writes."""
 
@@ -53,6 +56,18 @@ _OF_STATION = "FROM sample WHERE station = (SELECT id FROM station WHERE name = 
 _LAST = "coalesce(last_ns, time_ns)"
 _TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
 """Rows that may have a sample of a span: since a row keeps to its hour, none before the hour of the start has one."""
+
+_INSERT_SAMPLE = (
+    "INSERT INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET quality = excluded.quality, "
+    "data = excluded.data, size = excluded.size, last_ns = excluded.last_ns, crc = excluded.crc "
+    "WHERE NOT is_intact(station, time_ns, seq, quality, size, data, crc)"
+)
+_INSERT_EVENT = (
+    "INSERT INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?) "
+    "ON CONFLICT (kind, station, time_ns, digest) DO UPDATE SET payload = excluded.payload "
+    "WHERE payload != excluded.payload"
+)
+"""What comes again changes nothing, unless it was damaged meanwhile."""
 
 _PACKED = "time_ns, seq, size, quality, data, station, crc, (SELECT id FROM station WHERE name = :station)"
 """A `PackedSamples`, and by what it is checked: a page that stands in the place of another has rows of elsewhere."""
@@ -86,7 +101,7 @@ class LiveDatabase:
         self._alone = alone
         self._lock = threading.Lock()
         self._ids: dict[str, int] = {}
-        self._known_damage: set[tuple[object, ...]] = set()
+        self._refused = RefusedRows(path)
         self.is_damaged = False
         self.damages = 0
         try:
@@ -121,11 +136,11 @@ class LiveDatabase:
                     for row in rows
                 ]
                 before = database.total_changes
-                database.executemany("INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", values)
+                database.executemany(_INSERT_SAMPLE, values)
                 new += size * (database.total_changes - before)
             before = database.total_changes
             database.executemany(
-                "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?)",
+                _INSERT_EVENT,
                 [(row.kind, ids[row.station], row.time_ns, row.digest, row.payload) for row in batch.events],
             )
             new += database.total_changes - before
@@ -159,7 +174,7 @@ class LiveDatabase:
         """Samples from `start_ns` until before `end_ns`."""
         with self._reading() as database:
             rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", _span(station, start_ns, end_ns)).fetchall()
-        return Samples.of_rows(self._intact(station, rows)).between(start_ns, end_ns)
+        return Samples.of_rows(self._intact(rows)).between(start_ns, end_ns)
 
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
@@ -179,7 +194,7 @@ class LiveDatabase:
         with self._reading() as database:
             begun = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
             (time_ns,) = database.execute(f"SELECT min(time_ns) {_OF_STATION} AND time_ns >= :start", span).fetchone()
-        times_ns = Samples.of_rows(self._intact(station, begun)).time_ns
+        times_ns = Samples.of_rows(self._intact(begun)).time_ns
         times_ns = times_ns[times_ns >= start_ns]
         return min([*times_ns[:1].tolist(), *([] if time_ns is None else [int(time_ns)])], default=None)
 
@@ -214,7 +229,7 @@ class LiveDatabase:
             cut = database.execute(
                 f"SELECT {_PACKED} {_TOUCHING} AND (time_ns < :start OR {_LAST} >= :end)", span
             ).fetchall()
-        return min(most, int(whole) + len(Samples.of_rows(self._intact(station, cut)).between(start_ns, end_ns)))
+        return min(most, int(whole) + len(Samples.of_rows(self._intact(cut)).between(start_ns, end_ns)))
 
     def delete_samples(self, station: str, samples: Samples) -> None:
         """Delete the rows that hold these samples, and no others: what came meanwhile stays."""
@@ -250,10 +265,12 @@ class LiveDatabase:
             ).fetchall()
         intact = []
         for payload, digest, its_kind, time_ns, number in reversed(rows):
-            if is_event_intact(payload, digest) and its_kind == kind and start_ns <= time_ns < end_ns:
+            if its_kind != kind or not start_ns <= time_ns < end_ns:
+                self.is_damaged = True  # a page in the place of another
+            elif is_event_intact(payload, digest):
                 intact.append(payload)
             else:
-                self._tell_damage(station, "message", number)
+                self._refused.note("event", number)
         return intact
 
     def delete_events(self, station: str, end_ns: int) -> int:
@@ -277,7 +294,7 @@ class LiveDatabase:
             if is_hour_intact(number, hour_ns, data, crc):
                 intact.append((hour_ns, data))
             else:
-                self._tell_damage(station, "hour", hour_ns)
+                self._refused.note("hour", number, hour_ns)
         return Hours.of_rows(intact)
 
     def write_hours(self, station: str, hours: Hours) -> None:
@@ -290,23 +307,15 @@ class LiveDatabase:
             )
 
     def put_aside_damaged(self, station: str, start_ns: int, end_ns: int) -> int:
-        """Put rows of a span aside that are not what was written; how many."""
-        span = _span(station, start_ns, end_ns)
-        with self._transaction() as database:
-            rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
-            damaged = [(row[5], row[0], row[1]) for row in rows if not _is_intact(row)]
-            where = "WHERE station = ? AND time_ns = ? AND seq = ?"
-            database.executemany(f"INSERT INTO refused SELECT * FROM sample {where}", damaged)  # noqa: S608 - as above
-            database.executemany(f"DELETE FROM sample {where}", damaged)  # noqa: S608 - as above
-        if damaged:
-            log.error(
-                "%s: station '%s': %d rows of samples are not what was written; they are put aside",
-                self._path,
-                station,
-                len(damaged),
-            )
-            self.damages += 1
-        return len(damaged)
+        """Put what is not what was written of a span aside, of samples, messages and hours; how many rows."""
+        self.samples(station, start_ns, end_ns)
+        self.hours(station, start_ns, end_ns)
+        for kind in get_args(EventKind):
+            self.events(kind, station, start_ns, end_ns, MOST_EVENTS)
+        damages = self.damages
+        with self._transaction():
+            pass
+        return self.damages - damages
 
     def check(self) -> None:
         """Look through the file, as far as SQLite knows what must be in it; damage is mended by the next writing.
@@ -347,8 +356,10 @@ class LiveDatabase:
                 self._begin_anew("damaged")
             try:
                 self._writer.execute("BEGIN IMMEDIATE")
+                damages = self._refused.put_aside(self._writer)
                 yield self._writer
                 self._writer.execute("COMMIT")
+                self.damages += damages
             except sqlite3.Error as error:
                 self._note(error)
                 raise StoreError(f"{self._path}: {error}") from error
@@ -392,26 +403,24 @@ class LiveDatabase:
             lost,
         )
 
-    def _intact(self, station: str, rows: Sequence[tuple[Any, ...]]) -> list[PackedSamples]:
+    def _intact(self, rows: Sequence[tuple[Any, ...]]) -> list[PackedSamples]:
         """Rows that are what was written; the others are told, and left out."""
         intact: list[PackedSamples] = []
-        for row in rows:
-            if _is_intact(row):
-                intact.append((row[0], row[1], row[2], row[3], row[4]))
+        for time_ns, seq, size, quality, data, station, crc, asked in rows:
+            if station != asked:
+                self.is_damaged = True  # a page in the place of another
+            elif is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+                intact.append((time_ns, seq, size, quality, data))
             else:
-                self._tell_damage(station, "row", row[0], row[1])
+                self._refused.note("sample", station, time_ns, seq)
         return intact
-
-    def _tell_damage(self, station: str, *what: object) -> None:
-        if (station, *what) not in self._known_damage:
-            self._known_damage.add((station, *what))
-            log.error("%s: station '%s': a %s is not what was written, and left out", self._path, station, what[0])
 
     def _open(self) -> sqlite3.Connection:
         database = sqlite3.connect(self._path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             database.execute("PRAGMA journal_mode = WAL")
             database.execute("PRAGMA synchronous = FULL")
+            database.create_function("is_intact", 7, is_sample_intact, deterministic=True)
             prepare(database, self._path, self._alone)
             database.execute("SELECT count(*) FROM station").fetchone()
         except BaseException:
@@ -424,12 +433,6 @@ def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:
     """Values for `_TOUCHING`."""
     hour_ns = max(start_ns // HOUR_NS * HOUR_NS, -(2**63))
     return {"station": station, "hour": hour_ns, "start": start_ns, "end": end_ns}
-
-
-def _is_intact(row: tuple[Any, ...]) -> bool:
-    """Whether a row of `_PACKED` is what was written, and of the station that was asked for."""
-    time_ns, seq, size, quality, data, station, crc, asked = row
-    return station == asked and is_sample_intact(station, time_ns, seq, quality, size, data, crc)
 
 
 def _key(row: SampleRow) -> int:

@@ -13,12 +13,9 @@ log = logging.getLogger(__name__)
 VERSION = 3
 
 _REFUSED = """
-CREATE TABLE refused (
-    station INTEGER, time_ns INTEGER, seq INTEGER, quality INTEGER, data BLOB, size INTEGER, last_ns INTEGER,
-    crc INTEGER
-);
+CREATE TABLE refused (origin TEXT NOT NULL, key TEXT NOT NULL, content BLOB);
 """
-"""Rows of samples that are not what was written, as they were found."""
+"""What stood in rows that are not what was written; their table and key there."""
 
 _LIVE_TABLES = f"""
 BEGIN IMMEDIATE;

@@ -26,15 +26,16 @@ def sample(station: str, number: int) -> Sample:
     )
 
 
+def payload(station: str, number: int) -> bytes:
+    return f"verdict {number} of {station}".encode()
+
+
 def batch(station: str, first: int, last: int) -> Batch:
     rows = [pack(station, sample(station, number)) for number in range(first, last)]
     if station == "beta":  # many in a row
         samples = Samples.of_rows([(row.time_ns, row.seq, row.size, row.quality, row.data) for row in rows])
         rows = pack_arrays(station, samples.time_ns, samples.seq, samples.quality, samples.values)
-    events = [
-        EventRow("verdicts", station, number, f"verdict {number} of {station}".encode())
-        for number in range(first, last, 10)
-    ]
+    events = [EventRow("verdicts", station, number, payload(station, number)) for number in range(first, last, 10)]
     return Batch(samples=rows, events=events)
 
 
@@ -100,7 +101,7 @@ def test_what_is_left_is_what_was_written_and_new_samples_are_kept(content, tmp_
                 one = wanted[number]
                 assert (time_ns, values[0], values[3]) == (one.time, one.level_m, one.pumps[0].flow_m3h)
             verdicts = persistent(lambda station=station: store.events("verdicts", station, 0, 2**62, 10_000))
-            told = [f"verdict {number} of {station}".encode() for number in range(0, TIMES + 30, 10)]
+            told = [payload(station, number) for number in range(0, TIMES + 30, 10)]
             assert set(verdicts) <= set(told)
             assert len(verdicts) == len(set(verdicts))
             lost += TIMES + 30 - len(numbers) + len(told) - len(verdicts)
@@ -122,3 +123,30 @@ def test_a_page_that_cannot_be_read_costs_its_own_rows_only(content, tmp_path):
         assert TIMES - 360 - 60 < len(kept) < TIMES
         assert store.damages == 1
         assert (tmp_path / "live.sqlite.refused-1").exists()
+
+
+@pytest.mark.parametrize("place", [payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data])
+def test_what_comes_again_takes_the_place_of_what_was_damaged(content, tmp_path, place):
+    changed = bytearray(content)
+    changed[changed.index(place) + 3] ^= 1
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(batch("alpha", 0, TIMES))
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(TIMES))
+        told = [payload("alpha", number) for number in range(0, TIMES, 10)]
+        assert store.events("verdicts", "alpha", 0, 2**62, 10_000) == told
+
+
+def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
+    changed = bytearray(content)
+    for place in (payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data):
+        changed[changed.index(place) + 3] ^= 1
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 2
+        refused = store.live._writer.execute("SELECT origin, content FROM refused ORDER BY origin").fetchall()
+        assert [origin for origin, _ in refused] == ["event", "sample"]
+        assert all(content in changed for _, content in refused)
+        assert len(store.samples("alpha", 0, 2**62)) == TIMES - 1
+        assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == TIMES // 10 - 1
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
