@@ -6,6 +6,7 @@ python benchmarks/simulation.py --kind alpha --period-s 60 --stations 5 --sites 
 """
 
 import argparse
+import gc
 import json
 import sys
 import tempfile
@@ -37,7 +38,10 @@ def life_of(task: tuple[str, int, int, float, int], plan: Plan | None = None) ->
     kind, seed, stations, days, period_s = task
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
         site = KINDS[kind](seed, stations, days, period_s, Path(folder), plan)
-        return broken_rules(site), site.accidents
+        life = broken_rules(site), site.accidents
+    del site
+    gc.collect()  # a site is full of circles, and the detector has frozen what was there when it began
+    return life
 
 
 def shortest_test(task: tuple[str, int, int, float, int], rule: str) -> str:

@@ -16,7 +16,7 @@ from windows import MARGIN_S, Way, until_s
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.protocols.bus.keys import sample_key
+from wetwell.protocols.bus.keys import alarm_key, sample_key
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
@@ -24,6 +24,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.doctor.verify import verify_kept
 from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import StoreError
 
 Key = tuple[int, int]
@@ -117,6 +118,7 @@ def _history(site: Site) -> Iterator[str]:
         yield from _kept(station.name, samples, published)
         yield from _lost_samples(site, station.name, samples, published, is_told=is_told)
         yield from _lost_verdicts(site, station.name, verdicts)
+    yield from _lost_alarms(site, store)
     store.close()
 
 
@@ -163,6 +165,21 @@ def _lost_verdicts(site: Site, station: str, verdicts: list[bytes]) -> Iterator[
     }
     if lost:
         yield f"{station}: {len(lost)} verdicts were told, but not kept, such as {_begin(lost)}"
+
+
+def _lost_alarms(site: Site, store: FolderStore) -> Iterator[str]:
+    """The last that was said of each alarm is kept; of the site itself too."""
+    way, (_, last_s) = Way(site, "alarms", "historian", _commit_s(site)), _harms_s(site)
+    for (station, name), changes in site.alarms.items():
+        try:
+            kept = set(store.events("alarms", station, 0, MAX_STAMP_NS, 1_000_000))
+        except StoreError:
+            continue  # told as that of the samples
+        sent = [one for one in site.network.sent[alarm_key(station, name)] if one.payload == changes[-1].encode()]
+        if not kept & {one.payload for one in sent} and any(
+            way.is_open(max(one.at_s, last_s), one.bus.died_s) for one in sent
+        ):
+            yield f"{station}: the last change of alarm {name} is not in the history"
 
 
 def is_told_since(site: Site, first_s: float) -> bool:

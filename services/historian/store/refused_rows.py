@@ -10,7 +10,7 @@ log = logging.getLogger(__name__)
 
 Table = Literal["sample", "event", "hour"]
 
-_KEY: dict[Table, str] = {
+_ROW_OF: dict[Table, str] = {
     "sample": "station = ? AND time_ns = ? AND seq = ?",
     "event": "id = ?",
     "hour": "station = ? AND hour_ns = ?",
@@ -45,7 +45,7 @@ class RefusedRows:
         with self._lock:
             found, self._found = self._found, {}
         for table, key in found:
-            row, content = f"FROM {table} WHERE {_KEY[table]}", _CONTENT[table]
+            row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
             database.execute(f"INSERT INTO refused SELECT ?, ?, {content} {row}", (table, str(key), *key))
             database.execute(f"DELETE {row}", key)
         return len(found)
