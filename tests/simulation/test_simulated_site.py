@@ -42,4 +42,6 @@ def test_plans_have_every_kind_and_target_and_overlap():
     assert plans == [plan_of(seed, 172_800.0) for seed in range(200)]
     overlaps = [later.at_s < before.at_s + before.lasts_s for plan in plans for before, later in pairwise(plan)]
     assert sum(overlaps) > 1_000
-    assert {len({one.kind for one in plan}) for plan in plans} > {3, 8, 13}
+    kinds = [len({one.kind for one in plan}) for plan in plans]
+    assert min(kinds) < 5
+    assert max(kinds) > 11
