@@ -9,19 +9,24 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
     AsStationOption,
+    ConfigOption,
     JsonOption,
     RecordingOption,
     SchedulerOption,
     SeedOption,
     StationOption,
     TimeZoneOption,
+    ZenohOption,
     all_there,
     cores,
     positive,
     print_batch,
     print_result,
     reading_of,
+    run,
+    settings_of,
     signals_named,
+    with_history,
 )
 
 app = typer.Typer(no_args_is_help=True, help="The gap between simulation and reality.")
@@ -207,3 +212,46 @@ def gap_replay(
     from wetwell.services.batch.gap import replay_file
 
     print_result(replay_file(plant, recording, out, reading, closed_loop=closed_loop), as_json=as_json)
+
+
+@app.command("watch", cls=about("--station"))
+def gap_watch(
+    station: Annotated[
+        list[str] | None,
+        typer.Option("--station", metavar="FILE", help="Station file or built-in station; may be given again."),
+    ] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option("--history", metavar="DIR", help="Look at what this history holds, print it and end."),
+    ] = None,
+    state: Annotated[
+        Path | None, typer.Option("--state", metavar="DIR", help="Where the watch keeps what it knows.")
+    ] = None,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Keep up to date how far stations are from their simulators, since when, and what that is called."""
+    from wetwell.services.stations import find_stations
+
+    more: dict[str, object] = {} if state is None else {"watch": {"state_dir": state}}
+    settings, stations = settings_of(config, zenoh, more=more), find_stations(station or ["alpha"])
+    if history is None:
+        from wetwell.services.watch.daemon import serve_watch
+
+        return run(settings, serve_watch(settings, stations))
+    import json
+
+    from wetwell.services.batch.watch_history import watch_history
+    from wetwell.services.historian.store.opening import open_store
+    from wetwell.services.reports.gap_terminal import progress_bar
+    from wetwell.services.watch.words import watch_lines
+
+    kept = with_history(settings, history).historian
+    with open_store(kept, alone=False, must_exist=True) as store, progress_bar("watch") as progress:
+        told = [
+            message
+            for each in stations
+            if (message := watch_history(store, each, settings.watch.state_dir, progress=progress)) is not None
+        ]
+    return typer.echo(json.dumps([one.model_dump(mode="json") for one in told]) if as_json else watch_lines(told))

@@ -159,6 +159,19 @@ class AlarmSettings(Table):
     rules: dict[RuleName, RuleSettings] = Field(default_factory=dict)
 
 
+class WatchSettings(Table):
+    """The watch of the gap: where it keeps its state, if anywhere, and how often it asks what was kept meanwhile.
+
+    `threads`: stations that are looked at side by side. `fleet_prior`: whether a station that is diagnosed takes what
+    the others have shown as its prior.
+    """
+
+    state_dir: Path | None = None
+    ask_s: Positive = 60.0
+    threads: Annotated[int, Field(ge=1)] = 1
+    fleet_prior: bool = False
+
+
 class HistorianSettings(Table):
     """The historian: where it keeps what, and for how long.
 
@@ -239,6 +252,7 @@ class Settings(BaseSettings):
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
     alarms: AlarmSettings = AlarmSettings()
+    watch: WatchSettings = WatchSettings()
     historian: HistorianSettings = HistorianSettings()
     security: SecuritySettings = SecuritySettings()
     gateway: GatewaySettings = GatewaySettings()

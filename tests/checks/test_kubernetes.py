@@ -107,7 +107,7 @@ def secrets(schemas: ModuleType) -> tuple[dict[str, dict[str, str]], str]:
 def test_all_files_belong_to_it_and_nothing_is_there_twice():
     assert {path.name for path in FOLDER.glob("*.yaml")} == {*KUSTOMIZATION["resources"], "kustomization.yaml"}
     assert len(set(IDS)) == len(IDS)
-    assert list(WORKLOADS) == ["router", "branch", "scheduler", "worker", "fleet", "historian", "alarms", "dashboard"]
+    assert list(WORKLOADS) == ["router", "branch", "scheduler", "worker", "fleet", "historian", "alarms", "watch", "dashboard"]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -332,7 +332,7 @@ def test_passwords_users_and_roles_fit(secrets, tmp_path):
     assert len(set((users | behind).values())) == len(users | behind)
     assert set(behind) == {environment("fleet")["WETWELL_ZENOH__USER"]}
     at_root = {
-        environment(name).get("WETWELL_ZENOH__USER") for name in ("branch", "historian", "alarms", "dashboard")
+        environment(name).get("WETWELL_ZENOH__USER") for name in ("branch", "historian", "alarms", "watch", "dashboard")
     }
     assert set(users) == at_root | {"gateway"}
     (tmp_path / "tokens").write_text(data["tokens"]["tokens"])

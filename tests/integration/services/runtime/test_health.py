@@ -244,7 +244,7 @@ def test_daemons_tell_systemd_http_and_the_log(tmp_path):
 def test_units_are_alike_and_systemd_finds_no_fault_in_them(tmp_path):
     units = sorted(UNITS.glob("*.service"))
     assert [unit.stem for unit in units] == [
-        f"wetwell-{name}" for name in ("alarms", "dashboard", "detector@", "gateway", "historian", "router")
+        f"wetwell-{name}" for name in ("alarms", "dashboard", "detector@", "gateway", "historian", "router", "watch")
     ]
     hardening = {unit.read_text().split("\n\n")[2] for unit in units}
     assert len(hardening) == 1
