@@ -67,7 +67,7 @@ def up(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
-    """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, watch of the gap, page."""
+    """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, watch, page."""
     import tempfile
 
     from wetwell.services.runtime.settings import LogSettings

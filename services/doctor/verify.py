@@ -12,7 +12,7 @@ from wetwell.services.doctor.finding import Finding
 from wetwell.services.historian.store.archive import Archive
 from wetwell.services.historian.store.live_database import damage_of
 from wetwell.services.runtime.settings import Settings
-from wetwell.services.watch.state_file import SUFFIX, is_whole
+from wetwell.services.watch.state_file import WATCH_SUFFIX, is_whole
 
 MOST_TOLD = 5
 """Of damages of one kind; of others their number is told."""
@@ -66,7 +66,7 @@ def _alarms(folder: Path | None) -> Iterator[Finding]:
 
 
 def _watches(folder: Path | None) -> Iterator[Finding]:
-    files = [] if folder is None else sorted(folder.glob(f"*{SUFFIX}"))
+    files = [] if folder is None else sorted(folder.glob(f"*{WATCH_SUFFIX}"))
     if files:
         damaged = [file.name for file in files if not is_whole(file.read_bytes())]
         advice = "the watch puts it aside at its next start and begins anew; or bring a backup back"

@@ -14,7 +14,7 @@ from wetwell.sim2real.watch.state import WatchState
 
 log = logging.getLogger(__name__)
 
-SUFFIX = ".gap.json"
+WATCH_SUFFIX = ".gap.json"
 
 
 class WatchFile:
@@ -30,7 +30,7 @@ class WatchFile:
     def __init__(self, folder: Path | None, station: Station) -> None:
         self.errors = 0
         self._station = station
-        self._path = None if folder is None else folder / f"{station.name}{SUFFIX}"
+        self._path = None if folder is None else folder / f"{station.name}{WATCH_SUFFIX}"
 
     def load(self) -> WatchState:
         """The state that was kept, or that of a station at which nobody has looked.
