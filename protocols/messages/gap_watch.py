@@ -16,9 +16,22 @@ class _Part(BaseModel):
 class GapName(_Part):
     """What the gap, or a part of it, is called.
 
-    `effect` is as in the report of a diagnosis, None where nothing of the library explains it. `since` is when it
-    began to grow, None where it was there at the first look; `ended` when it was over. `fault` is the asset as whose
-    fault the detector tells it: then it is no gap of the model. `text` says all this in one line.
+    Parameters
+    ----------
+    effect : dict, optional
+        As in the report of a diagnosis: name, component, parameters; none where nothing of the library explains it.
+    component : str
+        The one held responsible.
+    probability : float
+        Of the verdict that named it. [1]
+    since : str, optional
+        When it began to grow; none where it was there at the first look.
+    ended : str, optional
+        When it was over.
+    fault : str, optional
+        The asset as whose fault the detector tells it, such as `main`: then it is no gap of the model.
+    text : str
+        All this in one line.
     """
 
     effect: dict[str, Any] | None = None
@@ -31,7 +44,19 @@ class GapName(_Part):
 
 
 class GapLook(_Part):
-    """A look at a span until `time`: the gap by signal, and the gap that matters; units as in `GapWatch`."""
+    """A look at a span of a station.
+
+    Parameters
+    ----------
+    time : str
+        Its end.
+    gap : dict
+        Gap of the station file by signal, in units of noise: 1 is noise alone. [1]
+    matters : float
+        The largest shift of a signal of a pump in a regime, over what matters to anybody. [1]
+    interval : list of float
+        Its 95 % interval. [1]
+    """
 
     time: Stamp
     gap: dict[str, float]
@@ -40,12 +65,33 @@ class GapLook(_Part):
 
 
 class GapWatch(Message):
-    """The watched gap of a station after its last look, at `time`.
+    """The watched gap of a station after its last look.
 
-    `gap` has the gap of the station file by signal: 1 is noise alone. `matters` is the largest shift of a signal of
-    a pump in a regime, `group`, in units of what matters to anybody (`[materiality]` of the station file); it was
-    `first_matters` at the first look, and `is_doubled` says whether it has doubled since and is no fault that the
-    detector tells. `looks` are the last ones, oldest first. `refused` says why nothing could be looked at since.
+    Parameters
+    ----------
+    time : str
+        End of the last look, in the time of the station.
+    gap : dict
+        Gap of the station file by signal, in units of noise: 1 is noise alone. [1]
+    matters : float
+        The largest shift of a signal of a pump in a regime, over what matters to anybody (`[materiality]` of the
+        station file). [1]
+    interval : list of float
+        Its 95 % interval. [1]
+    group : str
+        Signal, pump (from 1; 0 is the station) and regime of that shift, such as `flow/1/steady`.
+    first_matters : float
+        The same at the first look. [1]
+    is_doubled : bool
+        Whether it has doubled since, is more than what matters, and is no fault that the detector tells.
+    called : list of GapName
+        What the gap is called now.
+    past : list of GapName
+        What it was called once and is over, the last ones.
+    looks : list of GapLook
+        The last ones, oldest first.
+    refused : str
+        Why nothing could be looked at since; empty where it could.
     """
 
     schema_name: Literal["wetwell.gap-watch/1"] = Field("wetwell.gap-watch/1", alias="schema")

@@ -21,6 +21,8 @@ from wetwell.sim2real.calibration.validation import Validation, validate
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
+from wetwell.sim2real.fleet.fleet_prior import FleetPrior
+from wetwell.sim2real.likelihood.priors import EVEN
 from wetwell.sim2real.recording.preparation import PreparationReport
 from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.sim2real.recording.traces import traces_of
@@ -42,6 +44,7 @@ def diagnose_file(
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     progress: Callable[[float], None] = lambda _: None,
+    prior: FleetPrior | None = None,
 ) -> GapReport:
     """Write `report.json`, `report.html` and `station.toml` into a folder, which is made where it is missing.
 
@@ -55,7 +58,9 @@ def diagnose_file(
     check_effects([*(only or ()), *without])
     rows, preparation = prepared(recording, None, station, reading)
     try:
-        report, diagnosis = diagnose_rows(station, rows, preparation, only=only, without=without, progress=progress)
+        report, diagnosis = diagnose_rows(
+            station, rows, preparation, only=only, without=without, progress=progress, prior=prior
+        )
     except ValueError as error:
         raise RecordingError(f"{recording}: {error}") from error
     page = gap_page(report, diagnosis)
@@ -94,6 +99,7 @@ def diagnose_rows(
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     progress: Callable[[float], None] = lambda _: None,
+    prior: FleetPrior | None = None,
 ) -> tuple[GapReport, Diagnosis]:
     """Report of a diagnosis, and the diagnosis.
 
@@ -103,10 +109,19 @@ def diagnose_rows(
         If the recording cannot be diagnosed.
     """
     with ThreadPoolExecutor(THREADS) as pool:
-        diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
+        diagnosis = diagnose(
+            rows,
+            station,
+            only=only,
+            without=without,
+            progress=progress,
+            each=pool.map,
+            priors=EVEN if prior is None else prior.priors,
+        )
     closed_loop = _closed_loop(rows, station, diagnosis.station)
     notes = _notes(preparation, diagnosis.traces.rate_s)
-    return diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), notes), diagnosis
+    heard = 0 if prior is None else prior.stations
+    return diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), notes, heard), diagnosis
 
 
 def replay_file(

@@ -161,6 +161,10 @@ def gap_diagnose(
         int | None, typer.Option(min=1, help="Processes for several recordings; default: as many as cores.")
     ] = None,
     scheduler: SchedulerOption = None,
+    prior: Annotated[
+        Path | None,
+        typer.Option("--prior", metavar="FILE", help="Of wetwell gap fleet: what other stations say of this one."),
+    ] = None,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
@@ -172,6 +176,8 @@ def gap_diagnose(
     if not given and table is None:
         raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
     check_scheduler(scheduler)
+    if prior is not None and (len(given) > 1 or table is not None):
+        raise ConfigError("gap diagnose: --prior is for one --recording: several tell each other nothing here")
     if len(given) > 1 or table is not None or scheduler is not None:
         from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 
@@ -184,11 +190,15 @@ def gap_diagnose(
     if station is None:
         raise ConfigError("gap diagnose: give --station FILE with --recording")
     plant = find_station(station)
+    from wetwell.services.batch.fleet_prior import read_prior
     from wetwell.services.batch.gap import diagnose_file
     from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
 
+    known = None if prior is None else read_prior(prior)
     with progress_bar("diagnosis") as progress:
-        report = diagnose_file(plant, given[0], out, reading, only=only, without=without or (), progress=progress)
+        report = diagnose_file(
+            plant, given[0], out, reading, only=only, without=without or (), progress=progress, prior=known
+        )
     return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
 
 
@@ -255,3 +265,26 @@ def gap_watch(
             if (message := watch_history(store, each, settings.watch.state_dir, progress=progress)) is not None
         ]
     return typer.echo(json.dumps([one.model_dump(mode="json") for one in told]) if as_json else watch_lines(told))
+
+
+@app.command("fleet", cls=about("--from"))
+def gap_fleet(
+    folders: Annotated[
+        list[Path],
+        typer.Option("--from", metavar="DIR", help="With report.json or watched gaps in it; may be given again."),
+    ],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="For gap diagnose --prior.")] = None,
+    without: Annotated[
+        str | None, typer.Option("--without", metavar="STATION", help="The one that is to be diagnosed.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say which effects are usual in a fleet and how their sizes are spread, from its diagnoses."""
+    from wetwell.services.batch.fleet_prior import prior_of_folders, prior_rows, write_prior
+
+    prior = prior_of_folders(folders, without)
+    if out is not None:
+        write_prior(prior, out)
+    if as_json:
+        return typer.echo(prior.model_dump_json(by_alias=True, indent=2))
+    return print_result(prior_rows(prior), as_json=False)

@@ -254,10 +254,18 @@ class AlarmSettings(Table):
 
 
 class WatchSettings(Table):
-    """The watch of the gap: where it keeps its state, if anywhere, and how often it asks what was kept meanwhile.
+    """The watch of the gap between stations and their simulators.
 
-    `threads`: stations that are looked at side by side. `fleet_prior`: whether a station that is diagnosed takes what
-    the others have shown as its prior.
+    Parameters
+    ----------
+    state_dir : Path, optional
+        Folder of its state; without it the state ends with the process.
+    ask_s : float
+        How often it asks the historian what was kept meanwhile. [s]
+    threads : int
+        Stations that are looked at side by side.
+    fleet_prior : bool
+        Whether a station that is diagnosed takes what the others have shown as its prior.
     """
 
     state_dir: Path | None = None

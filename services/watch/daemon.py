@@ -4,19 +4,24 @@ import asyncio
 import contextlib
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import SITE, gap_key
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.status import ServiceState
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings, WatchSettings
 from wetwell.services.watch.history import kept_recording, kept_spans, told_faults
 from wetwell.services.watch.station_watcher import StationWatcher
+from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
+from wetwell.sim2real.fleet.fleet_prior import fleet_prior
+from wetwell.sim2real.watch.finding import finding_of
+from wetwell.sim2real.watch.watching import diagnosed_plainly
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +45,14 @@ async def serve_watch(settings: Settings, stations: Sequence[Station]) -> None:
 
 async def _run(settings: Settings, stations: Sequence[Station]) -> None:
     kept = settings.watch
-    watchers = [StationWatcher(station, kept.state_dir) for station in stations]
+    watchers: list[StationWatcher] = []
+
+    def with_prior(recording: Recording, station: Station, only: Collection[str] | None) -> Diagnosis:
+        findings = [found for each in watchers if (found := finding_of(each.state)) is not None]
+        return diagnosed_plainly(recording, station, only, fleet_prior(findings, without=station.name).priors)
+
+    diagnosed = with_prior if kept.fleet_prior else diagnosed_plainly
+    watchers += [StationWatcher(station, kept.state_dir, diagnosed) for station in stations]
     with await connect(settings) as bus, ThreadPoolExecutor(kept.threads) as pool:
         if kept.state_dir is None:
             log.info("watch.state_dir is not set: what the watch knows ends with the process")

@@ -304,6 +304,8 @@ class GapReport(_Part):
         Effects that this recording cannot show.
     notes : list of str
         What was out of order, and what is not measured.
+    prior_stations : int
+        Stations whose diagnoses were the prior of this one; 0 where effects and sizes were all alike before.
     next_experiment : str
         What to do next to learn more, in a sentence.
     """
@@ -326,4 +328,5 @@ class GapReport(_Part):
     value: StoredValue = "instant"
     not_tested: tuple[UntestedEffect, ...] = ()
     notes: tuple[str, ...] = ()
+    prior_stations: int = 0
     next_experiment: str

@@ -14,26 +14,28 @@ FALSE_CHANGES = 1e-4
 
 
 def changed_groups(
-    now: Mapping[str, Shift], before: Mapping[str, Shift], least: float = CHANGING
+    now: Mapping[str, Shift], before: Mapping[str, Shift], least: float = CHANGING, false: float = FALSE_CHANGES
 ) -> dict[str, float]:
     r"""Groups that have changed by more than a station may change by itself, the largest difference first.
 
     $$|d - d_0| - t_{\alpha / 2n} \sqrt{e^2 + e_0^2} > k$$
 
-    with Student's t at `FALSE_CHANGES` α shared by n groups, and k the share of the material size that the likelihood
-    lets change from cycle to cycle.
+    with Student's t at a share α of false alarms, shared by n groups, and k the share of the material size that the
+    likelihood lets change from cycle to cycle.
 
     Parameters
     ----------
     now, before : mapping of str to Shift
     least : float
         k, in units of what matters.
+    false : float
+        α.
     """
     found = {}
     for name, shift in now.items():
         known = before.get(name)
         mean, error, cycles = (0.0, 0.0, shift.cycles) if known is None else (known.mean, known.error, known.cycles)
-        quantile = student_t.isf(FALSE_CHANGES / (2.0 * len(now)), min(shift.cycles, cycles) - 1)
+        quantile = student_t.isf(false / (2.0 * len(now)), min(shift.cycles, cycles) - 1)
         if abs(shift.mean - mean) - quantile * np.hypot(shift.error, error) > least:
             found[name] = shift.mean - mean
     return dict(sorted(found.items(), key=lambda pair: -abs(pair[1])))

@@ -63,6 +63,12 @@ class Seen:
     look: Look
     series: dict[str, tuple[Integers, Floats]]
 
+    def last(self, length_s: float) -> dict[str, Shift]:
+        """Shifts of the last cycles of the look, of groups that have enough of them. [s]."""
+        begins_ns = self.look.end_ns - round(length_s * NS_PER_S)
+        parts = {name: means[time_ns >= begins_ns] for name, (time_ns, means) in self.series.items()}
+        return {name: _shift(means) for name, means in parts.items() if means.size >= FEWEST_CYCLES_OF_GROUP}
+
 
 def look_at(recording: Recording, station: Station) -> Seen:
     r"""Replay a recording once and say where it departs.
@@ -98,12 +104,7 @@ def look_at(recording: Recording, station: Station) -> Seen:
         start_ns=int(recording.time_ns[0]),
         end_ns=int(recording.time_ns[-1]),
         gap={SIGNALS[signal]: _gap(z, bins, bins.signal == signal) for signal in np.unique(bins.signal).tolist()},
-        shifts={
-            name: Shift(
-                mean=float(means.mean()), error=float(means.std(ddof=1) / np.sqrt(means.size)), cycles=means.size
-            )
-            for name, (_, means) in series.items()
-        },
+        shifts={name: _shift(means) for name, (_, means) in series.items()},
     )
     return Seen(look=look, series=series)
 
@@ -111,6 +112,10 @@ def look_at(recording: Recording, station: Station) -> Seen:
 def span_s(recording: Recording) -> float:
     """Time from the first row to the last; 0 without rows. [s]."""
     return float(recording.time_ns[-1] - recording.time_ns[0]) / NS_PER_S if len(recording) else 0.0
+
+
+def _shift(means: Floats) -> Shift:
+    return Shift(mean=float(means.mean()), error=float(means.std(ddof=1) / np.sqrt(means.size)), cycles=means.size)
 
 
 def _gap(z: Floats, bins: Bins, rows: Flags) -> float:

@@ -102,9 +102,15 @@ def _called(
         return ()
     probability = sum(one.probability for one in found.posterior if one.verdict == found.verdict)
 
-    def called(component: str, effect: FoundEffect | None, table: EffectTable | None) -> Called:
+    def called(
+        component: str,
+        effect: FoundEffect | None = None,
+        own: FoundEffect | None = None,
+        table: EffectTable | None = None,
+    ) -> Called:
         return Called(
             effect=effect,
+            own=own,
             table=table,
             component=component,
             probability=probability,
@@ -115,8 +121,7 @@ def _called(
         )
 
     if found.verdict == "unknown":
-        return (
-            called(found.where[0].component if found.where else next(iter(found.component_probability)), None, None),
-        )
+        return (called(found.where[0].component if found.where else next(iter(found.component_probability))),)
     tables = found.station.effect[len(found.station.effect) - len(found.effects) :]
-    return tuple(called(effect.component, effect, table) for effect, table in zip(found.effects, tables, strict=True))
+    parts = zip(found.effects, found.own_effects, tables, strict=True)
+    return tuple(called(effect.component, effect, own, table) for effect, own, table in parts)

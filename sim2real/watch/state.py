@@ -51,6 +51,8 @@ class Called(_Kept):
     ----------
     effect : FoundEffect or None
         None where nothing of the library explains it.
+    own : FoundEffect or None
+        The same by the recording alone: what it says to other stations.
     table : EffectTable or None
         The same, as a station file has it.
     component : str
@@ -70,6 +72,7 @@ class Called(_Kept):
     """
 
     effect: FoundEffect | None
+    own: FoundEffect | None
     table: EffectTable | None
     component: str
     probability: Short

@@ -1,6 +1,6 @@
 """One step of the watch: a look at a span, and where the gap has changed a diagnosis of what is new."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +9,10 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.attribution.intervals import TWO_SIDED
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
+from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.watch.agreement import ToldFault, asset_of
-from wetwell.sim2real.watch.change import changed_groups, step_ns
-from wetwell.sim2real.watch.look import Look, look_at, span_s
+from wetwell.sim2real.watch.change import FALSE_CHANGES, changed_groups, step_ns
+from wetwell.sim2real.watch.look import Look, Seen, Shift, look_at, span_s
 from wetwell.sim2real.watch.naming import Diagnose, first_named, renamed, shifts_of, tried_again
 from wetwell.sim2real.watch.state import MOST_LOOKS, KeptLook, WatchState
 
@@ -25,9 +26,11 @@ DOUBLED = 2.0
 """Times the gap that matters at the first look, at which people are told. [1]"""
 
 
-def diagnosed_plainly(recording: Recording, station: Station, only: Collection[str] | None) -> Diagnosis:
-    """Diagnosis with nothing known of other stations, effect by effect."""
-    return diagnose(recording, station, only=only)
+def diagnosed_plainly(
+    recording: Recording, station: Station, only: Collection[str] | None, priors: Priors = EVEN
+) -> Diagnosis:
+    """Diagnosis effect by effect, with nothing known of other stations unless it is told."""
+    return diagnose(recording, station, only=only, priors=priors)
 
 
 def watched(
@@ -55,28 +58,35 @@ def watched(
     ValueError
         If the recording cannot be looked at: too short, too few starts, another station, other units.
     """
+    drifting: dict[str, float] = {}
+    step: int | None = None
     if state.looked_ns is None:
         state = first_named(state, recording, diagnosed)
-        drifting: dict[str, float] = {}
-        step: int | None = None
     else:
         seen = look_at(recording, state.believed())
         before = shifts_of(state.reference)
-        drifting, step = changed_groups(seen.look.shifts, before, least=0.0), None
-        changed = changed_groups(seen.look.shifts, before)
+        changed = _changed(seen, before)
+        drifting = changed_groups(seen.look.shifts, before, least=0.0)
         unsettled = next((one for one in state.called if one.effect is None and one.span_s < WHOLE_S), None)
-        if changed:
-            group, distance = next(iter(changed.items()))
+        if changed or drifting:
+            group, distance = next(iter((changed or drifting).items()))
             known = before.get(group)
             step = step_ns(*seen.series[group], 0.0 if known is None else known.mean)
             part = _from(recording, step)
-            if span_s(part) >= LEAST_NAMED_S:
+            if changed and span_s(part) >= LEAST_NAMED_S:
                 state = renamed(state, part, _began_ns(state, group, distance, step), diagnosed)
-        elif unsettled is not None and span_s(recording) > unsettled.span_s:
+        if not changed and unsettled is not None and span_s(recording) > unsettled.span_s:
             state = tried_again(state, unsettled, recording, diagnosed)
     state = _told(state, faults, int(recording.time_ns[-1]))
     look = look_at(recording, state.believed(only_faults=True)).look
     return _looked(state, look, drifting, step, faults)
+
+
+def _changed(seen: Seen, before: Mapping[str, Shift]) -> dict[str, float]:
+    """Groups that have changed over the look, or over its last hours: what came late is lost in the mean of a day."""
+    found = changed_groups(seen.look.shifts, before, false=FALSE_CHANGES / 2.0)
+    found |= changed_groups(seen.last(LEAST_NAMED_S), before, false=FALSE_CHANGES / 2.0)
+    return dict(sorted(found.items(), key=lambda pair: -abs(pair[1])))
 
 
 def _began_ns(state: WatchState, group: str, distance: float, step: int) -> int:
