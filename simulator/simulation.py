@@ -73,7 +73,9 @@ class Simulation:
         self.station = station
         self.scenario = scenario
         self._inflow = scenario.inflow.stream(inflow_rng)
-        self._plant = Plant(effective_parameters(station), scenario.initial_level_m)
+        parameters = effective_parameters(station)
+        self._columns = parameters.columns
+        self._plant = Plant(parameters, scenario.initial_level_m)
         self.start_ns = scenario.start_time if scenario.start_time is not None else start_ns
 
     @property
@@ -137,6 +139,8 @@ class Simulation:
             len(self.station.pump),
             len(self.station.mains),
             with_sensors=any(isinstance(fault, SensorFault) for fault in self.scenario.fault),
+            clock_s=self.start_ns / NS_PER_S + time_s,
+            columns=np.full((len(self._columns), seconds), np.nan),
         )
         for effect in self._effects:
             effect.force(forcing, time_s)
