@@ -190,8 +190,8 @@ def gap_diagnose(
     if station is None:
         raise ConfigError("gap diagnose: give --station FILE with --recording")
     plant = find_station(station)
-    from wetwell.services.batch.fleet_prior import read_prior
     from wetwell.services.batch.gap import diagnose_file
+    from wetwell.services.batch.watch.prior import read_prior
     from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
 
     known = None if prior is None else read_prior(prior)
@@ -252,7 +252,7 @@ def gap_watch(
         return run(settings, serve_watch(settings, stations))
     import json
 
-    from wetwell.services.batch.watch_history import watch_history
+    from wetwell.services.batch.watch.history import watch_history
     from wetwell.services.historian.store.opening import open_store
     from wetwell.services.reports.gap_terminal import progress_bar
     from wetwell.services.watch.words import watch_lines
@@ -280,7 +280,7 @@ def gap_fleet(
     as_json: JsonOption = False,
 ) -> None:
     """Say which effects are usual in a fleet and how their sizes are spread, from its diagnoses."""
-    from wetwell.services.batch.fleet_prior import prior_of_folders, prior_rows, write_prior
+    from wetwell.services.batch.watch.prior import prior_of_folders, prior_rows, write_prior
 
     prior = prior_of_folders(folders, without)
     if out is not None:

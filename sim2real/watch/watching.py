@@ -69,9 +69,8 @@ def watched(
         drifting = changed_groups(seen.look.shifts, before, least=0.0)
         unsettled = next((one for one in state.called if one.effect is None and one.span_s < WHOLE_S), None)
         if changed or drifting:
-            group, distance = next(iter((changed or drifting).items()))
-            known = before.get(group)
-            step = step_ns(*seen.series[group], 0.0 if known is None else known.mean)
+            group, distance = max((changed or drifting).items(), key=lambda pair: _weight(seen, *pair))
+            step = _step_ns(seen, group, before)
             part = _from(recording, step)
             if changed and span_s(part) >= LEAST_NAMED_S:
                 state = renamed(state, part, _began_ns(state, group, distance, step), diagnosed)
@@ -87,6 +86,19 @@ def _changed(seen: Seen, before: Mapping[str, Shift]) -> dict[str, float]:
     found = changed_groups(seen.look.shifts, before, false=FALSE_CHANGES / 2.0)
     found |= changed_groups(seen.last(LEAST_NAMED_S), before, false=FALSE_CHANGES / 2.0)
     return dict(sorted(found.items(), key=lambda pair: -abs(pair[1])))
+
+
+def _weight(seen: Seen, group: str, distance: float) -> tuple[int, float]:
+    """How well a group tells when it changed: by its cycles, then by how far it went."""
+    return seen.series[group][0].size, abs(distance)
+
+
+def _step_ns(seen: Seen, group: str, before: Mapping[str, Shift]) -> int:
+    """When a group changed; the begin of the look where it has changed in its first cycle."""
+    time_ns, means = seen.series[group]
+    known = before.get(group)
+    found_ns = step_ns(time_ns, means, 0.0 if known is None else known.mean)
+    return seen.look.start_ns if found_ns == time_ns[0] else found_ns
 
 
 def _began_ns(state: WatchState, group: str, distance: float, step: int) -> int:

@@ -11,7 +11,7 @@ from memory_bus import MemoryBus
 from wetwell.protocols.bus.keys import gap_key, history_key
 from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.timestamps import NS_PER_DAY, NS_PER_S
-from wetwell.services.batch.watch_history import watch_history
+from wetwell.services.batch.watch.history import watch_history
 from wetwell.services.historian.answers import answer
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.folder_store import FolderStore

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.batch.fleet_prior import prior_of_folders, prior_rows, read_prior, write_prior
+from wetwell.services.batch.watch.prior import prior_of_folders, prior_rows, read_prior, write_prior
 from wetwell.services.stations import find_station
 from wetwell.services.watch.state_file import WatchFile
 from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect
