@@ -267,11 +267,13 @@ def gap_watch(
     return typer.echo(json.dumps([one.model_dump(mode="json") for one in told]) if as_json else watch_lines(told))
 
 
-@app.command("fleet", cls=about("--from"))
+@app.command("fleet", cls=about("--diagnoses"))
 def gap_fleet(
     folders: Annotated[
         list[Path],
-        typer.Option("--from", metavar="DIR", help="With report.json or watched gaps in it; may be given again."),
+        typer.Option(
+            "--diagnoses", metavar="DIR", help="With report.json or watched gaps in it; may be given again."
+        ),
     ],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="For gap diagnose --prior.")] = None,
     without: Annotated[

@@ -13,7 +13,6 @@ from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.intervals import TWO_SIDED
 from wetwell.sim2real.diagnosis.report import FoundEffect, Short
 from wetwell.sim2real.likelihood.priors import Priors
-from wetwell.simulator.effects import EFFECTS
 
 ADDED = 1.0
 """Stations that are thought to have each effect before any is diagnosed: Laplace's rule of succession. [1]"""
@@ -93,11 +92,11 @@ def fleet_prior(findings: Sequence[Finding], without: str | None = None) -> Flee
        Journal of the Royal Statistical Society A 172, 2009 (what it says of a further one).
     """
     heard = [one for one in findings if one.station != without]
-    counts = {name: sum(name in {effect.name for effect in one.effects} for one in heard) for name in EFFECTS}
+    free = {one.name: {each.name: each.unit for each in one.free} for one in candidates_of(1, 1)}
+    counts = {name: sum(name in {effect.name for effect in one.effects} for one in heard) for name in free}
     mean = float(np.mean([count + ADDED for count in counts.values()]))
     found: dict[str, dict[str, UsualParameter]] = {}
-    free = {one.name: {each.name: each.unit for each in one.free} for one in candidates_of(1, 1)}
-    for name in EFFECTS:
+    for name in free:
         effects = [effect for one in heard for effect in one.effects if effect.name == name]
         for parameter, unit in free[name].items():
             values, errors = _values(effects, parameter)

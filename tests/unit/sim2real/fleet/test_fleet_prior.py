@@ -5,7 +5,6 @@ import pytest
 
 from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect
 from wetwell.sim2real.fleet.fleet_prior import ADDED, Finding, FleetPrior, fleet_prior
-from wetwell.simulator.effects import EFFECTS
 
 
 def finding(number, value=None, error=0.01, name="friction_bias", parameter="factor"):
@@ -67,7 +66,7 @@ def test_a_station_is_no_witness_of_its_own():
 
 def test_without_stations_all_is_even():
     priors = fleet_prior([]).priors
-    names = tuple(EFFECTS)
+    names = tuple(fleet_prior([]).effects)
     assert priors.parameters == {}
     for sets in ((names[0],), names[:2]):
         assert priors.log_share(sets, names) == pytest.approx(-np.log(len(names)))
