@@ -96,9 +96,9 @@ def fleet_prior(findings: Sequence[Finding], without: str | None = None) -> Flee
     counts = {name: sum(name in {effect.name for effect in one.effects} for one in heard) for name in free}
     mean = float(np.mean([count + ADDED for count in counts.values()]))
     found: dict[str, dict[str, UsualParameter]] = {}
-    for name in free:
+    for name, units in free.items():
         effects = [effect for one in heard for effect in one.effects if effect.name == name]
-        for parameter, unit in free[name].items():
+        for parameter, unit in units.items():
             values, errors = _values(effects, parameter)
             if values.size >= FEWEST_STATIONS:
                 centre, sd = _spread(values, errors)
