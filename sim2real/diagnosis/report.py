@@ -112,9 +112,10 @@ class UntestedEffect(_Part):
 
 
 class NoiseCheck(_Part):
-    """Mean square of the residuals of a signal in a regime under the answer; 1 is all that a right model may be off.
+    """Mean square of what is left of a signal in a regime under the answer, over what is expected of a good model.
 
-    Between `noise_share`, what the sensors alone make, and 1 where the answer is right and the noise is known.
+    Between `noise_share`, what the sensors alone make, and 1 where the answer is right and the noise is known;
+    more in starts and stops, where a right model may be poor.
     """
 
     signal: str

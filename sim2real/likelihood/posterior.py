@@ -9,14 +9,14 @@ from scipy.special import logsumexp
 
 Verdict = Literal["effect", "none", "unknown"]
 
-NONE_PRIOR = 0.3
-"""Probability that nothing of the library acts, before anything is seen. [1]"""
-UNKNOWN_PRIOR = 0.3
-"""Probability that something acts that the library does not hold, alone or beside effects of it. [1]"""
+UNKNOWN_PRIOR = 1.0 / 3.0
+"""Probability that something acts that the library does not hold: as likely as none, and as effects. [1]"""
+NONE_PRIOR = 0.5
+"""Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
 TEMPER = 0.3
-"""Power of the likelihood: bins are not as independent as it takes them to be. [1]"""
+"""Power of the likelihood: its blocks are not as independent as it takes them to be. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""
 
