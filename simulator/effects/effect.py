@@ -37,6 +37,11 @@ class Effect(Table):
     A subclass is one file: the equation and its source, parameters with range and unit, and `modify` or `force`.
     `neutral` names the parameters that are its strength, with the values at which it changes nothing, bit for bit.
     `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open.
+
+    Parameters
+    ----------
+    name : str
+        Which effect.
     """
 
     component: ClassVar[Component]

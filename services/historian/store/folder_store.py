@@ -103,7 +103,8 @@ class FolderStore:
         """Where the history of a station ends; a day in a file counts as one that is believed."""
         filed_ns = {*self.archive.days_ns("samples", station), *self.archive.days_ns("minutes", station)}
         of_files = [(day_ns, day_ns + DAY_NS - 1, LEAST_SAMPLES) for day_ns in sorted(filed_ns, reverse=True)]
-        return end_of_stretch_ns([*self.live.rows_from_newest(station, MOST_LOOKED_AT), *of_files])
+        live = [(time_ns, time_ns, 1) for time_ns in self.live.newest_times_ns(station, MOST_LOOKED_AT)]
+        return end_of_stretch_ns([*live, *of_files])
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span."""

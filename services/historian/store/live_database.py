@@ -163,13 +163,15 @@ class LiveDatabase:
         times_ns = times_ns[times_ns >= start_ns]
         return min([*times_ns[:1].tolist(), *([] if time_ns is None else [int(time_ns)])], default=None)
 
-    def rows_from_newest(self, station: str, most: int) -> list[tuple[int, int, int]]:
-        """First time, last time and number of samples of the newest rows, the newest first."""
+    def newest_times_ns(self, station: str, most: int) -> list[int]:
+        """Times of the samples in the newest rows, at most so many rows, the newest first; each sample once."""
         with self._reading() as database:
-            return database.execute(
-                f"SELECT time_ns, {_LAST}, size {_OF_STATION} ORDER BY time_ns DESC LIMIT :most",
+            rows = database.execute(
+                f"SELECT {_PACKED} {_OF_STATION} ORDER BY time_ns DESC LIMIT :most",
                 {"station": station, "most": most},
             ).fetchall()
+        times_ns: list[int] = Samples.of_rows(rows).time_ns[::-1].tolist()
+        return times_ns
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:
         """Beginnings of the days that have samples in a span, in order."""
