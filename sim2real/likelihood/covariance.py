@@ -15,7 +15,7 @@ CHANGING = 0.5
 FORM = 0.07
 """Standard deviation of the error of form of a good effect, as a share of what it explains. [1]"""
 POOR_FORM = 0.35
-"""The same of a poor one, as in starts and stops; an error of the model is then as large as is allowed. [1]"""
+"""The same of a poor one, as in seconds of starts; an error of the model is then as large as is allowed. [1]"""
 SWING = 0.5
 """The same where an effect is known by how much it swings in time, and not by its course. [1]"""
 

@@ -1,17 +1,16 @@
 """How probable the cells are under a set of effects, its parameters and errors of form integrated out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve
-from scipy.special import logsumexp
 
-from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Form, no_form, projected
+from wetwell.protocols.arrays import Flags, Floats
+from wetwell.sim2real.likelihood.cells import Block, Cells
+from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Allowance, Form, no_form, projected
 
 POORLY = 0.1
-"""Probability that a right model is poor in a block. [1]"""
+"""Probability that a right model is poor in a group. [1]"""
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
 
@@ -44,11 +43,11 @@ class Evidence:
 def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evidence:
     r"""Laplace's approximation around a fit.
 
-    $$\ln p(z \mid S) = \sum_b \ln \left((1 - w)\,p(r_b \mid \text{good}) + w\,p(r_b \mid \text{poor})\right)
-    - \tfrac12 \ln\det(1 + H / 2\pi), \qquad H = \sum_b J_b^T C_b^{-1} J_b$$
+    $$\ln p(z \mid S) = \sum_b \ln p(r_b \mid \text{poor}_b) + \ln \pi(\text{poor}) - \tfrac12 \ln\det(1 + H / 2\pi),
+    \qquad H = \sum_b J_b^T C_b^{-1} J_b$$
 
     with the residuals r at the best parameters, their slopes J, a prior that is even over the range of each
-    parameter, and in each block b the covariance that is more probable at the fit; w is `POORLY`.
+    parameter, and in each block b the groups that are poor by what the fit leaves; π has `POORLY` for each of them.
 
     Parameters
     ----------
@@ -65,20 +64,20 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     """
     count = slopes.shape[1]
     columns = np.column_stack([residuals, slopes])
-    weighed = ((float(np.log(1.0 - POORLY)), GOOD), (float(np.log(POORLY)), POOR))
-    likely: list[list[tuple[float, Floats]]] = []
+    likely: list[tuple[float, Floats]] = []
     inner = np.zeros((count + 1, count + 1))
     for block in cells.blocks:
         own = form.chosen(block.rows)
-        each = [(log, *projected(block, columns[block.rows], own, allowance)) for log, allowance in weighed]
-        likely.append([(log - 0.5 * log_det, products) for log, products, log_det in each])
-        inner += max(likely[-1], key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))[1]
+        is_poor = _poor(block, residuals[block.rows], own)
+        loose, loose_form = _loosened(block, own, is_poor)
+        products, log_det = projected(loose, columns[block.rows], loose_form, GOOD)
+        prior = is_poor.sum() * np.log(POORLY) + (~is_poor).sum() * np.log(1.0 - POORLY)
+        likely.append((float(prior) - 0.5 * log_det, products))
+        inner += products
     precision, slope = inner[1:, 1:], inner[1:, 0]
     step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
     along = np.r_[1.0, step]
-    by_block = np.array(
-        [logsumexp([log - 0.5 * float(along @ products @ along) for log, products in each]) for each in likely]
-    )
+    by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products in likely])
     occam = float(np.linalg.slogdet(np.eye(count) + precision / (2.0 * np.pi))[1])
     return Evidence(
         log=float(by_block.sum()) - 0.5 * occam,
@@ -92,3 +91,29 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     """Evidence without any effect."""
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
+
+
+def _poor(block: Block, residuals: Floats, form: Form) -> Flags:
+    """(groups,) whether a group is more probable as a poor one, by its mean and its scatter over the cycles."""
+    counts = block.group_sums(np.ones(residuals.size))
+    mean, noise, allowed, signature = (
+        block.group_sums(values) / counts
+        for values in (residuals, block.variance, block.allowed**2, form.signature**2)
+    )
+    scatter = block.group_sums((residuals - mean[block.group]) ** 2)
+
+    def log(allowance: Allowance) -> Floats:
+        changing = noise + allowance.change**2 * allowed + allowance.changing_form**2 * signature
+        shared = changing / counts + allowance.offset**2 * allowed + allowance.form**2 * signature
+        log_volume = np.log(shared) + (counts - 1.0) * np.log(changing)
+        return np.asarray(-0.5 * (log_volume + mean**2 / shared + scatter / changing), dtype=np.float64)
+
+    return np.asarray(log(POOR) + np.log(POORLY) > log(GOOD) + np.log(1.0 - POORLY))
+
+
+def _loosened(block: Block, form: Form, is_poor: Flags) -> tuple[Block, Form]:
+    """A block and its form, as if all were good: what is allowed, and what is explained, is larger in poor groups."""
+    own = is_poor[block.group]
+    allowed = np.where(own, POOR.offset / GOOD.offset, 1.0) * block.allowed
+    signature = np.where(own, POOR.form / GOOD.form, 1.0) * form.signature
+    return replace(block, allowed=allowed), replace(form, signature=signature)

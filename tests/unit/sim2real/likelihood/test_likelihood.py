@@ -1,12 +1,14 @@
 """The likelihood against dense matrices, and what it must and must not gain from."""
 
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 import pytest
-from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from wetwell.sim2real.likelihood.cells import cells_of
-from wetwell.sim2real.likelihood.covariance import GOOD, POOR, SWING, Allowance, Form, no_form, projected
+from wetwell.sim2real.likelihood.covariance import GOOD, OFFSET, POOR, SWING, Allowance, Form, no_form, projected
 from wetwell.sim2real.likelihood.evidence import POORLY, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
@@ -74,33 +76,37 @@ def test_products_are_those_of_the_dense_covariance(cells, allowance, has_form):
         assert log_det == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-9)
 
 
-def log_density(cells, residuals):
-    """Of all blocks without an effect, each good or poor, but for the factors of 2π."""
-    total = 0.0
+def log_densities(cells, residuals):
+    """Of each way in which groups may be poor, block by block, but for the factors of 2π: (blocks, ways, ...)."""
+    found = []
     for block in cells.blocks:
-        form = no_form(cells).chosen(block.rows)
-        logs = [
-            np.log(weight)
-            + multivariate_normal(cov=dense(block, form, allowance)).logpdf(residuals[..., block.rows])
-            + 0.5 * block.rows.size * np.log(2.0 * np.pi)
-            for weight, allowance in ((1.0 - POORLY, GOOD), (POORLY, POOR))
-        ]
-        total = total + logsumexp(logs, axis=0)
-    return total
+        ways = []
+        for poor in product((False, True), repeat=int(block.group.max()) + 1):
+            is_poor = np.array(poor)
+            loose = replace(block, allowed=np.where(is_poor[block.group], 1.0 / OFFSET, 1.0) * block.allowed)
+            density = multivariate_normal(cov=dense(loose, no_form(cells).chosen(block.rows), GOOD))
+            log = density.logpdf(residuals[..., block.rows]) + 0.5 * block.rows.size * np.log(2.0 * np.pi)
+            ways.append(log + is_poor.sum() * np.log(POORLY) + (~is_poor).sum() * np.log(1.0 - POORLY))
+        found.append(ways)
+    return np.array(found)
 
 
-def test_the_evidence_of_none_is_a_mixture_of_normal_densities(cells):
-    residuals = np.random.default_rng(6).normal(size=cells.group.size)
-    assert evidence_of_none(cells, residuals).log == pytest.approx(log_density(cells, residuals), rel=1e-9)
+@pytest.mark.parametrize("poor", [0.0, 4.0], ids=["good", "one group poor"])
+def test_the_evidence_of_none_is_that_of_the_likeliest_way_to_be_poor(cells, poor):
+    residuals = 0.5 * np.sqrt(cells.variance) * np.random.default_rng(6).normal(size=cells.group.size)
+    residuals += poor * cells.allowed * (cells.group == 1)
+    ways = log_densities(cells, residuals)
+    assert int(np.argmax(ways, axis=1).sum() > 0) == int(poor > 0.0)
+    assert evidence_of_none(cells, residuals).log == pytest.approx(ways.max(axis=1).sum(), rel=1e-9)
 
 
 def test_a_parameter_is_integrated_over_its_range(cells):
     """Against a sum over a fine grid of the parameter, whose prior is even over its range."""
     rng = np.random.default_rng(7)
     slope = 40.0 * rng.normal(size=cells.group.size)
-    residuals = 0.7 * rng.normal(size=cells.group.size)
+    residuals = 0.5 * rng.normal(size=cells.group.size)
     grid = np.linspace(-0.5, 0.5, 20_001)
-    logs = log_density(cells, residuals + grid[:, None] * slope)
+    logs = log_densities(cells, residuals + grid[:, None] * slope)[:, 0].sum(axis=0)
     best = int(np.argmax(logs))
     expected = float(np.log(np.mean(np.exp(logs - logs[best]))) + logs[best])
     found = evidence(cells, residuals + grid[best] * slope, slope[:, None], no_form(cells))
