@@ -9,6 +9,16 @@ from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.quantities import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.control.drive import turned_ratio
 from wetwell.simulator.control.supervision import drive, supervise
+from wetwell.simulator.corrections.acting import correct
+from wetwell.simulator.corrections.parts import (
+    HEAD_LOSS,
+    LEVEL_BALANCE,
+    LEVEL_READING,
+    POWER_TERM,
+    PUMP_HEAD,
+    SPEED,
+    STATIC_HEAD,
+)
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h, pump_head_m
 from wetwell.simulator.parameters import MainParameters, PlantRecords
@@ -53,7 +63,8 @@ def simulate_seconds(
         is_moving = move_plant(plant, state, forcing, second, 0.0, truth, second)
 
         is_frozen = forcing.is_plc_frozen[second]
-        level_m, inflow_m3h = truth.level_m[second], forcing.inflow_m3h[second]
+        inflow_m3h = forcing.inflow_m3h[second]
+        level_m = truth.level_m[second] + state.correction[LEVEL_READING, 0]
         seen_level_m = read_channel(LEVEL, level_m, True, is_frozen, plant, state, forcing, second, rng, measured)
         read_channel(INFLOW, inflow_m3h, True, is_frozen, plant, state, forcing, second, rng, measured)
         may_rest = is_plain and not is_frozen
@@ -86,6 +97,8 @@ def move_plant(
     station, now = plant.station[0], state.station[0]
     level_m = level_at_volume_m(now.volume_m3, plant.profile)
     is_moving = is_moving_now(state)
+    if plant.has_corrections:
+        correct(plant, state, forcing, second, level_m)
     if is_moving:
         turn_pumps(plant, state, forcing, second)
         for m in range(plant.mains.size):
@@ -95,6 +108,7 @@ def move_plant(
             gather_air(plant, state, m)
     over_m3h = overflow_m3h(level_m, station.overflow_level_m, station.weir_width_m, plant.profile)
     inflow_m3h = forcing.inflow_m3h[second] + station.unmetered_inflow_m3h + extra_inflow_m3h
+    inflow_m3h += state.correction[LEVEL_BALANCE, 0]
     inflow_m3h += back_flow_m3h(plant, state, forcing, second, level_m)
     now.volume_m3 = next_volume_m3(now.volume_m3, inflow_m3h, over_m3h, state.mean_flow_m3h)
     if is_moving:
@@ -139,9 +153,11 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
             if state.flow_m3h[i] <= 0.0:
                 continue
         left = (1.0 - pump.slip * now.load) * (1.0 - now.ragging)
-        state.speed_ratio[i] = now.shaft_ratio * left * forcing.speed_factor[i, second]
+        factor = forcing.speed_factor[i, second] * (1.0 + state.correction[SPEED, i])
+        state.speed_ratio[i] = now.shaft_ratio * left * factor
         now.ragging += (pump.ragging_limit - now.ragging) / pump.ragging_s
-        factor, leak_m3h = forcing.head_factor[i, second], forcing.internal_leak_m3h[i, second]
+        factor = forcing.head_factor[i, second] * (1.0 + state.correction[PUMP_HEAD, i])
+        leak_m3h = forcing.internal_leak_m3h[i, second]
         state.curves[i, 0] = factor * (pump.c0 + (pump.c1 + pump.c2 * leak_m3h) * leak_m3h)
         state.curves[i, 1] = factor * (pump.c1 + 2.0 * pump.c2 * leak_m3h)
         state.curves[i, 2] = factor * pump.c2
@@ -195,7 +211,9 @@ def _solve_flows(
     main, curves, flow_m3h = plant.mains[m], state.curves, state.flow_m3h
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     if main.is_common_header:
-        lift_m = max(static_head_m + state.pumps[pumps[0]].air_m, 0.0)
+        at = pumps[0]
+        lift_m = max(static_head_m + state.pumps[at].air_m + state.correction[STATIC_HEAD, at], 0.0)
+        friction_h2_m5 *= 1.0 + state.correction[HEAD_LOSS, at]
         own_h2_m5 = friction_h2_m5 * (1.0 - main.shared_friction)
         for i in pumps:
             curves[i, 2] -= own_h2_m5
@@ -206,9 +224,10 @@ def _solve_flows(
             curves[i, 2] += own_h2_m5
         return
     for i in pumps:
-        lift_m = max(static_head_m + state.pumps[i].air_m, 0.0)
+        lift_m = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
+        own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
         flow_m3h[i] = individual_flow_m3h(
-            curves[i], state.speed_ratio[i], lift_m, friction_h2_m5, inertia_m_m3h, flow_m3h[i]
+            curves[i], state.speed_ratio[i], lift_m, own_h2_m5, inertia_m_m3h, flow_m3h[i]
         )
 
 
@@ -237,7 +256,7 @@ def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, seco
         if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
             m = plant.pumps[i].main
             static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
-            head_m = max(static_head_m + state.pumps[i].air_m, 0.0)
+            head_m = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
             if plant.mains[m].is_common_header:
                 pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
                 friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
@@ -283,7 +302,7 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
                     power_kw += by_load * loaded_power_kw(
                         shaft_kw, pump.rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
                     )
-                power_kw *= voltage_factor
+                power_kw *= voltage_factor * (1.0 + state.correction[POWER_TERM, i])
         truth.flow_m3h[i, second] = flow_m3h
         truth.head_m[i, second] = head_m
         truth.power_kw[i, second] = power_kw

@@ -8,14 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.jit import plain
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, AnalogueQuantity
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.station_file import Electrical, Sensors, Station
+from wetwell.simulator.corrections.parts import CorrectionPart
 from wetwell.simulator.power import hydraulic_power_kw, power_line, shaft_points
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
 from wetwell.simulator.wet_well import ProfileSlice, profile_of_slices
+
+_NO_CORRECTION = (CorrectionPart(term=0, size=0.0),)
+"""Records have at least one: compiled code must know what they are."""
 
 ROUND_ROBIN, FIXED, LEAST_RUN_TIME = range(3)
 ROTATIONS = ("round_robin", "fixed", "least_run_time")
@@ -104,7 +109,8 @@ class PlantParameters:
     Wet well: profile, an overflow weir, inflow that no meter sees. Pumps: see `PumpParameters`. Mains: see
     `MainParameters`. Drive: shape of the ramp. Control: levels, delay, rotation, limits, level controller.
     `rated_level_m` is where the rated duties are told. Electrical: a power that follows the frequency, or the load,
-    or between the two by `load_share`. Sensors: one a channel.
+    or between the two by `load_share`. Sensors: one a channel. Corrections: learnt addends to terms, and the columns
+    of a user that they go by, in the order of the forcing's.
     """
 
     profile: Records[ProfileSlice]
@@ -143,6 +149,9 @@ class PlantParameters:
     load_share: float
 
     sensors: tuple[SensorParameters, ...]
+
+    corrections: tuple[CorrectionPart, ...] = ()
+    columns: tuple[str, ...] = ()
 
     @property
     def curves(self) -> Floats:
@@ -192,6 +201,8 @@ class PlantParameters:
             has_air=any(main.air_head_m > 0.0 for main in self.mains),
             pumps_until=np.cumsum([0, *np.bincount(mains, minlength=len(self.mains))]),
             sensors=records_of(self.sensors),
+            corrections=records_of(self.corrections or _NO_CORRECTION),
+            has_corrections=bool(self.corrections),
             profile=self.profile,
             start_levels_m=self.start_levels_m.copy(),
             stop_levels_m=self.stop_levels_m.copy(),
@@ -202,7 +213,7 @@ class PlantRecords(NamedTuple):
     """Parameters of a plant in records; of the station there is one.
 
     Main m has the pumps `pumps_by_main[pumps_until[m]:pumps_until[m + 1]]`, counted from 0. `has_air` says whether
-    air may gather in any.
+    air may gather in any, `has_corrections` whether a correction acts.
     """
 
     station: Records[PlantParameters]
@@ -212,6 +223,8 @@ class PlantRecords(NamedTuple):
     pumps_until: Integers
     has_air: bool
     sensors: Records[SensorParameters]
+    corrections: Records[CorrectionPart]
+    has_corrections: bool
     profile: Records[ProfileSlice]
     start_levels_m: Floats
     stop_levels_m: Floats
@@ -292,7 +305,7 @@ def _rated_power(pump: Pump, electrical: Electrical, rated_m3h: float, rated_m: 
     points = shaft_points(pump.coefficients, pump.power_points, pump.efficiency_points)
     share = electrical.shutoff_power_share
     if not points:
-        return hydraulic_power_kw(rated_m3h, rated_m) / electrical.efficiency, share
+        return plain(hydraulic_power_kw)(rated_m3h, rated_m) / electrical.efficiency, share
     shutoff_kw, slope_kwh_m3 = power_line(points, share, rated_m3h)
     rated_kw = shutoff_kw + slope_kwh_m3 * rated_m3h
     return rated_kw, shutoff_kw / rated_kw

@@ -12,6 +12,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.control import check_levels
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.simulator.control.drivable import check_driven
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFault, SystemFault
@@ -73,7 +74,9 @@ class Simulation:
         self.station = station
         self.scenario = scenario
         self._inflow = scenario.inflow.stream(inflow_rng)
-        self._plant = Plant(effective_parameters(station), scenario.initial_level_m)
+        parameters = effective_parameters(station)
+        self._columns = parameters.columns
+        self._plant = Plant(parameters, scenario.initial_level_m)
         self.start_ns = scenario.start_time if scenario.start_time is not None else start_ns
 
     @property
@@ -137,6 +140,8 @@ class Simulation:
             len(self.station.pump),
             len(self.station.mains),
             with_sensors=any(isinstance(fault, SensorFault) for fault in self.scenario.fault),
+            clock_s=self.start_ns / NS_PER_S + time_s,
+            columns=np.full((len(self._columns), seconds), np.nan),
         )
         for effect in self._effects:
             effect.force(forcing, time_s)
@@ -185,21 +190,6 @@ class Simulation:
                 f"truth_pump{i + 1}_power_kw": true.power_kw[i],
             }
         return columns
-
-
-def check_driven(station: Station) -> None:
-    """Refuse a station whose pumps nothing in the simulator may start or stop.
-
-    Raises
-    ------
-    ValueError
-        One line.
-    """
-    if station.control.is_external:
-        raise ValueError(
-            f"station '{station.name}': control.mode: 'external': nobody knows when pumps start: replay a recording "
-            "of the station instead"
-        )
 
 
 def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.simulator.corrections.parts import COVARIATES, TERMS
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import channels
@@ -15,6 +16,8 @@ from wetwell.simulator.wet_well import SECONDS_PER_HOUR, volume_at_level_m3
 MAX_DELAY_S = 119
 PAST_S = MAX_DELAY_S + 2
 MAX_STARTS_PER_HOUR = 60
+LONG_REST_S = 1.0e5
+"""For so long a plant has stood when it begins: as long as any air takes to gather. [s]"""
 
 
 @dataclass(slots=True)
@@ -37,7 +40,10 @@ class StationState:
 
 @dataclass(slots=True)
 class PumpState:
-    """Drive and pump; `load` is the torque as a share of the rated one."""
+    """Drive and pump; `load` is the torque as a share of the rated one.
+
+    For corrections: seconds of this run and of this rest, and for how long nothing had moved in its pipe before.
+    """
 
     frequency_hz: float = 0.0
     shaft_ratio: float = 0.0
@@ -46,6 +52,9 @@ class PumpState:
     ragging: float = 0.0
     dwell_left_s: float = 0.0
     run_s: float = 0.0
+    turned_s: float = 0.0
+    rested_s: float = LONG_REST_S
+    idle_before_s: float = LONG_REST_S
     is_commanded: bool = False
     is_ready: bool = False
 
@@ -64,9 +73,10 @@ class PlantState(NamedTuple):
     """State of a plant; of the station there is one record.
 
     The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
-    now and before a step, and their means over the second. `past` (channels, m) and `level_history` (m,) are rings of
-    the last seconds. `started` holds the commanded pumps in the order of their starts; `recent_starts` (pumps, k) the
-    seconds of the last starts of each, the newest first.
+    now and before a step, and their means over the second. `correction` (terms, pumps) is what learnt corrections add
+    to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past` (channels, m) and
+    `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the order of their
+    starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first.
     """
 
     station: Records[StationState]
@@ -77,6 +87,8 @@ class PlantState(NamedTuple):
     flow_m3h: Floats
     flow_before_m3h: Floats
     mean_flow_m3h: Floats
+    correction: Floats
+    covariates: Floats
     past: Floats
     level_history: Floats
     started: Integers
@@ -105,6 +117,8 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         flow_m3h=np.zeros(pumps),
         flow_before_m3h=np.zeros(pumps),
         mean_flow_m3h=np.zeros(pumps),
+        correction=np.zeros((len(TERMS), pumps)),
+        covariates=np.zeros(len(COVARIATES)),
         past=np.full((channels(pumps), PAST_S), np.nan),
         level_history=np.full(PAST_S, np.nan),
         started=np.zeros(pumps, dtype=np.int64),

@@ -107,6 +107,8 @@ def _parts(title: str, parts: Iterable[dict[str, Any]]) -> str:
 def _parameter(row: dict[str, Any]) -> tuple[str, ...]:
     if "choices" in row:
         limits = ", ".join(row["choices"])
+    elif "parts" in row:
+        return f"`{row['name']}`", "", f"tables with {', '.join(row['parts'])}", ""
     elif "low" in row:
         limits = f"{row['low']:g} to {row['high']:g}"
     else:

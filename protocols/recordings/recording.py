@@ -2,6 +2,7 @@
 
 Columns: `time` (ISO 8601 with a Z or an offset), `level_m`, optional `inflow_m3h`, and for each pump i from 1
 `pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
+Columns that start with `covariate_` are those of a user: rain, tide, temperature.
 Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
 """
 
@@ -37,6 +38,7 @@ from wetwell.protocols.quantities import (
     pump_of,
     pumps_of,
 )
+from wetwell.protocols.recordings.covariates import covariate_of
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
 from wetwell.protocols.timestamps import from_iso, has_zone, to_iso_array
 
@@ -78,6 +80,12 @@ class Recording:
     def pumps(self) -> int:
         """Number of pumps that the columns speak of."""
         return pumps_of(self.columns)
+
+    @property
+    def covariates(self) -> dict[str, Floats]:
+        """(n,) values of the columns of a user, by their names without the prefix."""
+        named = ((covariate_of(column), values) for column, values in self.columns.items())
+        return {name: values for name, values in named if name is not None}
 
     def column(self, name: str) -> Floats:
         """(n,) values of a column, NaN throughout where it is absent."""
@@ -178,7 +186,7 @@ def recording_of(
     for name in table.column_names:
         if name == "time":
             continue
-        if name in STATION_QUANTITIES or pump_of(name):
+        if _is_measured(name):
             columns[name] = _numbers(table[name], name, place)
         elif name.startswith(TRUTH_PREFIX):
             truth[name] = table[name].to_numpy()
@@ -199,6 +207,10 @@ def recording_of(
     return recording
 
 
+def _is_measured(column: str) -> bool:
+    return column in STATION_QUANTITIES or pump_of(column) > 0 or covariate_of(column) is not None
+
+
 def _suffix(path: Path) -> str:
     for suffix in SUFFIXES:
         if path.name.endswith(suffix):
@@ -215,7 +227,7 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
             table = pa.parquet.read_table(path)
             return table, Origin.of_metadata(table.schema.metadata or {})
         mark, header = _csv_header(path)
-        types = {name: pa.float64() for name in header if name in STATION_QUANTITIES or pump_of(name)}
+        types = {name: pa.float64() for name in header if _is_measured(name)}
         table = pa.csv.read_csv(
             path,
             read_options=pa.csv.ReadOptions(use_threads=False, skip_rows=int(bool(mark))),

@@ -25,7 +25,7 @@ from wetwell.sim2real.recording.preparation import PreparationReport
 from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.simulator.effects import EFFECTS, effects_of
+from wetwell.simulator.effects import LIBRARY, effects_of
 
 MISSED = 1.5
 """Pause over that from row to row, from which a row is missing."""
@@ -82,7 +82,7 @@ def check_effects(names: Iterable[str]) -> None:
         Names the first.
     """
     for name in names:
-        if name not in EFFECTS:
+        if name not in LIBRARY:
             raise ConfigError(f"effect '{name}' is not in the library: wetwell effects lists it")
 
 

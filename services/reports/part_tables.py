@@ -74,8 +74,9 @@ def effect_lines(table: Sequence[Mapping[str, Any]]) -> str:
         for parameter in row["parameters"]:
             allowed = f"{parameter['low']:g} to {parameter['high']:g}" if "low" in parameter else "any"
             allowed = ", ".join(parameter["choices"]) if "choices" in parameter else allowed
+            allowed = f"tables with {', '.join(parameter['parts'])}" if "parts" in parameter else allowed
             unit = f" [{parameter['unit']}]" if "unit" in parameter else ""
-            value = parameter.get("default")
+            value = None if "parts" in parameter else parameter.get("default")
             default = "" if value is None else f", default {value if isinstance(value, str) else format(value, 'g')}"
             lines.append(_indented(f"{parameter['name']}: {allowed}{unit}{default}"))
     return "\n".join(lines)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.simulator.effects import EFFECTS, effect_table
+from wetwell.simulator.effects import EFFECTS, LIBRARY, effect_table
 from wetwell.simulator.effects.effect import Component, Effect
 
 WIDE = 50.0
@@ -107,10 +107,10 @@ def candidates_of(
     ValueError
         If a name is not in the library, or nothing is left.
     """
-    wanted = set(EFFECTS) if only is None else set(only)
+    wanted = set(LIBRARY) if only is None else set(only)
     dropped = set(without)
     for name in wanted | dropped:
-        if name not in EFFECTS:
+        if name not in LIBRARY:
             raise ValueError(f"effect '{name}' is not in the library: see wetwell effects")
     if not wanted - dropped:
         raise ValueError("no effect of the library is left")

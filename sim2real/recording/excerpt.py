@@ -86,4 +86,5 @@ def _of_rows(traces: Traces, parts: list[Integers]) -> Traces:
         level_m=np.where(is_cut, np.nan, taken(traces.level_m, np.nan)),
         inflow_m3h=None if traces.inflow_m3h is None else taken(traces.inflow_m3h, 0.0),
         signals={name: np.where(is_cut, np.nan, taken(values, np.nan)) for name, values in traces.signals.items()},
+        columns={name: taken(values, np.nan) for name, values in traces.columns.items()},
     )

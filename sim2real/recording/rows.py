@@ -96,13 +96,13 @@ class Rows:
             ]
         return frequency_hz
 
-    def inflow_m3h(self) -> Floats | None:
-        """(n,) inflow without NaN, None where most rows have none.
+    def course(self, name: str) -> Floats | None:
+        """(n,) values of a column in each second, without NaN; None where most rows have none.
 
         Of seconds that were lost, and of a value that is held, it is the last one; between rows it goes along a
         straight line; the mean of an interval is that of all its seconds.
         """
-        values = self.column("inflow_m3h")
+        values = self.column(name)
         if self.is_held:
             values = filled(values, self.seconds, np.nan)
         if not np.isfinite(values[self.second]).mean() > 0.5:

@@ -1,11 +1,12 @@
 """A recording on whole seconds: what the replay is driven by and held against."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
+from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
@@ -41,6 +42,8 @@ class Traces:
         Without NaN.
     signals : dict of (pumps, n) arrays
         Of `PUMP_METERS` those that are measured, and move.
+    columns : dict of (n,) arrays
+        Of a user, by name, without NaN: those that have values in most rows.
     """
 
     start_ns: int
@@ -52,11 +55,17 @@ class Traces:
     level_m: Floats
     inflow_m3h: Floats | None
     signals: dict[AnalogueQuantity, Floats]
+    columns: dict[str, Floats] = field(default_factory=dict)
 
     @property
     def seconds(self) -> int:
         """Length. [s]."""
         return int(self.level_m.shape[0])
+
+    @property
+    def clock_s(self) -> Floats:
+        """(n,) seconds since 1970, UTC. [s]."""
+        return self.start_ns / NS_PER_S + self.time_s
 
     @property
     def frequency_hz(self) -> Floats:
@@ -105,6 +114,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     if starts < MIN_STARTS:
         raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {MIN_STARTS}")
     level_m = rows.news(rows.column("level_m"))
+    courses = {name: rows.course(COVARIATE_PREFIX + name) for name in recording.covariates}
     if not signals and not _moves(level_m):
         raise ValueError(
             "flow, head, power and level have no values or never move: nothing to hold the simulator against"
@@ -117,8 +127,9 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         is_row=rows.is_row,
         drives=drives,
         level_m=level_m if _moves(level_m) else np.full(rows.seconds, np.nan),
-        inflow_m3h=rows.inflow_m3h(),
+        inflow_m3h=rows.course("inflow_m3h"),
         signals=signals,
+        columns={name: course for name, course in courses.items() if course is not None},
     )
 
 

@@ -5,6 +5,7 @@ import math
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.quantities import FLOW, HEAD, LEVEL, POWER
+from wetwell.simulator.corrections.parts import FLOW_READING, HEAD_READING, LEVEL_READING
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.kernel import move_plant
 from wetwell.simulator.parameters import PlantRecords
@@ -70,9 +71,10 @@ def replay_seconds(
             truth.flow_m3h[i, 0] = truth.head_m[i, 0] = truth.power_kw[i, 0] = 0.0
         move_plant(plant, state, forcing, second, extra_m3h, truth, 0)
         true_m = truth.level_m[0]
+        misread_m = state.correction[LEVEL_READING, 0]
         _read(plant, state, damped, second, truth, reading)
 
-        sensed_m += (true_m - sensed_m) * sensor.followed
+        sensed_m += (true_m + misread_m - sensed_m) * sensor.followed
         level_m[second] = sensed_m
         expected_m = sensed_m
         if delay_s > 0.0 and second > whole:
@@ -87,7 +89,8 @@ def replay_seconds(
         error_m = measured_level_m[second] - expected_m
         followed = level_gain[second]
         if followed >= 1.0:
-            now.volume_m3 = volume_at_level_m3(max(measured_level_m[second], plant.profile[0].level_m), plant.profile)
+            begun_m = max(measured_level_m[second] - misread_m, plant.profile[0].level_m)
+            now.volume_m3 = volume_at_level_m3(begun_m, plant.profile)
             sensed_m = measured_level_m[second]
         else:
             area_m2 = (
@@ -104,9 +107,10 @@ def _read(plant: PlantRecords, state: PlantState, damped: Floats, second: int, t
     """Read flow, head and power of each pump as its sensors do: damping, gain, offset, cutoff."""
     for i in range(state.pumps.size):
         is_active = state.pumps[i].frequency_hz > 0.0 or state.mean_flow_m3h[i] > 0.0
-        for k, (quantity, true_value) in enumerate(
-            ((FLOW, truth.flow_m3h[i, 0]), (HEAD, truth.head_m[i, 0]), (POWER, truth.power_kw[i, 0]))
-        ):
+        head_m = truth.head_m[i, 0]
+        head_m += state.correction[HEAD_READING, i] if head_m > 0.0 else 0.0
+        flow_m3h = truth.flow_m3h[i, 0] * (1.0 + state.correction[FLOW_READING, i])
+        for k, (quantity, true_value) in enumerate(((FLOW, flow_m3h), (HEAD, head_m), (POWER, truth.power_kw[i, 0]))):
             sensor = plant.sensors[pump_channel(quantity, i)]
             value = true_value
             is_seen = is_active

@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
+from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
@@ -80,7 +81,8 @@ class Replay:
         self.station = station
         self.own = tuple(own)
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
-        self._forcing = healthy_forcing(inflow_m3h, traces.pumps, len(station.mains))
+        self._forcing = healthy_forcing(inflow_m3h, traces.pumps, len(station.mains), clock_s=traces.clock_s)
+        self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
         known = np.flatnonzero(np.isfinite(traces.level_m))
@@ -168,7 +170,8 @@ class Replay:
         read = tuple((sensor.gain, sensor.offset, sensor.followed, sensor.cutoff) for sensor in plant.sensors)
         delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
         station, profile = np.asarray(records.station).tolist(), np.asarray(records.profile).tolist()
-        key = (station, plant.mains, plant.pumps, profile, read, is_held, delays_s, forces)
+        corrections = (plant.corrections, plant.columns)
+        key = (station, plant.mains, plant.pumps, profile, read, is_held, delays_s, corrections, forces)
         for run in self._kept:
             if run.key == key:
                 return run
@@ -238,14 +241,28 @@ class Replay:
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""
         delay_s = plant.sensors[INFLOW].delay_s
-        if not writing and delay_s == 0.0:
+        if not writing and delay_s == 0.0 and not plant.columns:
             return self._forcing
         forcing = healthy_forcing(
-            later(self._forcing.inflow_m3h, -delay_s), self.traces.pumps, len(self.station.mains)
+            later(self._forcing.inflow_m3h, -delay_s),
+            self.traces.pumps,
+            len(self.station.mains),
+            clock_s=self._forcing.clock_s,
+            columns=self._columns(plant.columns),
         )
         for effect in writing:
             effect.force(forcing, self.traces.time_s)
         return forcing
+
+    def _columns(self, names: Sequence[str]) -> Floats:
+        """(columns, n) columns of the user that corrections go by."""
+        missing = [name for name in names if name not in self.traces.columns]
+        if missing:
+            raise ValueError(
+                f"column '{COVARIATE_PREFIX}{missing[0]}' is missing, or most of its rows are empty: a correction of "
+                "the station file goes by it"
+            )
+        return np.array([self.traces.columns[name] for name in names]).reshape(len(names), self.traces.seconds)
 
 
 def _settled(regime: Integers) -> Flags:

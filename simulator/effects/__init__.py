@@ -1,5 +1,6 @@
 """Effects beyond the plain model, one file each. The registry is the union itself."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
@@ -22,6 +23,7 @@ from wetwell.simulator.effects.rising_main.friction_bias import FrictionBias
 from wetwell.simulator.effects.rising_main.level_dependent_static_head import LevelDependentStaticHead
 from wetwell.simulator.effects.rising_main.static_head_bias import StaticHeadBias
 from wetwell.simulator.effects.rising_main.water_inertia import WaterInertia
+from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 from wetwell.simulator.effects.telemetry.channel_delay import ChannelDelay
 from wetwell.simulator.effects.telemetry.flow_low_cutoff import FlowLowCutoff
 from wetwell.simulator.effects.telemetry.flow_meter_gain import FlowMeterGain
@@ -45,6 +47,7 @@ AnyEffect = Annotated[
     | FlowMeterLag
     | FrictionBias
     | HeadSensorOffset
+    | LearntCorrection
     | LevelDependentStaticHead
     | LevelQuantisation
     | LevelSensorLag
@@ -65,6 +68,8 @@ AnyEffect = Annotated[
 EFFECTS: dict[str, type[Effect]] = {
     effect.model_fields["name"].default: effect for effect in get_args(get_args(AnyEffect)[0])
 }
+LIBRARY = tuple(name for name, effect in EFFECTS.items() if not effect.is_learnt)
+"""Names of the effects that a diagnosis tries."""
 _ADAPTER: TypeAdapter[tuple[AnyEffect, ...]] = TypeAdapter(tuple[AnyEffect, ...])
 
 
@@ -117,7 +122,7 @@ def effect_table() -> list[dict[str, Any]]:
     Returns
     -------
     rows : list of dict
-        A parameter has a name, and of unit, low, high, choices, neutral and default what there is.
+        A parameter has a name, and of unit, low, high, choices, neutral, default and parts what there is.
     """
     return [
         {
@@ -132,11 +137,17 @@ def effect_table() -> list[dict[str, Any]]:
 
 def _parameters(effect: type[Effect]) -> list[dict[str, Any]]:
     keys = {"unit": "unit", "minimum": "low", "maximum": "high", "enum": "choices", "default": "default"}
-    properties = effect.model_json_schema()["properties"]
+    whole = effect.model_json_schema()
     return [
         {"name": name}
         | {new: schema[old] for old, new in keys.items() if old in schema}
         | ({"neutral": effect.neutral[name]} if name in effect.neutral else {})
-        for name, schema in properties.items()
+        | ({"parts": _keys(whole, schema["items"])} if "items" in schema else {})
+        for name, schema in whole["properties"].items()
         if name != "name"
     ]
+
+
+def _keys(whole: Mapping[str, Any], items: Mapping[str, str]) -> list[str]:
+    """Keys of the tables that a parameter is a list of."""
+    return list(whole["$defs"][items["$ref"].rpartition("/")[2]]["properties"])

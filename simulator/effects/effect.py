@@ -20,6 +20,7 @@ Component = Literal[
     "head_sensor",
     "power_meter",
     "telemetry",
+    "station",
 ]
 
 PumpNumber = Annotated[int, Field(ge=0, le=32, description="pump, counted from 1; 0 for all pumps")]
@@ -36,7 +37,9 @@ class Effect(Table):
 
     A subclass is one file: the equation and its source, parameters with range and unit, and `modify` or `force`.
     `neutral` names the parameters that are its strength, with the values at which it changes nothing, bit for bit.
-    `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open.
+    `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_learnt`
+    says that its form comes from a recording: it is not among those that a diagnosis tries. Its component is the
+    "station", and its parameters say which part of it.
 
     Parameters
     ----------
@@ -47,6 +50,7 @@ class Effect(Table):
     component: ClassVar[Component]
     neutral: ClassVar[dict[str, float]]
     has_one_form: ClassVar[bool] = False
+    is_learnt: ClassVar[bool] = False
 
     name: str
 

@@ -7,6 +7,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import inlined
 from wetwell.protocols.quantities import FLOW, FREQUENCY, HEAD, POWER
+from wetwell.simulator.corrections.parts import FLOW_READING, HEAD_READING
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.parameters import PlantRecords, SensorParameters
 from wetwell.simulator.records import Records
@@ -67,9 +68,11 @@ def read_pumps(
             silence(state, channel, pump_channel(FREQUENCY, i + 1))
             continue
         send(channel, frequency_hz, is_frozen, plant, state, measured, second)
+        head_m = truth.head_m[i, second]
+        head_m += state.correction[HEAD_READING, i] if head_m > 0.0 else 0.0
         for quantity, value in (
-            (FLOW, truth.flow_m3h[i, second]),
-            (HEAD, truth.head_m[i, second]),
+            (FLOW, truth.flow_m3h[i, second] * (1.0 + state.correction[FLOW_READING, i])),
+            (HEAD, head_m),
             (POWER, truth.power_kw[i, second]),
         ):
             channel = pump_channel(quantity, i)

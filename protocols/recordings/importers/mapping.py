@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_of
+from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX, covariate_of
 from wetwell.protocols.recordings.importers.times.time_format import TimeFormat
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
@@ -196,10 +197,10 @@ class TagMapping(Table):
 
 
 def _check_signal(name: str, signal: TagSignal) -> None:
-    if name not in STATION_QUANTITIES and not pump_of(name):
+    if name not in STATION_QUANTITIES and not pump_of(name) and covariate_of(name) is None:
         raise ValueError(
-            f"signal.{name}: is no column of a recording, must be {', '.join(STATION_QUANTITIES)} or "
-            f"pump1_ and so on with {', '.join(PUMP_QUANTITIES)}"
+            f"signal.{name}: is no column of a recording, must be {', '.join(STATION_QUANTITIES)}, pump1_ and so on "
+            f"with {', '.join(PUMP_QUANTITIES)}, or {COVARIATE_PREFIX} with a name such as rain_mm_h"
         )
     is_flag = name.endswith("_running")
     if signal.true and not is_flag:

@@ -18,6 +18,7 @@ from wetwell.sim2real.truth.deviations import DEVIATIONS, LIBRARY, OPEN
 from wetwell.sim2real.truth.sampling import case_of, faulty_case_of, inflow_of, station_of
 from wetwell.sim2real.truth.telemetry import Channel, transmitted
 from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.effects import LIBRARY as SEARCHED
 
 FOLDER = Path(truth_plant.__file__).parent
 STEADY = TrueInflow(mean_m3h=90.0, swing=0.0, noise=0.0, rain_per_day=0.0)
@@ -99,9 +100,9 @@ def test_no_module_of_the_truth_imports_the_simulator():
 
 
 def test_the_truth_has_every_effect_of_the_library_and_open_ones_beside():
-    assert set(LIBRARY) == set(EFFECTS)
+    assert set(LIBRARY) == set(SEARCHED)
     assert {name: DEVIATIONS[name].component for name in LIBRARY} == {
-        name: effect.component for name, effect in EFFECTS.items()
+        name: EFFECTS[name].component for name in SEARCHED
     }
     assert len(OPEN) >= 6
     assert not set(OPEN) & set(EFFECTS)

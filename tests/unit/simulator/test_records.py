@@ -10,7 +10,7 @@ from wetwell.simulator.records import NUMBERS, records_of
 from wetwell.simulator.state import ChannelState, PumpState, StationState
 from wetwell.simulator.wet_well import ProfileSlice
 
-OTHERWISE = {"profile", "mains", "pumps", "start_levels_m", "stop_levels_m", "sensors"}
+OTHERWISE = {"profile", "mains", "pumps", "start_levels_m", "stop_levels_m", "sensors", "corrections", "columns"}
 """Fields of the parameters that the kernel gets as arrays of their own."""
 
 

@@ -1,0 +1,1 @@
+"""Learnt corrections: what they are made of, and how they act in the plant."""

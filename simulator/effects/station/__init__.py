@@ -1,0 +1,1 @@
+"""Effects that may lie in any part of the station."""

@@ -1,0 +1,146 @@
+"""What a diagnosis has learnt and nobody has named yet."""
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from wetwell.simulator.corrections.parts import (
+    ALL,
+    COVARIATES,
+    HEAD_READING,
+    LEVEL_BALANCE,
+    SHAPES,
+    STATIC_HEAD,
+    TERMS,
+    CorrectionPart,
+    Term,
+)
+from wetwell.simulator.effects.effect import Component, Effect, MainNumber, PumpNumber, limits
+from wetwell.simulator.effects.station.correction_part import PartTable
+from wetwell.simulator.hydraulics import pump_head_m
+from wetwell.simulator.parameters import PlantParameters
+
+LEAST_LEFT = 0.05
+"""Share of a term that a correction has to leave of it. [1]"""
+COMPONENT_OF: dict[Term, Component] = {
+    "head_loss": "rising_main",
+    "static_head": "rising_main",
+    "pump_head": "pump",
+    "speed": "drive",
+    "flow_reading": "flow_meter",
+    "head_reading": "head_sensor",
+    "power": "drive",
+    "level_balance": "sump",
+    "level_reading": "level_sensor",
+}
+"""Where the cause of a correction lies."""
+
+
+class LearntCorrection(Effect):
+    r"""One term of the model goes with what its addends say, and no effect of the library has a name for it.
+
+    $$X \leftarrow X + X_r\,c \quad (\text{readings of flow, power, losses, pump head, speed: } X_r = X), \qquad
+    c = c_0 + \sum_k a_k\, \phi_k\!\left(\frac{x_k - x_{0k}}{s_k}\right)$$
+
+    with the reference $X_r$: the rated head for static head and reading of the head, the rated flow for the balance
+    of the level, 1 m for its reading. Shapes φ: z, z², cos 2πz, exp(−z), ln(1 + z), and the step [z >= 0].
+
+    Parameters
+    ----------
+    term : str
+        X.
+    offset : float
+        c_0; 0 is none. [1]
+    part : sequence of tables
+        At most three: `covariate` (x; `column` names one of a user), `shape` (φ), `size` (a), `centre` (x_0), `scale`
+        (s), and the range from `low` to `high` in which it is known.
+    pump : int
+        Of a term that each pump has; 0 for all.
+    main : int
+        Of a loss or a static head; 0 for all.
+
+    References
+    ----------
+    .. [1] M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001: a discrepancy as part
+       of the model.
+    """
+
+    component: ClassVar[Component] = "station"
+    neutral: ClassVar[dict[str, float]] = {"offset": 0.0}
+    is_learnt: ClassVar[bool] = True
+
+    name: Literal["learnt_correction"] = "learnt_correction"
+    term: Term
+    offset: Annotated[float, limits(-0.9, 4.0, "1")] = 0.0
+    part: Annotated[tuple[PartTable, ...], Field(max_length=3)] = ()
+    pump: PumpNumber = 0
+    main: MainNumber = 0
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest c, as if all addends could be so at once."""
+        lows, highs = zip(*(part.bounds for part in self.part), strict=True) if self.part else ((), ())
+        return self.offset + sum(lows), self.offset + sum(highs)
+
+    def reference(self, parameters: PlantParameters) -> float:
+        """X_r in the unit of the term; 1 where c is a share of the term itself. [m, m³/h, 1]."""
+        term = TERMS.index(self.term)
+        if term in {STATIC_HEAD, HEAD_READING}:
+            heads_m = [pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) for pump in parameters.pumps]
+            return max(heads_m)
+        return max(pump.rated_flow_m3h for pump in parameters.pumps) if term == LEVEL_BALANCE else 1.0
+
+    def modify(self, parameters: PlantParameters) -> PlantParameters:
+        """Add the addends.
+
+        Raises
+        ------
+        ValueError
+            If they would leave nothing of a flow or a head, or name a pump or a main that the term does not have.
+        """
+        term = TERMS.index(self.term)
+        of_station, of_pipe = term >= LEVEL_BALANCE, term <= STATIC_HEAD
+        for key, number, fits in (("pump", self.pump, not (of_station or of_pipe)), ("main", self.main, of_pipe)):
+            if number and not fits:
+                raise ValueError(f"learnt_correction.{key}: got {number}, term '{self.term}' has no {key} of its own")
+        low, high = self.bounds
+        if not of_station and term != STATIC_HEAD and 1.0 + low < LEAST_LEFT:
+            raise ValueError(
+                f"learnt_correction: {self.term} would fall to {1.0 + low:.3g} of itself, must keep {LEAST_LEFT:g}"
+            )
+        size = self.reference(parameters)
+        if term == STATIC_HEAD:
+            _check_lift(parameters, high * size)
+        columns = list(parameters.columns)
+        columns += dict.fromkeys(part.column for part in self.part if part.column and part.column not in columns)
+        place = {"pump": self.pump - 1 if self.pump else ALL, "main": self.main - 1 if self.main else ALL}
+        added = [CorrectionPart(term=term, size=size * self.offset, **place)] if self.offset else []
+        for part in self.part:
+            known_low, known_high = part.known
+            added.append(
+                CorrectionPart(
+                    term=term,
+                    covariate=COVARIATES.index(part.covariate),
+                    shape=SHAPES.index(part.shape),
+                    column=columns.index(part.column) if part.column else 0,
+                    size=size * part.size,
+                    centre=part.centre,
+                    scale=part.scale,
+                    low=known_low,
+                    high=known_high,
+                    **place,
+                )
+            )
+        return replace(parameters, corrections=(*parameters.corrections, *added), columns=tuple(columns))
+
+
+def _check_lift(parameters: PlantParameters, rise_m: float) -> None:
+    """Refuse a static head that no pump lifts."""
+    for number, pump in enumerate(parameters.pumps, start=1):
+        lift_m = parameters.mains[pump.main].static_head_at_m(parameters.rated_level_m) + rise_m
+        if pump.is_automatic and pump.c0 <= lift_m:
+            raise ValueError(
+                f"learnt_correction: static_head would rise to {lift_m:.3g} m, pump {number} lifts {pump.c0:.3g} m: "
+                "no water would flow"
+            )
