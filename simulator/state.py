@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.simulator.corrections.parts import COVARIATES, TERMS
+from wetwell.simulator.corrections.parts import TERMS
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import channels
@@ -74,9 +74,9 @@ class PlantState(NamedTuple):
 
     The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
     now and before a step, and their means over the second. `correction` (terms, pumps) is what learnt corrections add
-    to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past` (channels, m) and
-    `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the order of their
-    starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first.
+    to each term, 0 without any. `past` (channels, m) and `level_history` (m,) are rings of the last seconds.
+    `started` holds the commanded pumps in the order of their starts; `recent_starts` (pumps, k) the seconds of the
+    last starts of each, the newest first.
     """
 
     station: Records[StationState]
@@ -88,7 +88,6 @@ class PlantState(NamedTuple):
     flow_before_m3h: Floats
     mean_flow_m3h: Floats
     correction: Floats
-    covariates: Floats
     past: Floats
     level_history: Floats
     started: Integers
@@ -118,7 +117,6 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         flow_before_m3h=np.zeros(pumps),
         mean_flow_m3h=np.zeros(pumps),
         correction=np.zeros((len(TERMS), pumps)),
-        covariates=np.zeros(len(COVARIATES)),
         past=np.full((channels(pumps), PAST_S), np.nan),
         level_history=np.full(PAST_S, np.nan),
         started=np.zeros(pumps, dtype=np.int64),

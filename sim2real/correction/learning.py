@@ -1,0 +1,264 @@
+"""Learn a correction: terms screened by their slopes, the best ones tried and refined in the simulator itself."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.correction.bin_covariates import Place, bin_covariates
+from wetwell.sim2real.correction.dictionary import Atom, dictionary, near
+from wetwell.sim2real.correction.selection import PROPOSED, SIZE_PRIOR, Gram, Proposal, proposals
+from wetwell.sim2real.likelihood.cells import Cells
+from wetwell.sim2real.likelihood.posterior import TEMPER
+from wetwell.sim2real.recording.regimes import IDLE
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss
+from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.corrections.parts import TERMS, Term
+from wetwell.simulator.effects.effect import Effect
+from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
+
+PROBE = 0.01
+"""Correction by which the slopes of a term are found. [1]"""
+ROUNDS = 3
+"""Refinements of a proposal in the simulator."""
+LOOKS = 2
+"""Looks at all terms after the first, each without what the one before has shown to be far off."""
+BLOCKS = 6
+"""Parts of time, each of which is predicted by sizes that the others give."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learnt:
+    """A correction with what speaks for it.
+
+    Attributes
+    ----------
+    effect : LearntCorrection
+    atoms : tuple of Atom
+        What its addends are made of, in their order.
+    sizes : (columns,) array
+        Offset, then those of the columns of each atom. [1]
+    covariance : (columns, columns) array
+    log : float
+        Logarithm of its probability over that of no correction.
+    after : (bins,) array
+        Residuals under it, as `asinh_loss` makes them, each with sizes that other parts of the time gave.
+    beside : tuple of Effect
+        Effects of the library that it acts beside.
+    covariates : mapping of (bins,) arrays
+        What the terms were held against.
+    left_out : mapping of str to str
+        Columns of a user that say nothing, and why.
+    """
+
+    effect: LearntCorrection
+    atoms: tuple[Atom, ...]
+    sizes: Floats
+    covariance: Floats
+    log: float
+    before: Floats
+    after: Floats
+    beside: tuple[Effect, ...]
+    covariates: dict[Place, Floats]
+    left_out: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Tried:
+    """A proposal in the simulator: residuals and their slopes (bins, columns) at its sizes."""
+
+    proposal: Proposal
+    residuals: Floats
+    slopes: Floats
+    gram: Gram
+
+
+class Workshop:
+    """A recording, a station and effects beside which corrections are tried."""
+
+    def __init__(
+        self, replay: Replay, residuals: StationResiduals, cells: Cells, beside: Sequence[Effect] = ()
+    ) -> None:
+        self._replay, self._residuals, self._cells = replay, residuals, cells
+        self.beside = tuple(beside)
+        self.plain = residuals.of(replay.run(self.beside))
+        self.nothing = Gram(cells, cells.means(asinh_loss(self.plain)), np.zeros((cells.counts.size, 0))).nothing
+
+    @property
+    def bins(self) -> Bins:
+        """Bins of the residuals."""
+        return self._residuals.bins
+
+    def under(self, effect: Effect) -> Floats:
+        """(bins,) residuals under one more effect.
+
+        Raises
+        ------
+        ValueError
+            If it does not fit the station.
+        """
+        return self._residuals.of(self._replay.run([*self.beside, effect]))
+
+    def sensitivities(self) -> dict[Term, Floats]:
+        """(bins,) slope of the residuals over a constant correction of each term that they see."""
+        slopes = {
+            term: (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE for term in TERMS
+        }
+        return {term: slope for term, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
+
+    def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
+        r"""The best proposal of each of the best terms, the most probable first.
+
+        Residuals far off count less: after each look they are replaced by what a fit under the loss would see,
+        $z - z_1 + 5 \operatorname{asinh}(z_1 / 5)$, with $z_1$ those under the best proposal.
+
+        References
+        ----------
+        .. [1] P. J. Huber, Robust Statistics, 1981, section 7.8: pseudo-observations.
+        """
+        slopes, seen = self.sensitivities(), self.plain
+        found = proposals(self._cells, seen, atoms, slopes)
+        for _ in range(LOOKS):
+            best = found[0]
+            columns = np.column_stack([np.ones(seen.size), *(atom.columns for atom in best.atoms)])
+            after = self.plain + slopes[best.term] * (columns @ best.sizes)
+            seen = self.plain - after + asinh_loss(after)
+            likely = dict.fromkeys([one.term for one in found])
+            found = proposals(self._cells, seen, atoms, {term: slopes[term] for term in list(likely)[:PROPOSED]})
+        finer: list[Proposal] = []
+        for term in dict.fromkeys(one.term for one in found):
+            best = next(one for one in found if one.term == term)
+            around = [other for atom in best.atoms for other in near(atom, covariates[atom.place])]
+            finer += proposals(self._cells, seen, around, {term: slopes[term]})
+        return sorted(finer, key=lambda one: -one.log)
+
+    def tried(self, proposal: Proposal) -> _Tried | None:
+        """A proposal refined in the simulator; None where no station works with it, or none of it matters."""
+        found: _Tried | None = None
+        for _ in range(ROUNDS):
+            try:
+                found = self._at(proposal)
+            except ValueError:
+                break
+            _, sizes = found.gram.gain(range(proposal.sizes.size), proposal.sizes)
+            proposal = replace(proposal, sizes=sizes)
+        if found is None:
+            return None
+        kept = self._material(found)
+        if not kept.atoms and not self._matters(found.slopes[:, :1] @ found.proposal.sizes[:1]):
+            return None
+        return found if len(kept.atoms) == len(found.proposal.atoms) else self.tried(kept)
+
+    def _matters(self, signature: Floats) -> bool:
+        """Whether a change of the residuals is more than what is material, in some group."""
+        cells = self._cells
+        squares = cells.group_sums(cells.means(signature) ** 2) / np.bincount(cells.group)
+        return bool(np.any(squares > cells.group_material**2))
+
+    def _material(self, found: _Tried) -> Proposal:
+        """The proposal without addends that matter nowhere."""
+        whole = found.proposal
+        ends = np.cumsum([1, *(atom.columns.shape[1] for atom in whole.atoms)])
+        columns = list(pairwise(ends))
+        kept = [
+            number
+            for number, (begin, end) in enumerate(columns)
+            if self._matters(found.slopes[:, begin:end] @ whole.sizes[begin:end])
+        ]
+        sizes = [whole.sizes[:1], *(whole.sizes[slice(*columns[number])] for number in kept)]
+        return replace(whole, atoms=tuple(whole.atoms[number] for number in kept), sizes=np.concatenate(sizes))
+
+    def _at(self, proposal: Proposal) -> _Tried:
+        residuals = self.under(effect_of(proposal))
+        slopes = np.zeros((residuals.size, proposal.sizes.size))
+        for k in range(proposal.sizes.size):
+            sizes = proposal.sizes.copy()
+            sizes[k] += PROBE
+            slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
+        cells = self._cells
+        means = np.array([cells.means(column) for column in slopes.T]).T
+        gram = Gram(cells, cells.means(asinh_loss(residuals)), means)
+        gain, _ = gram.gain(range(proposal.sizes.size), proposal.sizes)
+        log = proposal.prior + TEMPER * (gain - self.nothing)
+        return _Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
+
+    def held_out(self, tried: _Tried) -> Floats:
+        """(bins,) residuals where each part of the time is predicted by sizes that the others gave."""
+        bins = self.bins
+        block = np.minimum(bins.second * BLOCKS // (int(bins.second.max()) + 1), BLOCKS - 1)
+        weight = 1.0 / (1.0 + bins.material**2)
+        start, found = tried.proposal.sizes, tried.residuals.copy()
+        for one in range(BLOCKS):
+            given = block != one
+            slopes = tried.slopes[given]
+            curvature = slopes.T @ (weight[given, None] * slopes) + np.eye(start.size) / SIZE_PRIOR**2
+            pull = slopes.T @ (weight[given] * asinh_loss(tried.residuals[given])) + start / SIZE_PRIOR**2
+            found[~given] -= tried.slopes[~given] @ np.linalg.solve(curvature, pull)
+        return found
+
+
+def _first_of_each(found: Sequence[Proposal]) -> list[list[Proposal]]:
+    """Proposals of each term, in their order."""
+    return [[one for one in found if one.term == term] for term in dict.fromkeys(one.term for one in found)]
+
+
+def effect_of(proposal: Proposal) -> LearntCorrection:
+    """Effect of a proposal.
+
+    Raises
+    ------
+    ValueError
+        If its sizes are beyond what an effect may have; pydantic's.
+    """
+    ends = np.cumsum([1, *(atom.columns.shape[1] for atom in proposal.atoms)])
+    parts = [
+        atom.part(sizes) for atom, sizes in zip(proposal.atoms, np.split(proposal.sizes, ends)[1:-1], strict=True)
+    ]
+    return LearntCorrection(term=proposal.term, offset=float(proposal.sizes[0]), part=tuple(parts))
+
+
+def learn(
+    replay: Replay, residuals: StationResiduals, cells: Cells, besides: Sequence[Sequence[Effect]] = ((),)
+) -> Learnt | None:
+    """The most probable correction; None where nothing is more probable without any.
+
+    Parameters
+    ----------
+    replay : Replay
+    residuals : StationResiduals
+    cells : Cells
+        Of their bins.
+    besides : sequence of sequence of Effect
+        Sets of effects of the library beside which a correction is looked for.
+    """
+    best: tuple[_Tried, Workshop] | None = None
+    prediction = replay.run()
+    bins = residuals.bins
+    flow_m3h = replay.readings(())[0]
+    covariates = bin_covariates(replay.traces, bins, prediction.plant, prediction.level_m, flow_m3h)
+    atoms, left_out = dictionary(covariates, bins.regime != IDLE)
+    for beside in besides:
+        shop = Workshop(replay, residuals, cells, beside)
+        for proposal in _first_of_each(shop.proposals(atoms, covariates)):
+            tried = next((one for one in map(shop.tried, proposal) if one is not None), None)
+            if tried is not None and tried.proposal.log > (0.0 if best is None else best[0].proposal.log):
+                best = tried, shop
+    if best is None:
+        return None
+    tried, shop = best
+    return Learnt(
+        effect=effect_of(tried.proposal),
+        atoms=tried.proposal.atoms,
+        sizes=tried.proposal.sizes,
+        covariance=tried.gram.covariance(range(tried.proposal.sizes.size)),
+        log=tried.proposal.log,
+        before=asinh_loss(shop.plain),
+        after=asinh_loss(shop.held_out(tried)),
+        beside=shop.beside,
+        covariates=covariates,
+        left_out=left_out,
+    )
