@@ -21,6 +21,7 @@ class Scenario(Table):
     Parameters
     ----------
     name : str
+        What people and logs call it.
     description : str
         One line for people.
     duration_s : float
@@ -29,12 +30,13 @@ class Scenario(Table):
         Time of the first sample. Without it a live run at the speed of life starts now, every other at
         `DEFAULT_START_NS`.
     initial_level_m : float
-        [m]
+        In the wet well at the beginning. [m]
     clock_speed : float
         Seconds of the station in a second on the wall, where none is asked for. [1]
     inflow : one of the inflow models
+        What comes to the wet well.
     fault : sequence of faults
-        Any number at once.
+        What goes wrong; any number at once.
     """
 
     name: Annotated[str, Field(pattern=NAME_PATTERN)]

@@ -1,13 +1,13 @@
 """Reference pages made from the code: commands, settings, messages, registers, effects, faults, inflow models."""
 
 import importlib
-import json
 import pkgutil
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal, get_args, get_origin
 
 import names
 import python_api
+import schemas
 import typer
 
 import wetwell.protocols.messages
@@ -15,6 +15,7 @@ from wetwell.protocols.messages.message import Message
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.cli import app
 from wetwell.services.reports.part_tables import part_table
+from wetwell.services.schemas.described import described_schema
 from wetwell.simulator.effects import effect_table
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.inflow import INFLOWS
@@ -67,25 +68,11 @@ def _default(option: Any) -> str:
     return f"`{option.default}`" if is_plain else ""
 
 
-def _summary(model: Any) -> str:
-    return (model.__doc__ or "").split("Attributes\n")[0].strip()
-
-
-def _rule(schema: dict[str, Any]) -> str:
-    words = {name: value for name, value in schema.items() if name not in {"default", "title", "description"}}
-    return f"`{json.dumps(words)}`" if words else ""
-
-
 def _messages() -> str:
     text = ["# Messages", "", "JSON on the bus. A key that is not listed is ignored; a new one has a default.", ""]
     for model in _message_models():
-        schema = model.model_json_schema(mode="serialization")
-        text += [f"## {model.__name__}", "", _summary(model), ""]
-        rows = [
-            (f"`{name}`", "yes" if name in schema.get("required", ()) else "", _rule(rule))
-            for name, rule in schema["properties"].items()
-        ]
-        text += [_table(("key", "always there", "form"), rows)]
+        schema = described_schema(model, mode="serialization")
+        text += [f"## {model.__name__}", "", schema["description"], "", schemas.key_table(schema, schema)]
     return "\n".join(text)
 
 

@@ -1,23 +1,12 @@
 """Reference pages of files and messages, made from their JSON Schemas: keys with type, unit, rule and example."""
 
 import json
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
+from wetwell.services.schemas.described import tables_of
 from wetwell.services.schemas.registry import SCHEMAS, schema_named
 
-ROOT = Path(__file__).parents[2]
-EXAMPLES = {
-    "station": ("simulator/stations/alpha.toml", "simulator/stations/twin.toml", "docs/add-a-station.md"),
-    "scenario": ("simulator/scenarios/demo.toml", "simulator/scenarios/paper.toml"),
-    "mapping": ("docs/convert.md",),
-    "preparation": ("docs/field-data.md",),
-    "plc": ("services/gateway/example.toml",),
-}
-"""Files of the repository, or pages with TOML blocks, in which the examples of the keys stand."""
 LIMITS = {
     "minimum": "≥ {}",
     "exclusiveMinimum": "> {}",
@@ -49,53 +38,47 @@ def _page(name: str, words: str, schema: dict[str, Any]) -> Iterator[str]:
     yield f"# Keys: {words}\n"
     yield "Made from the model that checks it."
     yield f"For editors: [{name}.json](schemas/{name}.json), or `wetwell schema {name}`.\n"
-    for place, table, examples in _tables(schema, _examples(name)):
+    for place, table in _tables(schema):
         yield f"## {place}\n"
         yield f"{table.get('description', '')}\n"
-        rows = [
-            _row(key, rule, schema, key in table.get("required", ()), [one[key] for one in examples if key in one])
-            for key, rule in {**table.get("properties", {}), **table.get("patternProperties", {})}.items()
-        ]
-        yield "\n".join(_line(cells) for cells in (HEAD, ("---",) * len(HEAD), *rows)) + "\n"
+        yield key_table(schema, table)
 
 
-def _tables(
-    schema: dict[str, Any], examples: list[dict[str, Any]]
-) -> Iterator[tuple[str, dict[str, Any], list[dict[str, Any]]]]:
-    """Place, rules and examples of the file itself and of each table in it, once each."""
-    waiting, seen = [("The file", schema, examples)], set[str]()
+def key_table(schema: dict[str, Any], table: dict[str, Any]) -> str:
+    """Markdown table of the keys of one table of a schema."""
+    rows = [
+        _row(key, rule, schema, key in table.get("required", ()))
+        for key, rule in {**table.get("properties", {}), **table.get("patternProperties", {})}.items()
+    ]
+    return "\n".join(_line(cells) for cells in (HEAD, ("---",) * len(HEAD), *rows)) + "\n"
+
+
+def _tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Place and rules of the file itself and of each table in it, once each."""
+    waiting, seen = [("", "The file", schema)], set[str]()
     while waiting:
-        place, table, known = waiting.pop(0)
-        yield place, table, known
+        path, heading, table = waiting.pop(0)
+        yield heading, table
         for key, rule in table.get("properties", {}).items():
-            for name, is_list in _references(rule):
-                if name not in seen and "properties" in schema["$defs"][name]:
-                    seen.add(name)
-                    inside = [part for one in known if key in one for part in _tables_in(one[key])]
-                    path = key if place == "The file" else f"{place.strip('`[]')}.{key}"
-                    waiting.append((f"`[[{path}]]`" if is_list else f"`[{path}]`", schema["$defs"][name], inside))
+            for inner in tables_of(schema, rule):
+                if inner["title"] not in seen:
+                    seen.add(inner["title"])
+                    place = f"{path}.{key}".lstrip(".") + (".NAME" if "additionalProperties" in rule else "")
+                    waiting.append((place, _heading(place, rule, inner), inner))
 
 
-def _references(rule: Mapping[str, Any], is_list: bool = False) -> Iterator[tuple[str, bool]]:
-    if "$ref" in rule:
-        yield rule["$ref"].rpartition("/")[2], is_list
-    for inner in (*rule.get("anyOf", ()), *rule.get("allOf", ()), *rule.get("oneOf", ())):
-        yield from _references(inner, is_list)
-    if isinstance(rule.get("items"), dict):
-        yield from _references(rule["items"], is_list=True)
+def _heading(place: str, rule: Mapping[str, Any], table: Mapping[str, Any]) -> str:
+    is_list = rule.get("type") == "array" or any(one.get("type") == "array" for one in rule.get("anyOf", ()))
+    fixed = [f' {key} = "{one["const"]}"' for key, one in table["properties"].items() if "const" in one]
+    return f"`[[{place}]]{''.join(fixed)}`" if is_list else f"`[{place}]{''.join(fixed)}`"
 
 
-def _tables_in(value: Any) -> list[dict[str, Any]]:
-    return [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, dict)]
-
-
-def _row(key: str, rule: dict[str, Any], schema: dict[str, Any], is_needed: bool, examples: list[Any]) -> Row:
+def _row(key: str, rule: dict[str, Any], schema: dict[str, Any], is_needed: bool) -> Row:
     kinds, rules = _told(rule, schema)
     has_default = rule.get("default") is not None and "table" not in kinds
     default = "must be given" if is_needed else _value(rule["default"]) if has_default else ""
-    example = next((_value(one) for one in examples if not _tables_in(one)), "")
-    cells = (f"`{key}`", kinds, rule.get("unit", ""), default, rules, example or (default if "`" in default else ""))
-    return (*cells, rule.get("description", ""))
+    example = _value(rule["examples"][0]) if "examples" in rule else default if "`" in default else ""
+    return f"`{key}`", kinds, rule.get("unit", ""), default, rules, example, rule.get("description", "")
 
 
 def _told(rule: Mapping[str, Any], schema: dict[str, Any]) -> tuple[str, str]:
@@ -112,30 +95,19 @@ def _told(rule: Mapping[str, Any], schema: dict[str, Any]) -> tuple[str, str]:
     kind = rule.get("type", "any")
     kind = " or ".join(one for one in kind if one != "null") if isinstance(kind, list) else kind
     limits = [words.format(rule[limit]) for limit, words in LIMITS.items() if limit in rule]
-    if kind == "array":
-        if inner := rule.get("prefixItems"):
-            return f"list of {len(inner)}: " + ", ".join(_told(one, schema)[0] for one in inner), ""
+    if kind == "array" and (inner := rule.get("prefixItems")):
+        kind = f"list of {len(inner)}: " + ", ".join(_told(one, schema)[0] for one in inner)
+    elif kind == "array":
         inside, inside_rule = _told(rule.get("items", {}), schema)
-        return f"list of {inside}", "; ".join([*limits, inside_rule]).strip("; ")
-    return {"string": "text", "object": "table"}.get(kind, kind), "; ".join(limits)
+        kind, limits = f"list of {inside}", [*limits, inside_rule]
+    elif kind == "object" and isinstance(rule.get("additionalProperties"), dict):
+        kind = f"{_told(rule['additionalProperties'], schema)[0]} by name"
+    return {"string": "text", "object": "table"}.get(kind, kind), "; ".join(filter(None, limits))
 
 
 def _value(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
     return f"`{text if len(text) <= 60 else text[:57] + '...'}`"
-
-
-def _examples(name: str) -> list[dict[str, Any]]:
-    found = []
-    for place in EXAMPLES.get(name, ()):
-        text = (ROOT / place).read_text(encoding="utf-8")
-        blocks = re.findall(r"^```toml\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
-        for block in blocks if place.endswith(".md") else [text]:
-            try:
-                found.append(tomllib.loads(block))
-            except tomllib.TOMLDecodeError:
-                continue  # a block that shows a part of a file
-    return found
 
 
 def _line(cells: Row) -> str:

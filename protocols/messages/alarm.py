@@ -55,10 +55,44 @@ RuleName = Literal[
 
 
 class Alarm(Message):
-    """An alarm after its last change. `id` names the condition, such as `pump2.pump_fault`, and stays the same.
+    """An alarm after its last change.
 
-    `asset`, `stage`, `severity` and `trend` are those of the fault, where it is one; times but `until` are those of
-    the station.
+    Parameters
+    ----------
+    id : str
+        Names the condition, such as `pump2.pump_fault`, and stays the same.
+    time : stamp
+        Of the last change, in the time of the station.
+    pump : int, optional
+        Which one, counted from 1; none for an alarm of the station.
+    asset : str, optional
+        What is at fault: `pump:2`, `main`, `main:line 1` or `sensor:pump2_flow_m3h`.
+    stage : str, optional
+        What to do: keep an eye on it (`watch`), plan a visit (`plan`), go (`act`).
+    severity : Severity, optional
+        How bad the fault is.
+    trend : Trend, optional
+        How it grows.
+    priority : str
+        How soon somebody has to act; an advisory calls nobody.
+    state : str
+        After ISA-18.2: normal (A), unacknowledged (B), acknowledged (C), returned to normal unacknowledged (D),
+        latched unacknowledged (E), latched acknowledged (F), shelved (G), suppressed by design (H), out of
+        service (I).
+    is_active : bool
+        Whether the condition holds now.
+    text : str
+        What is the matter, for people.
+    advice : str
+        What to do.
+    raised, returned, acknowledged : stamp, optional
+        When the condition last came, last went, and was last acknowledged, in the time of the station.
+    by : str, optional
+        Who acted last.
+    until : stamp, optional
+        When a shelved alarm comes back, on the wall clock.
+    reason : str
+        What was said at the last act, or why it is suppressed.
     """
 
     schema_name: Literal["wetwell.alarm/1"] = Field("wetwell.alarm/1", alias="schema")
@@ -84,9 +118,24 @@ class Alarm(Message):
 
 
 class AlarmAct(Message):
-    """What an operator does to an alarm. `id` makes it safe to ask twice; `minutes` is for how long it is shelved.
+    """What an operator does to an alarm.
 
     Of the alarm "station" it is an act on the mode of the station: under maintenance, stopped, or neither again.
+
+    Parameters
+    ----------
+    id : str
+        Of the act; makes it safe to ask twice.
+    alarm : str
+        `id` of the alarm, or "station".
+    act : str
+        What is done.
+    by : str
+        Who does it.
+    minutes : float, optional
+        For how long it is shelved. [min]
+    reason : str
+        Why, for the audit.
     """
 
     schema_name: Literal["wetwell.alarm-act/1"] = Field("wetwell.alarm-act/1", alias="schema")
@@ -108,7 +157,19 @@ class AlarmAct(Message):
 
 
 class AlarmAnswer(Message):
-    """What came of an act: the alarm as it is now, or why nothing was done."""
+    """What came of an act.
+
+    Parameters
+    ----------
+    id : str
+        Of the act.
+    is_done : bool
+        Whether it was done.
+    reason : str
+        Why nothing was done.
+    alarm : Alarm, optional
+        As it is now.
+    """
 
     schema_name: Literal["wetwell.alarm-answer/1"] = Field("wetwell.alarm-answer/1", alias="schema")
     id: str
@@ -118,7 +179,17 @@ class AlarmAnswer(Message):
 
 
 class AlarmFigure(Message):
-    """An alarm on a list: how often it changed within the hour, or since when it stands."""
+    """An alarm on a list.
+
+    Parameters
+    ----------
+    alarm : str
+        `id` of the alarm.
+    transitions : int, optional
+        Changes within the last hour, on the list of those that chatter.
+    raised : stamp, optional
+        Since when it stands, on the list of those that stand long.
+    """
 
     station: str
     alarm: str
@@ -129,8 +200,17 @@ class AlarmFigure(Message):
 class AlarmReport(Message):
     """How well the alarms of a site serve its operators. `rates` on the wall clock, lists in the stations' time.
 
-    `rates`: `alarms_10min`, `alarms_hour`, `alarms_day` (calls in the last ten minutes, hour and day), `peak_10min`
-    (most in any ten minutes of the last day), `flood_share` (of the day's ten minutes), `is_flood`.
+    Parameters
+    ----------
+    rates : dict
+        `alarms_10min`, `alarms_hour`, `alarms_day` (calls in the last ten minutes, hour and day), `peak_10min` (most
+        in any ten minutes of the last day), `flood_share` (of the day's ten minutes), `is_flood`.
+    standing : dict
+        How many alarms are in each state.
+    chattering : list of AlarmFigure
+        Alarms that come and go, the worst first.
+    stale : list of AlarmFigure
+        Alarms that stand long, the oldest first.
     """
 
     schema_name: Literal["wetwell.alarm-report/1"] = Field("wetwell.alarm-report/1", alias="schema")

@@ -19,9 +19,22 @@ NOTHING = "nothing"
 
 
 class MaintenanceAct(Message):
-    """An act of a crew. `id` makes it safe to enter twice; `time` is when it was done, None: just now.
+    """An act of a crew.
 
-    `found` is what the crew saw, "nothing" if all was well, empty if nobody looked.
+    Parameters
+    ----------
+    id : str
+        Makes it safe to enter the act twice.
+    time : stamp, optional
+        When it was done; none: just now.
+    asset : str
+        At what: `pump:2`, `main`, `main:line 1` or `sensor:pump2_flow_m3h`.
+    act : str
+        What was done.
+    found : str
+        What the crew saw, "nothing" if all was well, empty if nobody looked.
+    by : str
+        Who did it.
     """
 
     schema_name: Literal["wetwell.maintenance-act/1"] = Field("wetwell.maintenance-act/1", alias="schema")
@@ -37,7 +50,24 @@ class MaintenanceAct(Message):
 class MaintenanceRecord(Message):
     """An act in the log, with the severity before it and after the runs that followed.
 
-    `refused` says why it is not in the log.
+    Parameters
+    ----------
+    id : str
+        Of the act.
+    asset : str
+        At what: `pump:2`, `main`, `main:line 1` or `sensor:pump2_flow_m3h`.
+    act : str
+        What was done.
+    found : str
+        What the crew saw.
+    by : str
+        Who did it.
+    result : str
+        What the detector saw of it.
+    before, after : Severity, optional
+        How bad the asset was before the act, and is since.
+    refused : str
+        Why it is not in the log.
     """
 
     schema_name: Literal["wetwell.maintenance/1"] = Field("wetwell.maintenance/1", alias="schema")

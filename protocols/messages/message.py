@@ -37,7 +37,17 @@ Number = float | None
 
 
 class Message(BaseModel):
-    """Base of the messages: frozen; further keys from newer senders are ignored."""
+    """Base of the messages: frozen; further keys from newer senders are ignored.
+
+    Parameters
+    ----------
+    schema : str
+        Form of the message and its version.
+    station : str
+        Name of the station, as in its file.
+    time : stamp
+        ISO 8601, UTC, in the time of the station.
+    """
 
     model_config = ConfigDict(frozen=True, extra="ignore", populate_by_name=True, serialize_by_alias=True)
 

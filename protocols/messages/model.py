@@ -8,7 +8,17 @@ from wetwell.protocols.messages.message import Message, Number, Stamp
 
 
 class Curve(Message):
-    """Head over flow at nominal frequency, with the 95 % band of the healthy pump or main."""
+    """Head over flow at nominal frequency, with the 95 % band of the healthy pump or main.
+
+    Parameters
+    ----------
+    flow_m3h : list of float
+        Of each point.
+    head_m : list of float
+        At each flow.
+    low_m, high_m : list of float
+        Lower and upper end of the band at each flow; empty without a band.
+    """
 
     flow_m3h: tuple[float, ...]
     head_m: tuple[Number, ...]
@@ -19,9 +29,22 @@ class Curve(Message):
 class PumpModel(Message):
     """Curves of one pump and of its main: as configured, as learnt when healthy, as the last verdict sees them.
 
-    `name` is what people call it, None where it has its number only, `main` what they call its main. `header` are the
-    pumps on its common header, itself among them; over their total flow goes the system curve. `configured_*` are
-    without a band. `learnt_*` are None until learning has ended, `now_*` until a run was judged.
+    Parameters
+    ----------
+    pump : int
+        Which one, counted from 1.
+    name : str, optional
+        What people call it; none where it has its number only.
+    main : str, optional
+        What people call its main.
+    header : list of int
+        Pumps on its common header, itself among them; over their total flow goes the system curve.
+    configured_pump, configured_system : Curve
+        As the station file says; without a band.
+    learnt_pump, learnt_system : Curve, optional
+        As learnt when healthy; none until learning has ended.
+    now_pump, now_system : Curve, optional
+        As the last verdict sees them; none until a run was judged.
     """
 
     pump: int = Field(ge=1)
@@ -37,9 +60,22 @@ class PumpModel(Message):
 
 
 class Model(Message):
-    """Model of a station, published when it changes.
+    """What the detector takes a station to be, published when it changes.
 
-    `is_common_header`: all its pumps are on one header, and the system curve is over the total flow.
+    Parameters
+    ----------
+    nominal_frequency_hz : float
+        Of the drives.
+    start_levels_m, stop_levels_m : list of float
+        Level at which the n-th pump starts, and at which the n-th running pump stops.
+    floor_area_m2 : float
+        Area of the wet well at its floor.
+    floor_level_m : float
+        Level at which the wet well is empty.
+    is_common_header : bool
+        Whether all pumps are on one header, and the system curve is over the total flow.
+    pumps : list of PumpModel
+        In the order of the station file.
     """
 
     schema_name: Literal["wetwell.model/1"] = Field("wetwell.model/1", alias="schema")

@@ -9,7 +9,19 @@ from wetwell.protocols.station.station_file import Station
 
 
 class Order(Message):
-    """An act of an operator on the detector of a station; the verdict that follows carries its `id` as evidence."""
+    """An act of an operator on the detector of a station; the verdict that follows carries its `id` as evidence.
+
+    Parameters
+    ----------
+    id : str
+        Of the order.
+    pump : int
+        Which one, counted from 1.
+    act : str
+        Learn the healthy pump anew, or go back to what was learnt before.
+    by : str
+        Who orders it.
+    """
 
     schema_name: Literal["wetwell.order/1"] = Field("wetwell.order/1", alias="schema")
     id: str = Field(min_length=1, max_length=64)
@@ -21,7 +33,17 @@ class Order(Message):
 
 
 class Plan(Message):
-    """Stations of a shard; the shard works while `epoch` is its own, and ends when a later one goes elsewhere."""
+    """Stations of a shard; the shard works while `epoch` is its own, and ends when a later one goes elsewhere.
+
+    Parameters
+    ----------
+    shard : int
+        Which one, counted from 0.
+    epoch : int
+        Counts how often the shard has been given to a worker.
+    stations : list of Station
+        Their station files.
+    """
 
     schema_name: Literal["wetwell.plan/1"] = Field("wetwell.plan/1", alias="schema")
     time: Stamp

@@ -13,8 +13,14 @@ Speed = Annotated[float, Field(gt=0.0, le=1e6)]
 class PlantClockOrder(Message):
     """What the clock of a plant is to do; what is left out stays as it is. Without anything it asks how it stands.
 
-    `look_s`: for so long on the wall it runs no faster than `LOOK_SPEED`, then as before; while it stands nothing
-    happens.
+    Parameters
+    ----------
+    speed : float, optional
+        Seconds of the plant in a second on the wall. [1]
+    is_held : bool, optional
+        Whether it stands still.
+    look_s : float
+        For so long on the wall it runs no faster than `LOOK_SPEED`, then as before; nothing while it stands. [s]
     """
 
     schema_name: Literal["wetwell.plant-clock-order/1"] = Field("wetwell.plant-clock-order/1", alias="schema")
@@ -26,7 +32,18 @@ class PlantClockOrder(Message):
 class PlantClock(Message):
     """How the clock of a plant stands: it answers an order.
 
-    `full_speed` is the one that it was started with, and the fastest; `seconds` of the plant have passed.
+    Parameters
+    ----------
+    seconds : int
+        Of the plant that have passed. [s]
+    speed : float
+        Seconds of the plant in a second on the wall. [1]
+    full_speed : float
+        The one that it was started with, and the fastest. [1]
+    is_held : bool
+        Whether it stands still.
+    error : str
+        Why an order was not carried out.
     """
 
     schema_name: Literal["wetwell.plant-clock/1"] = Field("wetwell.plant-clock/1", alias="schema")

@@ -11,7 +11,21 @@ Quality = Literal["good", "uncertain", "bad"]
 
 
 class PumpReading(Message):
-    """What is measured at one pump."""
+    """What is measured at one pump; null is "no value".
+
+    Parameters
+    ----------
+    frequency_hz : float, optional
+        Of the drive.
+    flow_m3h : float, optional
+        What the pump delivers, by its own meter.
+    head_m : float, optional
+        Between suction and pressure side.
+    power_kw : float, optional
+        Electrical power that the drive takes.
+    running : bool, optional
+        Whether it runs.
+    """
 
     frequency_hz: Number = None
     flow_m3h: Number = None
@@ -21,7 +35,21 @@ class PumpReading(Message):
 
 
 class Sample(Message):
-    """What is measured at one station in one second. `seq` counts up by one within a source's life."""
+    """What is measured at one station in one second; null is "no value".
+
+    Parameters
+    ----------
+    seq : int
+        Counts up by one within a source's life.
+    level_m : float, optional
+        In the wet well.
+    inflow_m3h : float, optional
+        To the wet well.
+    pumps : list of PumpReading
+        In the order of the station file.
+    quality : str
+        What the source thinks of the sample, in the words of OPC.
+    """
 
     schema_name: Literal["wetwell.sample/1"] = Field("wetwell.sample/1", alias="schema")
     station: str
@@ -34,7 +62,17 @@ class Sample(Message):
 
 
 class LevelSample(Message):
-    """What a `Sample` says of the wet well: read alone it costs a third."""
+    """What a `Sample` says of the wet well: read alone it costs a third.
+
+    Parameters
+    ----------
+    seq : int
+        Counts up by one within a source's life.
+    level_m : float, optional
+        In the wet well.
+    quality : str
+        What the source thinks of the sample, in the words of OPC.
+    """
 
     schema_name: Literal["wetwell.sample/1"] = Field("wetwell.sample/1", alias="schema")
     station: str

@@ -35,7 +35,21 @@ Numbers = tuple[Number, ...]
 
 
 class PumpBlock(Message):
-    """What is measured at one pump."""
+    """What is measured at one pump, a value a sample; empty where none has one.
+
+    Parameters
+    ----------
+    frequency_hz : list of float
+        Of the drive.
+    flow_m3h : list of float
+        What the pump delivers, by its own meter.
+    head_m : list of float
+        Between suction and pressure side.
+    power_kw : list of float
+        Electrical power that the drive takes.
+    running : list of bool
+        Whether it runs.
+    """
 
     frequency_hz: Numbers = ()
     flow_m3h: Numbers = ()
@@ -48,6 +62,21 @@ class SampleBlock(Message):
     """What is measured at one station at several times, oldest first, all of one quality.
 
     Says the same as so many `Sample`, in a tenth of the messages and half of the bytes.
+
+    Parameters
+    ----------
+    seq : list of int
+        Counting number of each sample.
+    time : list of stamp
+        Of each sample.
+    level_m : list of float
+        In the wet well; empty where no sample has a value.
+    inflow_m3h : list of float
+        To the wet well; empty where no sample has a value.
+    pumps : list of PumpBlock
+        In the order of the station file.
+    quality : str
+        What the source thinks of the samples, in the words of OPC.
     """
 
     schema_name: Literal["wetwell.samples/1"] = Field("wetwell.samples/1", alias="schema")
@@ -127,7 +156,19 @@ class SampleBlock(Message):
 
 
 class LevelBlock(Message):
-    """What a `SampleBlock` says of the wet well."""
+    """What a `SampleBlock` says of the wet well.
+
+    Parameters
+    ----------
+    seq : list of int
+        Counting number of each sample.
+    time : list of stamp
+        Of each sample.
+    level_m : list of float
+        In the wet well; empty where no sample has a value.
+    quality : str
+        What the source thinks of the samples, in the words of OPC.
+    """
 
     schema_name: Literal["wetwell.samples/1"] = Field("wetwell.samples/1", alias="schema")
     station: str

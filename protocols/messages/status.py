@@ -11,7 +11,19 @@ ServiceState = Literal["starting", "running", "waiting", "stopping"]
 
 
 class Status(Message):
-    """Health figures of one service, once in a while; `reason` says what is wrong, for people."""
+    """Health figures of one service, once in a while.
+
+    Parameters
+    ----------
+    service : str
+        Name of the service.
+    state : str
+        How it is; `waiting` means for somebody else, such as a PLC that is away.
+    figures : dict
+        By name, each ending with its unit.
+    reason : str
+        What is wrong, for people.
+    """
 
     schema_name: Literal["wetwell.status/1"] = Field("wetwell.status/1", alias="schema")
     time: Stamp

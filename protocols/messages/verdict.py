@@ -29,7 +29,19 @@ class _Part(BaseModel):
 
 
 class Severity(_Part):
-    """How bad a fault is: a quantity with its unit, its 95 % interval, and the station's action limit."""
+    """How bad a fault is, beside the station's action limit.
+
+    Parameters
+    ----------
+    quantity : str
+        What is told; its name ends with its unit. Of `[limits]` of the station file, such as `friction_rise_percent`.
+    value : float
+        In the unit of the quantity.
+    interval : (float, float)
+        In which the true value lies with 95 %, in the same unit.
+    limit : float
+        Value at which somebody has to act, in the same unit.
+    """
 
     quantity: str
     value: float
@@ -38,10 +50,18 @@ class Severity(_Part):
 
 
 class Trend(_Part):
-    """How a severity grows by the day, with a 95 % interval, and when it reaches the limit.
+    """How a severity grows, and when it reaches the limit.
 
-    `reaches_limit` is None where it does not grow, or has passed the limit. `interval_at` are the earliest and the
-    latest time; None for one that may never come.
+    Parameters
+    ----------
+    per_day : float
+        Growth a day, in the unit of the severity's quantity.
+    interval : (float, float)
+        In which the true growth lies with 95 %.
+    reaches_limit : stamp, optional
+        When the limit is reached; none where the severity does not grow, or has passed it.
+    interval_at : (stamp or none, stamp or none)
+        Earliest and latest time of that with 95 %; none for one that may never come.
     """
 
     per_day: float
@@ -51,7 +71,23 @@ class Trend(_Part):
 
 
 class AssetFault(_Part):
-    """What is wrong with one asset: `pump:2`, `main`, `main:line 1`, `sensor:pump2_flow_m3h`."""
+    """What is wrong with one asset.
+
+    Parameters
+    ----------
+    asset : str
+        `pump:2`, `main`, `main:line 1` or `sensor:pump2_flow_m3h`.
+    stage : str
+        What to do: keep an eye on it (`watch`), plan a visit (`plan`), go (`act`).
+    since : stamp
+        When it began, as far as the detector knows.
+    severity : Severity, optional
+        How bad it is; none where no size can be told.
+    trend : Trend, optional
+        How it grows; none where too little is known.
+    advice : str
+        What a crew should do, in a sentence.
+    """
 
     asset: str = Field(min_length=1, max_length=64)
     stage: Stage
@@ -64,9 +100,33 @@ class AssetFault(_Part):
 class Verdict(Message):
     """What the detector says of one pump after a run, or when its state changes.
 
-    `probability` sums to one over the states that were weighed; `evidence` holds the figures that it rests on;
-    `window` is the time that was judged. `faults` are those of the pump, its main and its meters that stand, the
-    worst first, None where the sender does not tell them; `asset`, `stage`, `severity` and `trend` are of the worst.
+    Parameters
+    ----------
+    time : stamp
+        When it was said, in the time of the station.
+    pump : int
+        Which one, counted from 1.
+    state : str
+        What is different: nothing, the pump, its main ("system"), both, a meter; `learning` until a baseline is
+        known, `unknown` where no cause fits.
+    probability : dict
+        Of each state that was weighed; they sum to 1.
+    evidence : dict
+        The figures that it rests on, by name: docs/detection.md.
+    onset : stamp, optional
+        When the fault began; none without a fault, or where that is not known.
+    window : (stamp, stamp)
+        Beginning and end of the time that was judged.
+    asset : str, optional
+        Asset of the worst fault: `pump:2`, `main`, `main:line 1` or `sensor:pump2_flow_m3h`.
+    stage : str, optional
+        What to do about the worst fault: keep an eye on it (`watch`), plan a visit (`plan`), go (`act`).
+    severity : Severity, optional
+        Of the worst fault.
+    trend : Trend, optional
+        Of the worst fault.
+    faults : list of AssetFault, optional
+        What stands of the pump, its main and its meters, the worst first; none where the sender does not tell it.
     """
 
     schema_name: Literal["wetwell.verdict/1"] = Field("wetwell.verdict/1", alias="schema")

@@ -20,7 +20,17 @@ from wetwell.protocols.station.table import NonNegative, Positive, Table
 
 
 class Tls(Table):
-    """Modbus over TLS: who must have signed the PLC's certificate, and what the gateway shows of itself."""
+    """Modbus over TLS: who must have signed the PLC's certificate, and what the gateway shows of itself. PEM files.
+
+    Attributes
+    ----------
+    ca : Path
+        Authority that must have signed the certificate of the PLC.
+    certificate, key : Path, optional
+        What the gateway shows of itself, where the PLC asks for it.
+    server_name : str, optional
+        Name for which the certificate of the PLC is made, where it is not `host`.
+    """
 
     ca: Path
     certificate: Path | None = None
@@ -43,8 +53,16 @@ class Device(Table):
         Name and number of pumps, where no station file gives them; without either the map tells the number.
     station_file, map : Path, optional
         Files beside this one. A map is a CSV as `wetwell modbus-map` writes it; a `signal` here overrules its rows.
+    host : str
+        Address or name of the PLC.
+    port : int
+        Of the PLC; 502 is the standard one, 802 that with TLS.
+    unit_id : int
+        Of the PLC; a bridge to serial lines tells its devices apart by it.
     period_s : float
         Time from poll to poll. [s]
+    word_order : str
+        Order in which the four bytes of a 32-bit value arrive, A being the highest.
     connect_timeout_s, answer_timeout_s : float
         Time after which a connection, or an answer, is no longer waited for. [s]
     max_gap, max_words : int
@@ -55,6 +73,10 @@ class Device(Table):
         Whose time a sample bears; "plc" needs the signal `time_s`.
     fixed_frequency_hz : float, optional
         Frequency of running pumps that have no drive: for those without a signal of it. [Hz]
+    tls : Tls, optional
+        For a PLC that is reached over TLS.
+    signal : dict of Signal
+        By the column of the recording, such as `pump1_flow_m3h`; also `heartbeat` and `time_s`.
     """
 
     station: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)] | None = None
@@ -89,7 +111,13 @@ class Device(Table):
 
 
 class DeviceFile(Table):
-    """A file of several PLCs."""
+    """A file of several PLCs.
+
+    Attributes
+    ----------
+    plc : list of Device
+        One table a PLC; a file of one PLC may have its keys alone.
+    """
 
     plc: Annotated[tuple[Device, ...], Field(min_length=1)]
 

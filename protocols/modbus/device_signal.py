@@ -39,9 +39,15 @@ class Signal(Table):
     address : int
         From zero.
     type : str
-        "bit" in a table of words needs the number of its `bit`, 0 being the lowest.
+        Form in which it stands there.
+    bit : int, optional
+        Of type "bit" in a table of words: which one, 0 being the lowest.
+    scale, offset : float
+        Of the raw number, before its unit is converted: `scale` in units a count, `offset` in the unit.
     unit : str
-        Of the value after scale and offset.
+        Of the value after scale and offset; empty is the unit of the recording.
+    span : (float, float), optional
+        For unit "%": values at 0 % and at 100 % in the unit of the recording.
     word_order : str, optional
         Of a 32-bit value; default: the PLC's.
     no_value : tuple of int

@@ -37,9 +37,31 @@ def check_levels(start_levels_m: tuple[float, ...], stop_levels_m: tuple[float, 
 class Control(Table):
     """Start and stop by level, with ramps. Fewer levels than pumps: the others stand by in rotation.
 
-    Mode "pid" starts and stops by the same levels, and holds `setpoint_m` by the speed of the running pumps. Mode
-    "external" has no levels: an optimiser or an operator starts and stops the pumps, and nobody knows why.
-    `max_starts_per_hour` is for each pump, 0 sets no limit; `out_of_service` counts pumps from 1.
+    Parameters
+    ----------
+    mode : str
+        "on_off"; "pid" starts and stops by the same levels, and holds `setpoint_m` by the speed of the running pumps;
+        "external" has no levels: an optimiser or an operator starts and stops the pumps, and nobody knows why.
+    start_levels_m, stop_levels_m : list of float
+        Level at which the n-th pump starts, and at which the n-th running pump stops. [m]
+    ramp_s : float
+        Time from 0 Hz to nominal frequency, and back. [s]
+    min_frequency_hz : float
+        Under which a running pump is not driven. [Hz]
+    dwell_s : float
+        How long a pump stays at `min_frequency_hz` before it stops. [s]
+    rotation : str
+        Which pump starts next: the next in order, the first that stands, or the one that ran least.
+    max_starts_per_hour : int
+        Of each pump; 0 sets no limit. [1/h]
+    out_of_service : list of int
+        Pumps that are not started, counted from 1.
+    setpoint_m : float
+        Level that mode "pid" holds. [m]
+    gain_hz_m : float
+        Its proportional gain. [Hz/m]
+    integral_s, derivative_s : float
+        Its integral and derivative time. [s]
     """
 
     mode: Literal["on_off", "pid", "external"] = "on_off"

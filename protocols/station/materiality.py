@@ -6,8 +6,19 @@ from wetwell.protocols.station.table import Positive, Table
 class Materiality(Table):
     """What counts as no difference: a diagnosis names nothing that stays under it, however significant.
 
-    Shares are of the reading, and of half of that at the duty point where it is lower. The share of the flow also
-    stands for the balance of the wet well. `time_s` is how late or early a signal may be while it moves.
+    Parameters
+    ----------
+    flow_share : float
+        Of the reading of the flow, and of half of that at the duty point where it is lower; also for the balance of
+        the wet well. [1]
+    head_share, power_share : float
+        As of the flow. [1]
+    level_m : float
+        Of the level. [m]
+    threshold_m : float
+        Of the level at which a pump starts or stops. [m]
+    time_s : float
+        How late or early a signal may be while it moves. [s]
     """
 
     flow_share: Positive = 0.01

@@ -22,16 +22,16 @@ class Pump(Table):
     main : str, optional
         Name of its rising main; may be left out where there is one.
     curve : (c0, c1, c2), optional
-        [m, m/(m³/h), m/(m³/h)²]
+        H = c0 N² + c1 N Q + c2 Q², with N = 1 at nominal frequency. [m, m/(m³/h), m/(m³/h)²]
     points : sequence of (flow_m3h, head_m), optional
-        Instead of `curve`. [m³/h, m]
+        Instead of `curve`: points of its datasheet. [m³/h, m]
     power_points : sequence of (flow_m3h, power_kw), optional
         Shaft power (P2 of a datasheet) at nominal speed. One point gives the size of the power, two or more also how
         it grows with the flow. [m³/h, kW]
     efficiency_points : sequence of (flow_m3h, share), optional
         Instead of `power_points`: efficiency of the pump without its motor at nominal speed. [m³/h, 1]
     nominal_frequency_hz : float
-        [Hz]
+        Frequency for which the curve is given. [Hz]
     """
 
     name: Label | None = None

@@ -24,7 +24,22 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 class Electrical(Table):
     """Motor and supply of every pump.
 
-    Power model "current" is the paper's: the current follows the frequency; "load": it follows the shaft power.
+    Parameters
+    ----------
+    voltage_v : float
+        Between two phases of the supply. [V]
+    rated_current_a : float
+        That the motor takes at nominal frequency. [A]
+    power_factor : float
+        cos φ. [1]
+    efficiency : float
+        Of the pump without its motor at its rated duty, where the pump has no points of its own. [1]
+    power_model : str
+        "current", the paper's: the current follows the frequency; "load": it follows the shaft power.
+    motor_efficiency, drive_efficiency : float
+        At rated load, in power model "load". [1]
+    shutoff_power_share : float
+        Shaft power at no flow over the rated one, in power model "load". [1]
     """
 
     voltage_v: Positive = 400.0
@@ -40,7 +55,14 @@ class Electrical(Table):
 class Sensors(Table):
     """Standard deviations of the measurements: relative, but for the level in metres.
 
-    `correlation` is that of the noise from one second to the next.
+    Parameters
+    ----------
+    flow_noise, head_noise, power_noise, inflow_noise : float
+        Share of the reading. [1]
+    level_noise_m : float
+        Of the level. [m]
+    correlation : float
+        Of the noise from one second to the next. [1]
     """
 
     flow_noise: NonNegative = 0.01
@@ -52,17 +74,39 @@ class Sensors(Table):
 
 
 class EffectTable(BaseModel):
-    """An effect beyond the plain model: its name, and parameters that the effect itself checks."""
+    """An effect beyond the plain model.
+
+    Parameters
+    ----------
+    name : str
+        Which one; its parameters stand beside it, and the effect itself checks them.
+    """
 
     model_config = ConfigDict(frozen=True, extra="allow")
     name: str
 
 
 class Station(Table):
-    """A pump station. Pumps are in rotation order.
+    """A pump station.
 
     A file has one `[rising_main]` or several `[[main]]`; code asks for `mains`, and for the main of each pump.
-    `name` is its key on the bus and in files; `title` is what people call it.
+
+    Parameters
+    ----------
+    name : str
+        Its key on the bus and in files.
+    title : str, optional
+        What people call it.
+    pump : list of Pump
+        In rotation order.
+    rising_main : RisingMain, optional
+        The only main.
+    main : list of RisingMain, optional
+        Instead of `rising_main`, where there are several; each pump says which is its own.
+    costs : Costs, optional
+        What acts and omissions cost here; without it those of the settings count.
+    effect : list of EffectTable
+        What the plain model leaves out, such as a common header or a slow sensor.
     """
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]

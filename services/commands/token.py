@@ -21,6 +21,9 @@ NameOption = Annotated[str, typer.Option("--name", help="Who holds it; stands in
 def new(
     name: NameOption,
     role: Annotated[Role, typer.Option("--role", help="viewer: may look; operator: may also act.")] = "viewer",
+    days: Annotated[
+        int, typer.Option("--days", min=0, max=3650, metavar="DAYS", help="Days until it ends; 0: it does not end.")
+    ] = 365,
     file: FileOption = None,
     config: ConfigOption = None,
     *,
@@ -30,7 +33,7 @@ def new(
     from wetwell.services.security.tokens import new_token
 
     path = _file(file, config)
-    token = new_token(path, name, role)
+    token = new_token(path, name, role, days)
     if as_json:
         print_result({"name": name, "role": role, "token": token, "file": str(path)}, as_json=True)
     else:
@@ -40,14 +43,17 @@ def new(
 @app.command("list")
 def list_(file: FileOption = None, config: ConfigOption = None, *, as_json: JsonOption = False) -> None:
     """Print who holds a token."""
-    from wetwell.services.security.tokens import read_holders
+    from wetwell.services.security.tokens import read_holders, today
 
     holders = read_holders(_file(file, config))
     if as_json:
-        print_result({"holders": [holder.model_dump(include={"name", "role"}) for holder in holders]}, as_json=True)
+        told = [holder.model_dump(mode="json", exclude={"sha256"}) for holder in holders]
+        print_result({"holders": told}, as_json=True)
     else:
         for holder in holders:
-            typer.echo(f"{holder.name}\t{holder.role}")
+            until = "without end" if holder.until is None else f"until {holder.until}"
+            ended = ", over" if holder.has_ended(today()) else ""
+            typer.echo(f"{holder.name}\t{holder.role}\t{until}{ended}")
 
 
 @app.command()

@@ -20,7 +20,7 @@ from wetwell.protocols.bus.keys import SITE
 from wetwell.services.dashboard.assets import Asset, Assets
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
-from wetwell.services.dashboard.login import Login, holder_in
+from wetwell.services.dashboard.login import Login, holder_in, while_admitted
 from wetwell.services.dashboard.past.client import act_on_alarm, enter_act, history, recording_pieces, set_plant_clock
 from wetwell.services.dashboard.past.journal import bands, is_kept, journal
 from wetwell.services.dashboard.past.trends import trends_text
@@ -28,6 +28,7 @@ from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.dashboard.reports import find_report, report_names
 from wetwell.services.dashboard.view.metrics import StationMetrics
 from wetwell.services.dashboard.view.site_view import SiteView
+from wetwell.services.security.attempts import Attempts
 
 GZIP_BYTES = 1000
 GZIP_LEVEL = 5
@@ -64,7 +65,8 @@ class AppState:
 
 def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
     """Web application over a state, behind a `Guard`."""
-    pages, answers, login = _Pages(app_state), _Answers(app_state), Login(tokens_file)
+    attempts = Attempts()
+    pages, answers, login = _Pages(app_state), _Answers(app_state), Login(tokens_file, attempts)
     shells = ("/", "/alarms", "/reports", "/health")
     return Starlette(
         routes=[
@@ -93,7 +95,7 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
             Route("/api/reports", answers.reports),
             Route("/reports/{name:path}", answers.report),
         ],
-        middleware=[Middleware(Guard, tokens_file=tokens_file, is_local=is_local)],
+        middleware=[Middleware(Guard, tokens_file=tokens_file, attempts=attempts, is_local=is_local)],
         exception_handlers={RefusalError: _refuse},
     )
 
@@ -133,7 +135,7 @@ class _Answers:
 
     async def events(self, request: Request) -> Response:
         return StreamingResponse(
-            self._state.streams.listen(request.query_params.get("station", "")),
+            while_admitted(request, self._state.streams.listen(request.query_params.get("station", ""))),
             media_type="text/event-stream",
             headers={"cache-control": "no-store", "x-accel-buffering": "no"},
         )

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import defaultdict
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 
 QUEUE = 16
 """Events that may wait for a browser."""
@@ -74,7 +74,7 @@ class EventStreams:
         """What somebody looks at."""
         return tuple(self._clients)
 
-    async def listen(self, topic: str) -> AsyncIterator[bytes]:
+    async def listen(self, topic: str) -> AsyncGenerator[bytes]:
         """Events of a topic for one browser, until it goes or all are closed."""
         client = Client()
         if self.is_closed:

@@ -1,6 +1,9 @@
 """What stands before every answer: whose requests are heard, and what a browser may do with the page."""
 
+import logging
+import time
 from collections.abc import Mapping
+from functools import partial
 from http.cookies import SimpleCookie
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -10,8 +13,11 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.services.security.attempts import Attempts
 from wetwell.services.security.exposure import is_loopback
 from wetwell.services.security.tokens import Holder, holder_of
+
+log = logging.getLogger(__name__)
 
 COOKIE = "wetwell_token"
 PAGE_POLICY = (
@@ -32,7 +38,9 @@ _HEADERS = {
     "permissions-policy": "camera=(), geolocation=(), microphone=()",
 }
 _GUARDED = ("/events", "/api/", "/reports/", "/metrics")
-_OPEN = ("/api/login", "/api/who")
+_LOGIN = "/api/login"
+_OPEN = (_LOGIN, "/api/who")
+_NEEDED = (401, "a token is needed")
 
 
 class Guard:
@@ -41,19 +49,23 @@ class Guard:
     Without tokens the page is for this machine: a request by any other host name comes by one that was made to point
     here. With tokens every request for data must bring one, as `Authorization: Bearer` or as the cookie that the
     login sets. An act (anything but GET and HEAD) must be JSON, come from this page itself, and needs an operator.
+    Of an address that has tried too many wrong tokens, no more are heard for a while.
 
     Parameters
     ----------
     app : ASGIApp
     tokens_file : Path, optional
         File of tokens.
+    attempts : Attempts
+        Wrong tokens of each address.
     is_local : bool
         Whether only names of this machine are heard.
     """
 
-    def __init__(self, app: ASGIApp, tokens_file: Path | None, *, is_local: bool) -> None:
+    def __init__(self, app: ASGIApp, tokens_file: Path | None, attempts: Attempts, *, is_local: bool) -> None:
         self._app = app
         self._tokens_file = tokens_file
+        self._attempts = attempts
         self._is_local = is_local
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -74,13 +86,28 @@ class Guard:
 
         refusal = (foreign_name(headers) if self._is_local else None) or foreign_act(scope["method"], headers)
         if refusal is None and self._tokens_file is not None:
-            holder, refusal = self._admitted(scope["method"], path, token_in(headers))
-            scope.setdefault("state", {})["holder"] = holder
+            token = token_in(headers)
+            holder, refusal = self._admitted(scope["method"], path, token)
+            if (
+                holder is None
+                and token
+                and path.startswith(_GUARDED)
+                and path != _LOGIN
+                and refusal in {None, _NEEDED}
+            ):
+                refusal = too_many(self._attempts, scope) or refusal
+            state = scope.setdefault("state", {})
+            state["holder"] = holder
+            state["is_admitted"] = partial(self._is_admitted, path, token)
         if refusal:
             status, reason = refusal
             await JSONResponse({"error": reason}, status)(scope, receive, send_safe)
             return
         await self._app(scope, receive, send_safe)
+
+    def _is_admitted(self, path: str, token: str) -> bool:
+        """Whether who was let in still is: a stream may outlive its token."""
+        return self._admitted("GET", path, token)[1] is None
 
     def _admitted(self, method: str, path: str, token: str) -> tuple[Holder | None, tuple[int, str] | None]:
         """Who asks, and why that is refused, if it is."""
@@ -93,10 +120,20 @@ class Guard:
         if path in _OPEN:
             return holder, None
         if holder is None:
-            return None, (401, "a token is needed")
+            return None, _NEEDED
         if method not in {"GET", "HEAD"} and not holder.may("operator"):
             return holder, (403, f"'{holder.name}' may look, not act")
         return holder, None
+
+
+def too_many(attempts: Attempts, scope: Scope) -> tuple[int, str] | None:
+    """Count a wrong token, and refuse those of its address where there were too many."""
+    address = (scope.get("client") or ("?", 0))[0]
+    wait_s = attempts.note(address, time.monotonic())
+    if not wait_s:
+        log.warning("a wrong token from %s", address)
+        return None
+    return 429, f"too many wrong tokens from {address}: wait {wait_s:.0f} s"
 
 
 def token_in(headers: Mapping[str, str]) -> str:

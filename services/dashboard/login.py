@@ -1,22 +1,32 @@
 """Who looks at the page: a token once, then a cookie that scripts cannot read."""
 
+import contextlib
 import json
+import logging
+import time
+from collections.abc import AsyncGenerator
 from pathlib import Path
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from wetwell.services.dashboard.guard import COOKIE
+from wetwell.services.dashboard.guard import COOKIE, too_many
+from wetwell.services.security.attempts import Attempts
 from wetwell.services.security.tokens import Holder, holder_of
 
+log = logging.getLogger(__name__)
+
 COOKIE_S = 30 * 24 * 3600
+CHECK_S = 10.0
+"""So often an open stream asks whether its token still holds."""
 
 
 class Login:
     """Answers on who asks; without a file of tokens nobody needs one."""
 
-    def __init__(self, tokens_file: Path | None) -> None:
+    def __init__(self, tokens_file: Path | None, attempts: Attempts) -> None:
         self._tokens_file = tokens_file
+        self._attempts = attempts
 
     async def who(self, request: Request) -> Response:
         """Whether a token is needed, and who has brought one."""
@@ -31,8 +41,13 @@ class Login:
         holder = None if self._tokens_file is None else holder_of(self._tokens_file, token)
         answer = JSONResponse(self._told(holder), headers={"cache-control": "no-store"})
         if holder is None:
+            refusal = too_many(self._attempts, request.scope) if token and self._tokens_file else None
+            if refusal is not None:
+                status, reason = refusal
+                return JSONResponse({"error": reason}, status)
             answer.delete_cookie(COOKIE)
         else:
+            log.info("%s has come in as %s", holder.name, holder.role)
             secure = request.url.scheme == "https"
             answer.set_cookie(COOKIE, token, max_age=COOKIE_S, httponly=True, samesite="strict", secure=secure)
         return answer
@@ -49,3 +64,16 @@ def holder_in(request: Request) -> Holder | None:
     """Who asks, as the guard has found; None without tokens."""
     holder: Holder | None = request.scope.get("state", {}).get("holder")
     return holder
+
+
+async def while_admitted(request: Request, stream: AsyncGenerator[bytes]) -> AsyncGenerator[bytes]:
+    """A stream until its end, or until the token that opened it was revoked or has ended."""
+    is_admitted = request.scope.get("state", {}).get("is_admitted")
+    checked_s = time.monotonic()
+    async with contextlib.aclosing(stream):
+        async for data in stream:
+            if is_admitted is not None and time.monotonic() - checked_s >= CHECK_S:
+                checked_s = time.monotonic()
+                if not is_admitted():
+                    return
+            yield data

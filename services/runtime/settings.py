@@ -23,7 +23,19 @@ CONFIG_VARIABLE = "WETWELL_CONFIG"
 
 
 class ZenohTlsSettings(Table):
-    """Certificates of the bus, for endpoints `tls/...`; PEM files."""
+    """Certificates of the bus, for endpoints `tls/...`; PEM files.
+
+    Parameters
+    ----------
+    root_ca : Path, optional
+        Authority that must have signed the certificate of the other side.
+    certificate, private_key : Path, optional
+        Own certificate and its key.
+    mutual : bool
+        Whether a router lets in only clients that show a certificate.
+    verify_name : bool
+        Whether the certificate of the router must be for the name that was called.
+    """
 
     root_ca: Path | None = None
     certificate: Path | None = None
@@ -33,12 +45,27 @@ class ZenohTlsSettings(Table):
 
 
 class ZenohSettings(Table):
-    """The bus: where; as whom (`user`); for a router whom it lets in (`users_file`) and to what (`access_control`).
+    """The bus: where it is, as whom one comes, and whom a router lets in.
 
-    `upstream`: routers that a router connects to, as a branch of their tree. `gather_s`: so long gateway, simulator
-    and replay gather the samples of a station into one message; with 0 each is sent at once, by itself.
-
-    A password comes from `password_file`, or from the environment as `WETWELL_ZENOH__PASSWORD`.
+    Parameters
+    ----------
+    endpoint : str
+        Address of the router, `tcp/host:port` or `tls/host:port`.
+    upstream : list of str
+        Routers that a router connects to, as a branch of their tree.
+    gather_s : float
+        So long gateway, simulator and replay gather the samples of a station into one message; with 0 each is sent at
+        once, by itself. [s]
+    user : str, optional
+        Name under which one comes to the router.
+    password : str, optional
+        Of the user; better in `password_file`, or in the environment as `WETWELL_ZENOH__PASSWORD`.
+    password_file : Path, optional
+        File with the password alone.
+    users_file : Path, optional
+        Of a router: file of the users whom it lets in, with their passwords.
+    access_control : Path or "default", optional
+        Of a router: which user may send and receive what.
     """
 
     endpoint: Endpoint = "tcp/127.0.0.1:7447"
@@ -53,7 +80,15 @@ class ZenohSettings(Table):
 
 
 class ModbusTlsSettings(Table):
-    """Certificates of the Modbus server, PEM: with them it speaks TLS only; with `client_ca` clients need one too."""
+    """Certificates of the Modbus server, PEM files; with them it speaks TLS only.
+
+    Parameters
+    ----------
+    certificate, private_key : Path, optional
+        Own certificate and its key.
+    client_ca : Path, optional
+        Authority that must have signed the certificate of each client; without it clients need none.
+    """
 
     certificate: Path | None = None
     private_key: Path | None = None
@@ -61,16 +96,35 @@ class ModbusTlsSettings(Table):
 
 
 class WriteRule(Table):
-    """Registers that the clients of a network may write; `*` stands for any part of a name."""
+    """Registers that the clients of a network may write.
+
+    Parameters
+    ----------
+    client : str
+        Network or address of the clients.
+    registers : list of str
+        Names of registers; `*` stands for any part of a name.
+    """
 
     client: IPvAnyNetwork
     registers: Annotated[tuple[str, ...], Field(min_length=1)]
 
 
 class ModbusSettings(Table):
-    """The Modbus TCP server. Port 5020 needs no privilege, unlike the standard 502 (802 with TLS).
+    """The Modbus TCP server.
 
-    `write_allow` says who may write; by default programs on this machine may, and nobody else.
+    Parameters
+    ----------
+    host : str
+        Address on which it listens.
+    port : int
+        Where it listens: 5020 needs no privilege, unlike the standard 502 (802 with TLS); 0 takes a free one.
+    unit_id : int
+        Of the station.
+    word_order : str
+        Order of the four bytes of a 32-bit value, A being the highest.
+    write_allow : list of WriteRule
+        Who may write; by default programs on this machine may, and nobody else.
     """
 
     host: str = "127.0.0.1"
@@ -84,16 +138,31 @@ class ModbusSettings(Table):
 
 
 class LogSettings(Table):
-    """Logs, on standard error. Form "json" is one JSON object a line."""
+    """Logs, on standard error.
+
+    Parameters
+    ----------
+    level : str
+        From which on a line is written.
+    form : str
+        "text" for people; "json" is one JSON object a line.
+    """
 
     level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
     form: Literal["text", "json"] = "text"
 
 
 class HealthSettings(Table):
-    """Health figures on the bus, and over HTTP at an address such as `127.0.0.1:9100` where one is given.
+    """Health figures of a daemon, on the bus and over HTTP.
 
-    `max_sample_age_s`: so long without a sample, and `/healthz` says that the daemon does not do its duty.
+    Parameters
+    ----------
+    period_s : float
+        From one to the next on the bus. [s]
+    http : str, optional
+        Address such as `127.0.0.1:9100` at which `/healthz` and `/metrics` answer; without it nothing listens.
+    max_sample_age_s : float
+        So long without a sample, and `/healthz` says that the daemon does not do its duty. [s]
     """
 
     period_s: Positive = 10.0
@@ -102,9 +171,20 @@ class HealthSettings(Table):
 
 
 class DetectorSettings(Table):
-    """The detector: where it keeps its state, if anywhere, how often, and what acts cost.
+    """The detector.
 
-    `crash_tries`: so often within `crash_window_s` a station may bring the process down until it is left out.
+    Parameters
+    ----------
+    state_dir : Path, optional
+        Folder of what it has learnt; without it a restart learns anew.
+    checkpoint_s : float
+        From one saving of the state to the next. [s]
+    crash_tries : int
+        So often within `crash_window_s` a station may bring the process down until it is left out.
+    crash_window_s : float
+        Over which crashes are counted. [s]
+    costs : Costs
+        What acts and omissions cost at stations whose file says nothing of it.
     """
 
     state_dir: Path | None = None
@@ -115,7 +195,19 @@ class DetectorSettings(Table):
 
 
 class RuleSettings(Table):
-    """What is other than in the rule table for one kind of alarm."""
+    """What is other than in the rule table for one kind of alarm; what is left out stays as it is there.
+
+    Parameters
+    ----------
+    priority : str, optional
+        How soon somebody has to act.
+    on_delay_s, off_delay_s : float, optional
+        So long must the condition hold, or be gone, before the alarm comes or returns, in the station's time. [s]
+    is_enabled : bool, optional
+        Whether there is such an alarm at all.
+    is_latching : bool, optional
+        Whether the alarm stays after its condition has gone, until it is reset.
+    """
 
     priority: Priority | None = None
     on_delay_s: NonNegative | None = None
@@ -137,6 +229,8 @@ class AlarmSettings(Table):
         A heartbeat of a PLC that has not changed for so long is an alarm.
     high_level_m : float, optional
         High level of every station; without it, `high_level_margin_m` above the last start level of its file.
+    high_level_margin_m : float
+        So far above the last start level is the high level, where none is given.
     overflow_margin_m : float
         So far under the overflow of the station file begins the risk.
     level_deadband_m : float
@@ -160,11 +254,28 @@ class AlarmSettings(Table):
 
 
 class HistorianSettings(Table):
-    """The historian: where it keeps what, and for how long.
+    """The historian: where it keeps what, and for how long. Days count back from the newest sample of a station.
 
-    `url` names a PostgreSQL database that is used in place of the folder, such as `postgresql://user@host/name`; its
-    password may stand in `password_file`. Days count back from the newest sample of a station. A batch is kept each
-    `commit_s`; up to `spool_rows` samples and messages wait in memory while the disk or the database refuses.
+    Parameters
+    ----------
+    folder : Path
+        Folder of the history.
+    url : str, optional
+        PostgreSQL database that is used in place of the folder, such as `postgresql://user@host/name`.
+    password_file : Path, optional
+        File with the password of the database alone.
+    commit_s : float
+        From one batch that is kept to the next. [s]
+    maintain_s : float
+        From one tidying to the next: days that are full become files, what is old goes. [s]
+    spool_rows : int
+        Samples and messages that wait in memory at the most while the disk or the database refuses.
+    keep_live_days : int
+        Days that stay where they are quick to reach.
+    downsample_after_days : int, optional
+        Age from which count, mean, least and largest of each minute take the place of samples; without it never.
+    keep_days : int, optional
+        Age from which all is deleted; without it never.
     """
 
     folder: Path = Path("wetwell-data")
@@ -187,21 +298,49 @@ class HistorianSettings(Table):
 
 
 class SecuritySettings(Table):
-    """Who is let in: tokens of the dashboard, made by `wetwell token`; whether to listen to all without asking."""
+    """Who is let in.
+
+    Parameters
+    ----------
+    tokens_file : Path, optional
+        Tokens of the dashboard, made by `wetwell token`.
+    insecure : bool
+        Whether to listen beyond this machine without asking who comes.
+    """
 
     tokens_file: Path | None = None
     insecure: bool = False
 
 
 class GatewaySettings(Table):
-    """The gateway: files of the PLCs that it polls, and its longest wait before a connection is made anew."""
+    """The gateway.
+
+    Parameters
+    ----------
+    plcs : list of Path
+        Files of the PLCs that it polls.
+    longest_wait_s : float
+        Longest wait before a connection that failed is made anew. [s]
+    """
 
     plcs: tuple[Path, ...] = ()
     longest_wait_s: Positive = 30.0
 
 
 class FleetSettings(Table):
-    """Many stations on Dask: the scheduler, or how many workers to start here; shards; how often to look around."""
+    """Many stations on Dask.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address of a scheduler that runs already; without it workers start here.
+    workers : int, optional
+        How many to start here; default: one a core.
+    shards : int
+        Parts into which the stations are put; each is judged by one worker at a time.
+    period_s : float
+        From one look around to the next: what is new, who is gone. [s]
+    """
 
     scheduler: Annotated[str, Field(pattern=r"^(tcp|tls)://.+:\d+$")] | None = None
     workers: Annotated[int, Field(ge=1)] | None = None
@@ -214,8 +353,10 @@ class DashboardSettings(Table):
 
     Attributes
     ----------
-    host, port
-        Where it listens; beyond this machine only with `security.tokens_file`.
+    host : str
+        Address on which it listens; beyond this machine only with `security.tokens_file`.
+    port : int
+        Where it listens; 0 takes a free one.
     reports : Path
         Folder whose `*.html`, three levels down, the page lists.
     stale_s : float

@@ -1,7 +1,7 @@
 """JSON Schema of a model, with what its docstrings say of each key, and the unit that its name carries."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from inspect import cleandoc
 from typing import Any, get_args
 
@@ -10,6 +10,7 @@ from pydantic.json_schema import JsonSchemaMode
 
 UNITS = {
     "_h2_m5": "h²/m⁵",
+    "_hz_m": "Hz/m",
     "_m3h": "m³/h",
     "_per_kwh": "currency/kWh",
     "_m2": "m²",
@@ -27,6 +28,8 @@ UNITS = {
     "_a": "A",
 }
 """By the end of a name, the longest first."""
+_UNIT = re.compile(r"\s*\[([^\]]+)\]\.?$")
+"""At the end of what is said of a key."""
 _ENTRY = re.compile(r"^([\w, ]+?) : .*$")
 
 
@@ -40,22 +43,55 @@ def described_schema(model: type[BaseModel], mode: JsonSchemaMode = "validation"
     'm²'
     """
     schema = model.model_json_schema(mode=mode)
-    tables = {"": schema, **schema.get("$defs", {})}
-    for part in {model, *_parts(model)}:
-        table = tables[""] if part is model else tables.get(part.__name__)
+    describe(schema, [model, *_parts(model)])
+    return schema
+
+
+def describe(schema: dict[str, Any], models: Iterable[type[BaseModel]]) -> None:
+    """Write into a schema what the docstrings of its models, and of what they build on, say of each key.
+
+    A key of which they say nothing, and whose value is a table, has what is said of that table.
+    """
+    tables = schema.get("$defs", {})
+    for part in dict.fromkeys(models):
+        table = schema if part.__name__ == schema.get("title") else tables.get(part.__name__)
         if table is None:
             continue
-        text = cleandoc(part.__doc__ or "")
-        table["description"] = _summary(text)
-        words = _words(text)
+        table["description"] = _summary(cleandoc(part.__doc__ or ""))
+        words = _words_of(part)
         for key, rule in table.get("properties", {}).items():
-            said = words.get(key, "")
-            if said and "description" not in rule:
-                rule["description"] = said
+            if "const" in rule:
+                words.setdefault(key, "Which of the forms the table has.")
+            said = rule.get("description", words.get(key, ""))
+            rule["description"] = _UNIT.sub("", said)
             unit = unit_of(key, said)
             if unit and "unit" not in rule:
                 rule["unit"] = unit
-    return schema
+    for table in (schema, *tables.values()):
+        for rule in table.get("properties", {}).values():
+            if not rule.get("description"):
+                rule["description"] = next((inner["description"] for inner in tables_of(schema, rule)), "")
+
+
+def tables_of(schema: Mapping[str, Any], rule: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Tables that a key may hold, alone, in a list, by name, or as one of several.
+
+    Examples
+    --------
+    >>> schema = {"$defs": {"Pump": {"title": "Pump", "properties": {}}}}
+    >>> [table["title"] for table in tables_of(schema, {"type": "array", "items": {"$ref": "#/$defs/Pump"}})]
+    ['Pump']
+    """
+    if "$ref" in rule:
+        found = schema["$defs"][rule["$ref"].rpartition("/")[2]]
+        if "properties" in found:
+            yield found
+        else:
+            yield from tables_of(schema, found)
+    inner = [one for key in ("anyOf", "oneOf") for one in rule.get(key, ())]
+    for one in (*inner, rule.get("items"), rule.get("additionalProperties")):
+        if isinstance(one, dict):
+            yield from tables_of(schema, one)
 
 
 def unit_of(name: str, said: str = "") -> str:
@@ -66,7 +102,7 @@ def unit_of(name: str, said: str = "") -> str:
     >>> unit_of("level_m"), unit_of("curve", "Head over flow. [m]"), unit_of("name")
     ('m', 'm', '')
     """
-    if bracket := re.search(r"\[([^\]]+)\]\.?$", said):
+    if bracket := _UNIT.search(said):
         return bracket[1]
     return next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
 
@@ -85,6 +121,15 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for inner in get_args(annotation):
         yield from _models(inner)
+
+
+def _words_of(model: type[BaseModel]) -> dict[str, str]:
+    """What its docstring says of each key, and those of its bases of the others."""
+    words: dict[str, str] = {}
+    for base in reversed(model.__mro__):
+        if issubclass(base, BaseModel):
+            words |= {key: said for key, said in _words(cleandoc(base.__doc__ or "")).items() if said}
+    return words
 
 
 def _summary(text: str) -> str:

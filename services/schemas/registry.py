@@ -14,10 +14,11 @@ from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES
 from wetwell.protocols.recordings.importers.mapping import TagMapping
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.runtime.settings import Settings
-from wetwell.services.schemas.described import described_schema
+from wetwell.services.schemas.described import describe, described_schema
+from wetwell.services.schemas.examples import add_examples, examples_of
 from wetwell.sim2real.diagnosis.report import GapReport
 from wetwell.sim2real.recording.preparation import Preparation
-from wetwell.simulator.effects import AnyEffect
+from wetwell.simulator.effects import EFFECTS, AnyEffect
 from wetwell.simulator.scenario import Scenario
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -29,6 +30,21 @@ def _station() -> dict[str, Any]:
     effects = TypeAdapter(AnyEffect).json_schema(ref_template="#/$defs/{model}")
     schema["$defs"] |= effects.pop("$defs")
     schema["$defs"]["EffectTable"] = effects | {"description": "An effect beyond the plain model."}
+    describe(schema, EFFECTS.values())
+    return schema
+
+
+def _scenario() -> dict[str, Any]:
+    """Scenario file; a recorded inflow may name a recording, whose series then takes the place of its name."""
+    schema = described_schema(Scenario)
+    recorded = schema["$defs"]["RecordedInflow"]
+    series = recorded["required"]
+    del recorded["required"]
+    recorded["properties"]["file"] = {
+        "type": "string",
+        "description": "Instead of the series: a recording with the column `inflow_m3h`, beside this file.",
+    }
+    recorded["oneOf"] = [{"required": ["file"]}, {"required": series}]
     return schema
 
 
@@ -65,7 +81,7 @@ def _written(model: type[BaseModel]) -> Callable[[], dict[str, Any]]:
 
 SCHEMAS: Mapping[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "station": ("station file, TOML", _station),
-    "scenario": ("scenario file, TOML", _read(Scenario)),
+    "scenario": ("scenario file, TOML", _scenario),
     "settings": ("settings of the services, TOML", _read(Settings)),
     "recording": ("row of a recording, CSV or Parquet", _recording),
     "mapping": ("mapping of an export, TOML", _read(TagMapping)),
@@ -80,7 +96,7 @@ SCHEMAS: Mapping[str, tuple[str, Callable[[], dict[str, Any]]]] = {
 
 
 def schema_named(name: str) -> dict[str, Any]:
-    """JSON Schema, draft 2020-12, of a file or a message.
+    """JSON Schema, draft 2020-12, of a file or a message: each key with meaning, unit, default, rule and example.
 
     Raises
     ------
@@ -89,4 +105,6 @@ def schema_named(name: str) -> dict[str, Any]:
     """
     if name not in SCHEMAS:
         raise ConfigError(f"schema '{name}' is none of {', '.join(SCHEMAS)}")
-    return {"$schema": DIALECT} | SCHEMAS[name][1]()
+    schema = {"$schema": DIALECT} | SCHEMAS[name][1]()
+    add_examples(schema, examples_of(name))
+    return schema

@@ -8,6 +8,7 @@ import hashlib
 import hmac
 import os
 import secrets
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -25,11 +26,12 @@ PREFIX = "wetwell_"
 
 
 class Holder(Table):
-    """Who holds a token, and what it allows."""
+    """Who holds a token, what it allows, and its last day in UTC; without one it does not end."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN)]
     role: Role
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", repr=False)]
+    until: date | None = None
 
     def may(self, role: Role) -> bool:
         """Whether this holder may do what a role may.
@@ -42,13 +44,17 @@ class Holder(Table):
         order = get_args(Role)
         return bool(order.index(self.role) >= order.index(role))
 
+    def has_ended(self, today: date) -> bool:
+        """Whether its last day is over."""
+        return self.until is not None and today > self.until
+
 
 class _File(Table):
     token: tuple[Holder, ...] = ()
 
 
 def holder_of(file: Path, token: str) -> Holder | None:
-    """Who holds this token; None if nobody does. Takes as long for a wrong token as for a right one.
+    """Who holds this token; None if nobody does, or not any more. Takes as long for a wrong token as for a right one.
 
     Raises
     ------
@@ -57,9 +63,14 @@ def holder_of(file: Path, token: str) -> Holder | None:
     """
     digest, found = _digest(token), None
     for holder in read_holders(file):
-        if hmac.compare_digest(holder.sha256, digest):
+        if hmac.compare_digest(holder.sha256, digest) and not holder.has_ended(today()):
             found = holder
     return found
+
+
+def today() -> date:
+    """Day in UTC, by which tokens end."""
+    return datetime.now(UTC).date()
 
 
 def read_holders(file: Path) -> tuple[Holder, ...]:
@@ -76,8 +87,10 @@ def read_holders(file: Path) -> tuple[Holder, ...]:
         raise ConfigError(f"{file}: {first_fault(error)}") from error
 
 
-def new_token(file: Path, name: str, role: Role) -> str:
+def new_token(file: Path, name: str, role: Role, days: int = 0) -> str:
     """Make a token, and add its hash to a file, which need not exist. The token itself is kept nowhere.
+
+    It ends after so many days; with 0 it does not.
 
     Raises
     ------
@@ -91,7 +104,8 @@ def new_token(file: Path, name: str, role: Role) -> str:
         raise ConfigError(f"{file}: '{name}' has a token already; revoke it first")
     token = PREFIX + secrets.token_urlsafe(32)
     try:
-        holder = Holder(name=name, role=role, sha256=_digest(token))
+        until = today() + timedelta(days=days) if days else None
+        holder = Holder(name=name, role=role, sha256=_digest(token), until=until)
     except ValidationError as error:
         raise ConfigError(first_fault(error)) from error
     _write(file, (*holders, holder))
@@ -118,7 +132,7 @@ def revoke_token(file: Path, name: str) -> None:
 def _write(file: Path, holders: tuple[Holder, ...]) -> None:
     with atomic_file(file) as out:
         os.fchmod(out.fileno(), 0o600)
-        tomli_w.dump(_File(token=holders).model_dump(), out)
+        tomli_w.dump(_File(token=holders).model_dump(exclude_none=True), out)
 
 
 def _digest(token: str) -> str:

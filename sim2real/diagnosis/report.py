@@ -1,10 +1,12 @@
-"""The report of a diagnosis, as programs read it: schema `wetwell.gap-report/1`."""
+"""The report of a diagnosis, as programs read it: schema `wetwell.gap-report/2`."""
 
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.sim2real.recording.regimes import Regime
+from wetwell.sim2real.residuals.bins import Signal
 from wetwell.simulator.effects.effect import Component
 
 Short = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
@@ -18,18 +20,44 @@ class _Part(BaseModel):
 
 
 class Where(_Part):
-    """A cell of the gap; `gap` in units of the sensors' noise, 1 is noise alone."""
+    """A cell of the gap: one signal in one regime.
+
+    Parameters
+    ----------
+    component : str
+        The one that is held responsible.
+    signal : str
+        What was measured: flow, head, power, level, or an event such as a start.
+    regime : str
+        What the station was doing.
+    gap : float
+        Size of the residuals in units of the sensors' noise; 1 is noise alone. [1]
+    ci : (float, float)
+        In which it lies with 95 %. [1]
+    share : float
+        Of the whole gap. [1]
+    """
 
     component: Component
-    signal: str
-    regime: str
+    signal: Signal
+    regime: Regime
     gap: Short
     ci: ShortInterval
     share: Short
 
 
 class FittedParameter(_Part):
-    """Value with 95 % interval; a number, or the pump or channel that the effect is confined to."""
+    """A parameter of an effect.
+
+    Parameters
+    ----------
+    value : float, int or str
+        A size, or the pump, main or channel that the effect is confined to.
+    ci : (float, float), optional
+        In which the true size lies with 95 %; none for what is no size.
+    unit : str
+        Of the size; "1" for a share or factor.
+    """
 
     value: Short | int | str
     ci: ShortInterval | None
@@ -37,7 +65,19 @@ class FittedParameter(_Part):
 
 
 class FoundEffect(_Part):
-    """An accepted effect; `equivalent` names those that these data cannot tell from it."""
+    """An accepted effect.
+
+    Parameters
+    ----------
+    name : str
+        In the library of effects.
+    component : str
+        On which it acts.
+    equivalent : list of str
+        Effects that these data cannot tell from it.
+    parameters : dict of FittedParameter
+        By name.
+    """
 
     name: str
     component: Component
@@ -46,7 +86,19 @@ class FoundEffect(_Part):
 
 
 class RankedCandidate(_Part):
-    """A single effect of the library: its score on held-out cycles, and how far it alone shrinks the gap."""
+    """An effect of the library, tried alone.
+
+    Parameters
+    ----------
+    name : str
+        In the library of effects.
+    score : float
+        By how much it lowers the sum of squared residuals on held-out cycles, in units of noise squared. [1]
+    shrinkage : float
+        Share of the gap that it closes alone. [1]
+    shrinkage_ci : (float, float)
+        In which that lies with 95 %. [1]
+    """
 
     name: str
     score: Short
@@ -55,14 +107,34 @@ class RankedCandidate(_Part):
 
 
 class SignalGap(_Part):
-    """Gap of one signal."""
+    """Gap of one signal, in units of the sensors' noise.
+
+    Parameters
+    ----------
+    before, after : float
+        As configured, and with the effects; 1 is noise alone. [1]
+    """
 
     before: Short
     after: Short
 
 
 class Gap(_Part):
-    """Gap on held-out cycles, in units of the sensors' noise."""
+    """Gap on held-out cycles, in units of the sensors' noise.
+
+    Parameters
+    ----------
+    before, after : float
+        As configured, and with the effects. [1]
+    floor : float
+        What a perfect model would score. [1]
+    shrinkage : float
+        (before − after) / (before − floor). [1]
+    shrinkage_ci : (float, float)
+        In which that lies with 95 %, by resampling blocks of cycles. [1]
+    by_signal : dict of SignalGap
+        Of each signal.
+    """
 
     before: Short
     after: Short
@@ -73,7 +145,17 @@ class Gap(_Part):
 
 
 class ClosedLoop(_Part):
-    """The simulator running free under the recorded inflow: error of the level over its range, starts, run time."""
+    """The simulator running free under the recorded inflow.
+
+    Parameters
+    ----------
+    level_nmae : float
+        Mean absolute error of the level over its range. [1]
+    starts_per_day : float
+        Of all pumps. [1/d]
+    run_h_per_day : float
+        Of all pumps. [h/d]
+    """
 
     level_nmae: float
     starts_per_day: float
@@ -81,7 +163,19 @@ class ClosedLoop(_Part):
 
 
 class ClosedLoopComparison(_Part):
-    """Measured, and simulated before and after; None where it could not be run."""
+    """What the station did, and what the simulator does when it runs free.
+
+    Parameters
+    ----------
+    inflow : str
+        Where the inflow comes from: measured, or worked out from level and flow.
+    measured_starts_per_day : float
+        Of all pumps of the station. [1/d]
+    measured_run_h_per_day : float
+        Of all pumps of the station. [h/d]
+    before, after : ClosedLoop
+        As configured, and with the effects.
+    """
 
     inflow: str
     measured_starts_per_day: float
@@ -91,10 +185,20 @@ class ClosedLoopComparison(_Part):
 
 
 class DetectorVerdicts(_Part):
-    """Verdicts a day that call a fault on the recording, taken to be healthy, with both stations.
+    """Verdicts of the detector that call a fault on the recording, taken to be healthy.
 
-    `has_new_curves` says whether the effects change a curve that the detector takes its residuals from; if not, both
-    are the same run. It learns its baseline: constant effects make little difference to it.
+    The detector learns its baseline, so constant effects make little difference to it.
+
+    Parameters
+    ----------
+    days : float
+        Length of the recording that was judged. [d]
+    verdicts : int
+        Verdicts in it.
+    false_per_day_before, false_per_day_after : float
+        That call a fault, with the station as configured, and with the effects. [1/d]
+    has_new_curves : bool
+        Whether the effects change a curve that the detector takes its residuals from; if not, both are the same run.
     """
 
     days: float
@@ -105,26 +209,53 @@ class DetectorVerdicts(_Part):
 
 
 class UntestedEffect(_Part):
-    """An effect that the recording cannot show, and why; "none" means none of the others."""
+    """An effect that the recording cannot show; "none" means none of the others.
+
+    Parameters
+    ----------
+    effect : str
+        In the library of effects.
+    reason : str
+        Why the recording cannot show it.
+    """
 
     effect: str
     reason: str
 
 
 class NoiseCheck(_Part):
-    """Mean square of the residuals of a signal in a regime under the answer; 1 is all that a right model may be off.
+    """How large the residuals of a signal in a regime are under the answer.
 
-    Between `noise_share`, what the sensors alone make, and 1 where the answer is right and the noise is known.
+    Parameters
+    ----------
+    signal : str
+        What was measured.
+    regime : str
+        What the station was doing.
+    mean_square : float
+        1 is all that a right model may be off. [1]
+    noise_share : float
+        What the sensors alone make of that; a right answer lies between it and 1. [1]
     """
 
-    signal: str
-    regime: str
+    signal: Signal
+    regime: Regime
     mean_square: Short
     noise_share: Short
 
 
 class AnswerProbability(_Part):
-    """Probability of one answer: `none`, `unknown`, or a set of effects."""
+    """Probability of one answer.
+
+    Parameters
+    ----------
+    effects : list of str
+        The set of effects; empty for `none` and `unknown`.
+    verdict : str
+        Of which kind the answer is.
+    probability : float
+        Those of all answers sum to 1. [1]
+    """
 
     effects: tuple[str, ...]
     verdict: Literal["effect", "none", "unknown"]
@@ -132,9 +263,52 @@ class AnswerProbability(_Part):
 
 
 class GapReport(_Part):
-    """What `wetwell gap diagnose` writes."""
+    """What `wetwell gap diagnose` writes.
 
-    schema_: Literal["wetwell.gap-report/1"] = Field(default="wetwell.gap-report/1", alias="schema")
+    Parameters
+    ----------
+    schema : str
+        Form of the report and its version.
+    station : str
+        Name of the station, as in its file.
+    verdict : str
+        `none`: nothing that could be tested differs by more than what matters; `effect`: a set of effects explains
+        the recording; `unknown`: something differs that no effect explains.
+    where : list of Where
+        Where the gap lies, by share, the largest first; the first names the component that is held responsible.
+    effects : list of FoundEffect
+        Accepted effects, the strongest first; none for `none` and `unknown`.
+    posterior : list of AnswerProbability
+        Each answer that is still possible, the most probable first.
+    component_probability : dict
+        That something is otherwise in a component. [1]
+    noise_check : list of NoiseCheck
+        Whether what is left under the answer is as large as noise and a right model make it.
+    candidates : list of RankedCandidate
+        Single effects, the best first.
+    gap : Gap
+        How far the simulator is off, before and after.
+    closed_loop : ClosedLoopComparison, optional
+        The simulator running free; none where level or inflow do not allow it.
+    detector : DetectorVerdicts, optional
+        What the detector makes of the recording with both stations.
+    signals : list of str
+        What was measured and used.
+    cycles : int
+        Cycles of the recording, from start to start, that were used.
+    rate_s : float
+        From row to row of the recording. [s]
+    value : str
+        What a stored value stands for: an instant, the mean since the row before, or a value that held.
+    not_tested : list of UntestedEffect
+        Effects that this recording cannot show.
+    notes : list of str
+        What was out of order, and what is not measured.
+    next_experiment : str
+        What to do next to learn more, in a sentence.
+    """
+
+    schema_: Literal["wetwell.gap-report/2"] = Field(default="wetwell.gap-report/2", alias="schema")
     station: str
     verdict: Literal["effect", "none", "unknown"]
     where: tuple[Where, ...]

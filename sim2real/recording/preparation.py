@@ -14,7 +14,17 @@ from wetwell.protocols.timestamps import NS_PER_S
 
 
 class Offset(Table):
-    """A constant added to a column between two times, such as after a level sensor was hung anew."""
+    """A constant added to a column between two times, such as after a level sensor was hung anew.
+
+    Parameters
+    ----------
+    column : str
+        Of the recording.
+    value : float
+        What is added, in the unit of the column.
+    start, end : stamp
+        First and last time of the rows that it is added to.
+    """
 
     column: str
     value: Finite
@@ -29,7 +39,15 @@ class Offset(Table):
 
 
 class Scale(Table):
-    """A factor on a column, for a conversion of units: 3.6 makes m³/h of L/s."""
+    """A factor on a column, for a conversion of units.
+
+    Parameters
+    ----------
+    column : str
+        Of the recording.
+    factor : float
+        3.6 makes m³/h of L/s. [1]
+    """
 
     column: str
     factor: Annotated[float, Field(allow_inf_nan=False)]
@@ -38,7 +56,14 @@ class Scale(Table):
 class Preparation(Table):
     """What is done to a recording, in this order: scale, offset, sort by time, drop doubles, look for gaps.
 
-    Without `max_gap_s` a gap is longer than three usual steps of the recording, and than 10 s.
+    Parameters
+    ----------
+    scale : list of Scale
+        Conversions of units.
+    offset : list of Offset
+        Corrections of what was measured.
+    max_gap_s : float, optional
+        A longer pause between rows is a gap; default: three usual steps of the recording, at least 10 s. [s]
     """
 
     scale: tuple[Scale, ...] = ()

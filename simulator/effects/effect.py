@@ -40,6 +40,11 @@ class Effect(Table):
     `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_learnt`
     says that its form comes from a recording: it is not among those that a diagnosis tries. Its component is the
     "station", and its parameters say which part of it.
+
+    Parameters
+    ----------
+    name : str
+        Which effect.
     """
 
     component: ClassVar[Component]

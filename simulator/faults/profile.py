@@ -27,6 +27,7 @@ class Profile(Table):
     after : "hold" or "clear"
         What becomes of the fault after the end.
     shape : "ramp", "step" or "intermittent"
+        How the fault comes: it grows from start to end, is there at once, or comes and goes.
     period_s : float
         T, of an intermittent fault. [s]
     duty : float
@@ -67,13 +68,25 @@ class Profile(Table):
 
 
 class PumpFault(Profile):
-    """A fault of one pump, counted from 1."""
+    """A fault of one pump.
+
+    Parameters
+    ----------
+    pump : int
+        Which one, counted from 1.
+    """
 
     pump: Annotated[int, Field(ge=1)]
 
 
 class SystemFault(Profile):
-    """A fault of a rising main, counted from 1 as in the file, or of all (0); felt by all pumps on it."""
+    """A fault of a rising main, felt by all pumps on it.
+
+    Parameters
+    ----------
+    main : int
+        Which one, counted from 1 as in the file; 0 for all.
+    """
 
     main: Annotated[int, Field(ge=0)] = 0
 
@@ -87,7 +100,15 @@ class SensorFault(Profile):
 
 
 class ChannelFault(SensorFault):
-    """A fault of the sensors of one quantity: of one pump, counted from 1, or of all (0); 0 for level and inflow."""
+    """A fault of the sensors of one quantity.
+
+    Parameters
+    ----------
+    channel : str
+        The quantity.
+    pump : int
+        At which pump, counted from 1; 0 for all, and for level and inflow.
+    """
 
     channel: SensedQuantity
     pump: Annotated[int, Field(ge=0)] = 0

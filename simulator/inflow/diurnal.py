@@ -20,7 +20,7 @@ class DiurnalInflow(Table):
     mean_m3h, amplitude_m3h, noise_m3h : float
         Mean, amplitude of the sine, standard deviation of the noise. [m³/h]
     period_s : float
-        [s]
+        Of the sine. [s]
     surges : Surges
 
     References

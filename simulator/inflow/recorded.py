@@ -3,7 +3,7 @@
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, PlainSerializer, model_validator
+from pydantic import BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchema, model_validator
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.table import Table
@@ -16,7 +16,12 @@ def _floats(values: Any) -> Floats:
         raise ValueError("must be an array of numbers") from error
 
 
-FloatArray = Annotated[np.ndarray, BeforeValidator(_floats), PlainSerializer(np.ndarray.tolist, when_used="json")]
+FloatArray = Annotated[
+    np.ndarray,
+    BeforeValidator(_floats),
+    PlainSerializer(np.ndarray.tolist, when_used="json"),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 1}),
+]
 
 
 class RecordedInflow(Table):
@@ -27,7 +32,7 @@ class RecordedInflow(Table):
     time_s : (n,) array
         Seconds since the first value, rising, starting at 0. [s]
     flow_m3h : (n,) array
-        [m³/h]
+        At each of these times. [m³/h]
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)

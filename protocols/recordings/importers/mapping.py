@@ -28,6 +28,10 @@ class Columns(Table):
         Header of the column.
     date : str, optional
         Header of the column with the date, where `time` has the time of day alone.
+    tag, value : str, optional
+        Of a long file: headers of the columns with the name of the tag and with its value.
+    quality : str, optional
+        Of a long file: header of the column with the quality of the value.
     good : tuple of str
         What stands in the quality of a value that can be trusted; any other value is none.
     """
@@ -53,6 +57,10 @@ class TagSignal(Table):
         Name of the tag; in a wide file the header of its column.
     unit : str
         Of the raw number; empty is the unit of the recording.
+    scale : float
+        Factor on the raw number. [1]
+    offset : float
+        Added after the unit has been converted, in the unit of the recording.
     span : tuple, optional
         Values at 0 % and at 100 % in the unit of the recording; without it "%" is that of the nominal frequency.
     true, false : tuple of str
@@ -112,6 +120,10 @@ class TagMapping(Table):
         that was found. [s]
     max_age_s : float, optional
         How long a value stored on change holds. [s]
+    columns : Columns
+        Where time, tag and value stand.
+    signal : dict of TagSignal
+        By the column of the recording, such as `pump1_flow_m3h`.
     """
 
     station: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]

@@ -24,6 +24,7 @@ from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.dashboard import login
 from wetwell.services.dashboard.app import AppState, dashboard_app
 from wetwell.services.dashboard.daemon import serve_dashboard
 from wetwell.services.dashboard.event_streams import EventStreams
@@ -31,7 +32,7 @@ from wetwell.services.dashboard.feed import Feed
 from wetwell.services.dashboard.view.site_view import ROWS, SiteView
 from wetwell.services.dashboard.web import open_socket, web_server
 from wetwell.services.runtime.settings import DashboardSettings, Settings
-from wetwell.services.security.tokens import new_token
+from wetwell.services.security.tokens import new_token, revoke_token
 
 PAGE = "http://127.0.0.1:8080"
 
@@ -505,16 +506,11 @@ def test_with_tokens_data_needs_one_and_the_shell_does_not(tokens) -> None:
         async with guarded(file) as client:
             for path in ("/", "/favicon.ico", "/api/who"):
                 assert (await client.get(path)).status_code == 200, path
-            for path in (
-                "/api/stations",
-                "/api/stations/a",
-                "/api/alarms",
-                "/api/health",
-                "/events",
-                "/reports/x.html",
-            ):
+        for path in ("/api/stations", "/api/stations/a", "/api/alarms", "/api/health", "/events", "/reports/x.html"):
+            async with guarded(file) as client:  # each counts wrong tokens anew
                 for headers in ({}, {"authorization": "Bearer wrong"}, {"cookie": "wetwell_token=wrong"}):
                     assert (await client.get(path, headers=headers)).status_code == 401, path
+        async with guarded(file) as client:
             bearer = {"authorization": f"Bearer {viewer}"}
             assert (await client.get("/api/stations", headers=bearer)).status_code == 200
 
@@ -538,6 +534,54 @@ def test_a_login_sets_a_cookie_that_scripts_and_other_sites_do_not_get(tokens) -
             assert (await client.get("/api/stations")).status_code == 200  # the client keeps the cookie
 
     asyncio.run(run())
+
+
+def test_of_an_address_with_many_wrong_tokens_only_a_right_one_is_heard(tokens) -> None:
+    file, operator, _ = tokens
+
+    async def run():
+        async with guarded(file) as client:
+            told = [await client.get("/api/stations", headers={"authorization": f"Bearer {n}"}) for n in range(12)]
+            assert [each.status_code for each in told] == [401] * 10 + [429] * 2
+            assert "too many wrong tokens from 127.0.0.1: wait" in told[-1].json()["error"]
+            entry = await client.post("/api/login", json={"token": "wrong"})
+            assert entry.status_code == 429
+            who = await client.get("/api/who", headers={"authorization": "Bearer wrong"})
+            assert who.status_code == 429
+            assert (await client.get("/api/stations")).status_code == 401  # no token, no attempt
+            assert (await client.post("/api/login", json={"token": operator})).json()["name"] == "ada"
+
+    asyncio.run(run())
+
+
+def test_a_stream_ends_with_the_token_that_opened_it(tmp_path, monkeypatch) -> None:
+    file = tmp_path / "tokens.toml"
+    token = new_token(file, "ada", "viewer")
+    monkeypatch.setattr(login, "CHECK_S", 0.0)
+    app_state = app_state_with(None)
+
+    async def run() -> list[bytes]:
+        app = dashboard_app(app_state, file, is_local=False)
+        sent = asyncio.Queue()
+        scope = {
+            "type": "http",
+            "asgi": {"version": "3.0", "spec_version": "2.4"},
+            "method": "GET",
+            "path": "/events",
+            "query_string": b"station=alpha",
+            "headers": [(b"authorization", f"Bearer {token}".encode())],
+            "client": ("192.0.2.7", 1),
+        }
+        asked = asyncio.create_task(app(scope, asyncio.Queue().get, sent.put))
+        got = [await sent.get() for _ in range(2)]
+        app_state.streams.send("alpha", "1")
+        got.append(await sent.get())
+        revoke_token(file, "ada")
+        app_state.streams.send("alpha", "2")
+        await asked
+        return [message.get("body", b"") for message in [*got, await sent.get()]]
+
+    assert asyncio.run(run())[2:] == [b"data: 1\n\n", b""]
 
 
 def test_only_operators_act_and_always_in_their_own_name(tokens) -> None:

@@ -35,7 +35,7 @@ def main() -> None:
         sys.exit("cannot do it")
     given.out.mkdir()
     report = {
-        "schema": "wetwell.gap-report/1",
+        "schema": "wetwell.gap-report/2",
         "verdict": "none",
         "where": [],
         "effects": [],

@@ -2,13 +2,14 @@
 
 import json
 import stat
+from datetime import timedelta
 
 import pytest
 from typer.testing import CliRunner
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.services.cli import app
-from wetwell.services.security.tokens import holder_of, new_token, read_holders, revoke_token
+from wetwell.services.security.tokens import holder_of, new_token, read_holders, revoke_token, today
 
 
 def test_a_token_names_its_holder_until_it_is_revoked(tmp_path):
@@ -25,6 +26,20 @@ def test_a_token_names_its_holder_until_it_is_revoked(tmp_path):
     revoke_token(file, "control-room")
     assert holder_of(file, room) is None
     assert holder_of(file, wall) is not None
+
+
+def test_a_token_ends_after_its_last_day_and_says_so(tmp_path):
+    file = tmp_path / "tokens.toml"
+    token = new_token(file, "ada", "operator", days=1)
+    last = today() + timedelta(days=1)
+    assert f"until = {last}" in file.read_text()
+    assert holder_of(file, token) is not None
+    file.write_text(file.read_text().replace(str(last), str(today() - timedelta(days=1))))
+    assert holder_of(file, token) is None
+    result = CliRunner().invoke(app, ["token", "list", "--file", str(file)])
+    assert result.stdout == f"ada\toperator\tuntil {today() - timedelta(days=1)}, over\n"
+    assert holder_of(file, new_token(file, "eve", "viewer")) is not None
+    assert read_holders(file)[1].until is None
 
 
 @pytest.mark.parametrize("change", [str.upper, str.strip, lambda token: token[:-1], lambda _: "", lambda _: "\udc80"])
@@ -71,9 +86,12 @@ def test_the_command_makes_lists_and_revokes(tmp_path, monkeypatch):
     token = run("new", "--name", "anna", "--role", "operator").strip()
     made = json.loads(run("new", "--name", "wall", "--json"))
     assert (made["name"], made["role"]) == ("wall", "viewer")
-    assert run("list") == "anna\toperator\nwall\tviewer\n"
+    last = today() + timedelta(days=365)
+    assert run("list") == f"anna\toperator\tuntil {last}\nwall\tviewer\tuntil {last}\n"
     run("revoke", "--name", "wall")
-    assert json.loads(run("list", "--json")) == {"holders": [{"name": "anna", "role": "operator"}]}
+    assert json.loads(run("list", "--json")) == {
+        "holders": [{"name": "anna", "role": "operator", "until": str(last)}]
+    }
     found = holder_of(tmp_path / "tokens.toml", token)
     assert found is not None
     assert found.name == "anna"

@@ -1,0 +1,85 @@
+"""Examples are what the models take, and each stands at the key that it is one of."""
+
+import json
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.modbus.device_map import DeviceFile
+from wetwell.protocols.recordings.importers.mapping import TagMapping
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.runtime.settings import Settings
+from wetwell.services.schemas.examples import add_examples, examples_of
+from wetwell.services.schemas.registry import SCHEMAS, schema_named
+from wetwell.sim2real.diagnosis.report import GapReport
+from wetwell.sim2real.recording.preparation import Preparation
+from wetwell.simulator.effects import effective_parameters
+from wetwell.simulator.scenario import Scenario
+
+MODELS = {
+    "station": Station,
+    "scenario": Scenario,
+    "settings": Settings,
+    "mapping": TagMapping,
+    "preparation": Preparation,
+    "plc": DeviceFile,
+    "gap-report": GapReport,
+    "verdict": Verdict,
+    "sample": Sample,
+    "alarm": Alarm,
+}
+EACH = [pytest.param(name, one, id=f"{name}-{n}") for name in SCHEMAS for n, one in enumerate(examples_of(name))]
+
+
+def test_each_schema_has_one():
+    assert {name for name in SCHEMAS if examples_of(name)} == set(SCHEMAS)
+    assert MODELS.keys() == SCHEMAS.keys() - {"recording"}
+
+
+@pytest.mark.parametrize(("name", "example"), EACH)
+def test_the_schema_takes_it(name, example):
+    assert [error.message for error in Draft202012Validator(schema_named(name)).iter_errors(example)] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "example"),
+    [one for one in EACH if one.values[0] in MODELS and "file" not in one.values[1].get("inflow", ())],
+)
+def test_the_model_takes_it(name, example):
+    model = MODELS[name].model_validate_json(json.dumps(example))
+    if isinstance(model, Station):
+        effective_parameters(model)
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_what_a_key_shows_is_allowed_there(name):
+    schema = schema_named(name)
+    shown = [
+        (key, value, {**rule, "$defs": schema.get("$defs", {})})
+        for table in (schema, *schema.get("$defs", {}).values())
+        for key, rule in table.get("properties", {}).items()
+        for value in rule.get("examples", ())
+    ]
+    assert shown
+    for key, value, rule in shown:
+        assert Draft202012Validator(rule).is_valid(value), key
+
+
+def test_the_first_example_counts_and_tables_are_looked_into():
+    inner = {"title": "Inner", "properties": {"kind": {"const": "a"}, "size_m": {"type": "number"}}}
+    other = {"title": "Other", "properties": {"kind": {"const": "b"}, "size_m": {"type": "number"}}}
+    schema = {
+        "properties": {
+            "name": {"type": "string"},
+            "part": {"type": "array", "items": {"oneOf": [{"$ref": "#/$defs/Inner"}, {"$ref": "#/$defs/Other"}]}},
+        },
+        "$defs": {"Inner": inner, "Other": other},
+    }
+    first = {"name": "n", "unknown": 1, "part": [{"kind": "b", "size_m": 2.0}]}
+    add_examples(schema, [first, {"name": "m", "part": [{"kind": "a", "size_m": 3.0}, {"kind": "b", "size_m": 4.0}]}])
+    assert schema["properties"]["name"]["examples"] == ["n"]
+    assert "examples" not in schema["properties"]["part"]
+    assert [one["properties"]["size_m"]["examples"] for one in (inner, other)] == [[3.0], [2.0]]
