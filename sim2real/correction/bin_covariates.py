@@ -65,7 +65,7 @@ def _times(running: Flags) -> tuple[Floats, Floats]:
     """(n,) seconds since the longest run began, and for which nothing had run before it; of (pumps, n) flags."""
     place = np.arange(running.shape[1])
     since = np.max([np.where(one, place - _last(~one, place), 0) for one in running], axis=0)
-    any_running = running.any(axis=0)
+    any_running = np.asarray(running.any(axis=0))
     stood = np.where(any_running, 0, place - _last(any_running, place))
     begins = np.maximum.accumulate(np.where(any_running & ~np.r_[False, any_running[:-1]], place, 0))
     idle = np.where(any_running, np.r_[0, stood[:-1]][begins], stood)

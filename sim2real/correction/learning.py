@@ -7,10 +7,11 @@ from itertools import pairwise
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.sim2real.correction.bin_covariates import Place, bin_covariates
 from wetwell.sim2real.correction.dictionary import Atom, dictionary, near
+from wetwell.sim2real.correction.means import means_of
 from wetwell.sim2real.correction.selection import PROPOSED, SIZE_PRIOR, Gram, Proposal, proposals
-from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.posterior import TEMPER
 from wetwell.sim2real.recording.regimes import IDLE
 from wetwell.sim2real.replay.replay import Replay
@@ -23,7 +24,7 @@ from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 
 PROBE = 0.01
 """Correction by which the slopes of a term are found. [1]"""
-ROUNDS = 3
+ROUNDS = 4
 """Refinements of a proposal in the simulator."""
 LOOKS = 2
 """Looks at all terms after the first, each without what the one before has shown to be far off."""
@@ -45,14 +46,11 @@ class Learnt:
     covariance : (columns, columns) array
     log : float
         Logarithm of its probability over that of no correction.
-    after : (bins,) array
-        Residuals under it, as `asinh_loss` makes them, each with sizes that other parts of the time gave.
-    beside : tuple of Effect
-        Effects of the library that it acts beside.
+    before, after : (bins,) arrays
+        Residuals without and with it, as `asinh_loss` makes them; with it each by sizes that other parts of the time
+        gave.
     covariates : mapping of (bins,) arrays
         What the terms were held against.
-    left_out : mapping of str to str
-        Columns of a user that say nothing, and why.
     """
 
     effect: LearntCorrection
@@ -62,9 +60,7 @@ class Learnt:
     log: float
     before: Floats
     after: Floats
-    beside: tuple[Effect, ...]
     covariates: dict[Place, Floats]
-    left_out: dict[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,15 +74,13 @@ class _Tried:
 
 
 class Workshop:
-    """A recording, a station and effects beside which corrections are tried."""
+    """A recording and a station on which corrections are tried."""
 
-    def __init__(
-        self, replay: Replay, residuals: StationResiduals, cells: Cells, beside: Sequence[Effect] = ()
-    ) -> None:
-        self._replay, self._residuals, self._cells = replay, residuals, cells
-        self.beside = tuple(beside)
-        self.plain = residuals.of(replay.run(self.beside))
-        self.nothing = Gram(cells, cells.means(asinh_loss(self.plain)), np.zeros((cells.counts.size, 0))).nothing
+    def __init__(self, replay: Replay, residuals: StationResiduals) -> None:
+        self._replay, self._residuals = replay, residuals
+        self._means = means_of(residuals.bins)
+        self.plain = residuals.of(replay.run())
+        self.nothing = Gram(self._means, asinh_loss(self.plain), np.zeros((self.plain.size, 0))).nothing
 
     @property
     def bins(self) -> Bins:
@@ -101,7 +95,7 @@ class Workshop:
         ValueError
             If it does not fit the station.
         """
-        return self._residuals.of(self._replay.run([*self.beside, effect]))
+        return self._residuals.of(self._replay.run([effect]))
 
     def sensitivities(self) -> dict[Term, Floats]:
         """(bins,) slope of the residuals over a constant correction of each term that they see."""
@@ -121,19 +115,19 @@ class Workshop:
         .. [1] P. J. Huber, Robust Statistics, 1981, section 7.8: pseudo-observations.
         """
         slopes, seen = self.sensitivities(), self.plain
-        found = proposals(self._cells, seen, atoms, slopes)
+        found = proposals(self._means, seen, atoms, slopes)
         for _ in range(LOOKS):
             best = found[0]
             columns = np.column_stack([np.ones(seen.size), *(atom.columns for atom in best.atoms)])
             after = self.plain + slopes[best.term] * (columns @ best.sizes)
             seen = self.plain - after + asinh_loss(after)
             likely = dict.fromkeys([one.term for one in found])
-            found = proposals(self._cells, seen, atoms, {term: slopes[term] for term in list(likely)[:PROPOSED]})
+            found = proposals(self._means, seen, atoms, {term: slopes[term] for term in list(likely)[:PROPOSED]})
         finer: list[Proposal] = []
         for term in dict.fromkeys(one.term for one in found):
             best = next(one for one in found if one.term == term)
             around = [other for atom in best.atoms for other in near(atom, covariates[atom.place])]
-            finer += proposals(self._cells, seen, around, {term: slopes[term]})
+            finer += proposals(self._means, seen, around, {term: slopes[term]})
         return sorted(finer, key=lambda one: -one.log)
 
     def tried(self, proposal: Proposal) -> _Tried | None:
@@ -141,23 +135,20 @@ class Workshop:
         found: _Tried | None = None
         for _ in range(ROUNDS):
             try:
-                found = self._at(proposal)
+                now = self._at(proposal)
             except ValueError:
                 break
-            _, sizes = found.gram.gain(range(proposal.sizes.size), proposal.sizes)
+            if found is not None and now.proposal.log <= found.proposal.log:
+                break
+            found = now
+            _, sizes = now.gram.gain(range(proposal.sizes.size), proposal.sizes)
             proposal = replace(proposal, sizes=sizes)
         if found is None:
             return None
         kept = self._material(found)
-        if not kept.atoms and not self._matters(found.slopes[:, :1] @ found.proposal.sizes[:1]):
+        if not kept.atoms and not self._means.matters(found.slopes[:, 0] * found.proposal.sizes[0]):
             return None
         return found if len(kept.atoms) == len(found.proposal.atoms) else self.tried(kept)
-
-    def _matters(self, signature: Floats) -> bool:
-        """Whether a change of the residuals is more than what is material, in some group."""
-        cells = self._cells
-        squares = cells.group_sums(cells.means(signature) ** 2) / np.bincount(cells.group)
-        return bool(np.any(squares > cells.group_material**2))
 
     def _material(self, found: _Tried) -> Proposal:
         """The proposal without addends that matter nowhere."""
@@ -167,7 +158,7 @@ class Workshop:
         kept = [
             number
             for number, (begin, end) in enumerate(columns)
-            if self._matters(found.slopes[:, begin:end] @ whole.sizes[begin:end])
+            if self._means.matters(found.slopes[:, begin:end] @ whole.sizes[begin:end])
         ]
         sizes = [whole.sizes[:1], *(whole.sizes[slice(*columns[number])] for number in kept)]
         return replace(whole, atoms=tuple(whole.atoms[number] for number in kept), sizes=np.concatenate(sizes))
@@ -179,11 +170,8 @@ class Workshop:
             sizes = proposal.sizes.copy()
             sizes[k] += PROBE
             slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
-        cells = self._cells
-        means = np.array([cells.means(column) for column in slopes.T]).T
-        gram = Gram(cells, cells.means(asinh_loss(residuals)), means)
-        gain, _ = gram.gain(range(proposal.sizes.size), proposal.sizes)
-        log = proposal.prior + TEMPER * (gain - self.nothing)
+        gram = Gram(self._means, asinh_loss(residuals), slopes)
+        log = proposal.prior + TEMPER * (gram.at(proposal.sizes) - self.nothing)
         return _Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
 
     def held_out(self, tried: _Tried) -> Floats:
@@ -221,44 +209,48 @@ def effect_of(proposal: Proposal) -> LearntCorrection:
     return LearntCorrection(term=proposal.term, offset=float(proposal.sizes[0]), part=tuple(parts))
 
 
-def learn(
-    replay: Replay, residuals: StationResiduals, cells: Cells, besides: Sequence[Sequence[Effect]] = ((),)
-) -> Learnt | None:
-    """The most probable correction; None where nothing is more probable without any.
+def columns_of_no_use(replay: Replay, bins: Bins, recording: Recording) -> list[tuple[str, str]]:
+    """Columns of the user that say nothing, and why."""
+    if not recording.covariates:
+        return []
+    absent = [name for name in recording.covariates if name not in replay.traces.columns]
+    left_out = dictionary(_covariates(replay, bins), bins.regime != IDLE)[1]
+    return [*((name, "has values in less than half of the rows") for name in absent), *left_out.items()]
+
+
+def _covariates(replay: Replay, bins: Bins) -> dict[Place, Floats]:
+    prediction = replay.run()
+    flow_m3h = replay.readings(())[0]
+    return bin_covariates(replay.traces, bins, prediction.plant, prediction.level_m, flow_m3h)
+
+
+def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
+    """The most probable correction; None where none is more probable.
 
     Parameters
     ----------
     replay : Replay
     residuals : StationResiduals
-    cells : Cells
-        Of their bins.
-    besides : sequence of sequence of Effect
-        Sets of effects of the library beside which a correction is looked for.
     """
-    best: tuple[_Tried, Workshop] | None = None
-    prediction = replay.run()
     bins = residuals.bins
-    flow_m3h = replay.readings(())[0]
-    covariates = bin_covariates(replay.traces, bins, prediction.plant, prediction.level_m, flow_m3h)
-    atoms, left_out = dictionary(covariates, bins.regime != IDLE)
-    for beside in besides:
-        shop = Workshop(replay, residuals, cells, beside)
-        for proposal in _first_of_each(shop.proposals(atoms, covariates)):
-            tried = next((one for one in map(shop.tried, proposal) if one is not None), None)
-            if tried is not None and tried.proposal.log > (0.0 if best is None else best[0].proposal.log):
-                best = tried, shop
+    covariates = _covariates(replay, bins)
+    atoms, _ = dictionary(covariates, bins.regime != IDLE)
+    shop = Workshop(replay, residuals)
+    best: _Tried | None = None
+    for proposals_of_term in _first_of_each(shop.proposals(atoms, covariates)):
+        tried = next((one for one in map(shop.tried, proposals_of_term) if one is not None), None)
+        if tried is not None and tried.proposal.log > (0.0 if best is None else best.proposal.log):
+            best = tried
     if best is None:
         return None
-    tried, shop = best
+    proposal = best.proposal
     return Learnt(
-        effect=effect_of(tried.proposal),
-        atoms=tried.proposal.atoms,
-        sizes=tried.proposal.sizes,
-        covariance=tried.gram.covariance(range(tried.proposal.sizes.size)),
-        log=tried.proposal.log,
+        effect=effect_of(proposal),
+        atoms=proposal.atoms,
+        sizes=proposal.sizes,
+        covariance=best.gram.covariance(range(proposal.sizes.size)),
+        log=proposal.log,
         before=asinh_loss(shop.plain),
-        after=asinh_loss(shop.held_out(tried)),
-        beside=shop.beside,
+        after=asinh_loss(shop.held_out(best)),
         covariates=covariates,
-        left_out=left_out,
     )

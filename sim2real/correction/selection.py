@@ -7,8 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.correction.dictionary import Atom
-from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import no_form, projected
+from wetwell.sim2real.correction.means import Means
 from wetwell.sim2real.likelihood.posterior import TEMPER
 from wetwell.simulator.corrections.parts import TERMS, Term
 
@@ -48,14 +47,13 @@ class Gram:
     $$\Delta \ln L = \tfrac12 g^T (G + 1/\tau^2)^{-1} g - \tfrac12 \ln\det(1 + \tau^2 G), \qquad
     G = A^T C^{-1} A, \quad g = -A^T C^{-1} r$$
 
-    with a prior of the sizes that is normal around 0 with `SIZE_PRIOR` τ, averaged over the scales of an error that
-    cycles share.
+    with a prior of the sizes that is normal around 0 with `SIZE_PRIOR` τ.
 
     Parameters
     ----------
-    cells : Cells
-    residuals : (cells,) array
-    columns : (cells, k) array
+    means : Means
+    residuals : (bins,) array
+    columns : (bins, k) array
         Change of the residuals with the size of each addend.
 
     Attributes
@@ -68,15 +66,12 @@ class Gram:
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
 
-    def __init__(self, cells: Cells, residuals: Floats, columns: Floats) -> None:
-        stacked = np.column_stack([residuals, columns])
-        found = list(projected(cells, stacked, no_form(cells)))
-        self._products = [products for products, _ in found]
-        self._before = np.array([-0.5 * (products[0, 0] + log_det) for products, log_det in found])
-        self.nothing = _log_sum(self._before.tolist())
+    def __init__(self, means: Means, residuals: Floats, columns: Floats) -> None:
+        self._products = means.products(means.of(np.column_stack([residuals, columns])))
+        self.nothing = -0.5 * float(self._products[0, 0])
 
     def gain(self, chosen: Sequence[int] | Integers, base: Floats | None = None) -> tuple[float, Floats]:
-        """Logarithm of the gain in evidence, and the best sizes.
+        """Logarithm of the evidence, but for the same constant, and the best sizes.
 
         Parameters
         ----------
@@ -87,41 +82,34 @@ class Gram:
         """
         rows = np.asarray(chosen, dtype=np.int64) + 1
         start = np.zeros(rows.size) if base is None else base
-        logs, best = [], (-np.inf, start)
-        for products, before in zip(self._products, self._before, strict=True):
-            inner, slope = products[np.ix_(rows, rows)], products[rows, 0]
-            curvature = inner + np.eye(rows.size) / SIZE_PRIOR**2
-            pull = slope + start / SIZE_PRIOR**2
-            step = -np.linalg.solve(curvature, pull)
-            occam = float(np.linalg.slogdet(np.eye(rows.size) + SIZE_PRIOR**2 * inner)[1])
-            log = before - 0.5 * (float(pull @ step) + float(start @ start) / SIZE_PRIOR**2 + occam)
-            logs.append(log)
-            if log > best[0]:
-                best = (log, start + step)
-        return _log_sum(logs), best[1]
+        inner, slope = self._products[np.ix_(rows, rows)], self._products[rows, 0]
+        pull = slope + start / SIZE_PRIOR**2
+        step = -np.linalg.solve(inner + np.eye(rows.size) / SIZE_PRIOR**2, pull)
+        occam = float(np.linalg.slogdet(np.eye(rows.size) + SIZE_PRIOR**2 * inner)[1])
+        log = self.nothing - 0.5 * (float(pull @ step) + float(start @ start) / SIZE_PRIOR**2 + occam)
+        return log, start + step
+
+    def at(self, sizes: Floats) -> float:
+        """Logarithm of the evidence, but for the same constant, of residuals that are those at the sizes."""
+        inner = self._products[1:, 1:]
+        occam = float(np.linalg.slogdet(np.eye(sizes.size) + SIZE_PRIOR**2 * inner)[1])
+        return self.nothing - 0.5 * (float(sizes @ sizes) / SIZE_PRIOR**2 + occam)
 
     def covariance(self, chosen: Sequence[int] | Integers) -> Floats:
         """(columns, columns) covariance of the sizes; errors of the cells are dependent, so that it is tempered."""
         rows = np.asarray(chosen, dtype=np.int64) + 1
-        products = self._products[int(np.argmax(self._before))]
-        inner = TEMPER * products[np.ix_(rows, rows)]
+        inner = TEMPER * self._products[np.ix_(rows, rows)]
         return np.asarray(np.linalg.inv(inner + np.eye(rows.size) / SIZE_PRIOR**2))
 
 
-def _log_sum(logs: Sequence[float]) -> float:
-    """Logarithm of the sum of exponentials of a few numbers."""
-    most = max(logs)
-    return most + float(np.log(sum(np.exp(log - most) for log in logs)))
-
-
 def proposals(
-    cells: Cells, residuals: Floats, atoms: Sequence[Atom], sensitivities: Mapping[Term, Floats]
+    means: Means, residuals: Floats, atoms: Sequence[Atom], sensitivities: Mapping[Term, Floats]
 ) -> list[Proposal]:
     """The best addends of each term, and the best of each smaller number; the most probable proposal first.
 
     Parameters
     ----------
-    cells : Cells
+    means : Means
     residuals : (bins,) array
     atoms : sequence of Atom
     sensitivities : mapping of (bins,) arrays
@@ -132,12 +120,12 @@ def proposals(
     costs = [float(np.log(PART_PRIOR / len(set(places)) / places.count(place))) for place in places]
     found: list[Proposal] = []
     for term, slope in sensitivities.items():
-        columns = [cells.means(slope)]
+        columns = [slope]
         of_atom: dict[int, list[int]] = {-1: [0]}
         for number, atom in enumerate(atoms):
             of_atom[number] = list(range(len(columns), len(columns) + atom.columns.shape[1]))
-            columns += [cells.means(slope * values) for values in atom.columns.T]
-        gram = Gram(cells, cells.means(residuals), np.array(columns).T)
+            columns += [slope * values for values in atom.columns.T]
+        gram = Gram(means, residuals, np.array(columns).T)
         found += _path(term, gram, atoms, of_atom, costs)
     return sorted(found, key=lambda one: -one.log)
 

@@ -5,11 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.sim2real.attribution.attribution import Attribution, attribute
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.trials import Each
+from wetwell.sim2real.correction.learning import columns_of_no_use, learn
+from wetwell.sim2real.diagnosis.correction import Correction, weighed
 from wetwell.sim2real.diagnosis.experiments import next_experiment
 from wetwell.sim2real.diagnosis.findings import found_effects, noise_check, ranking, where_it_lies
 from wetwell.sim2real.diagnosis.limitations import limitations
@@ -40,7 +43,9 @@ from wetwell.simulator.effects.effect import Component
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """All that is found; `station` has the effects added. `attribution` and what follows are for drawings.
+    """All that is found; `station` has the effects, or the correction, added; `remarks` are on that and on columns.
+
+    `attribution` and what follows are for drawings.
 
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
     is in a component, whether an effect of the library or something unknown.
@@ -51,6 +56,8 @@ class Diagnosis:
     effects: tuple[FoundEffect, ...]
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
+    correction: Correction | None
+    remarks: tuple[str, ...]
     posterior: tuple[SetProbability, ...]
     component_probability: dict[str, float]
     station: Station
@@ -83,6 +90,7 @@ class Diagnosis:
             noise_check=noise_check(self.attribution, self.bins),
             candidates=self.candidates,
             gap=self.gap,
+            correction=None if self.correction is None else self.correction.report,
             closed_loop=closed_loop,
             detector=detector,
             signals=tuple(self.gap.by_signal),
@@ -92,7 +100,7 @@ class Diagnosis:
             not_tested=tuple(
                 UntestedEffect(effect=one.effect, reason=one.reason) for one in self.attribution.not_tested
             ),
-            notes=(*notes, *limitations(self.traces)),
+            notes=(*notes, *self.remarks, *limitations(self.traces)),
             next_experiment=next_experiment(self.verdict, names, equivalent, blamed),
         )
 
@@ -147,12 +155,23 @@ def diagnose(
     unknown = localise(excess, found.plain, bins, plain.plant)
     blamed = unknown if found.accepted is None else found.accepted.candidates[0].component
     effects = () if found.accepted is None else found.accepted.effects
-    tables = tuple(EffectTable.model_validate(effect.model_dump()) for effect in effects)
+    tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
+    correction: Correction | None = None
+    remarks = [
+        f"column '{COVARIATE_PREFIX}{name}' {why}: nothing is told by it"
+        for name, why in columns_of_no_use(replay, bins, recording)
+    ]
+    if verdict == "unknown":
+        correction, why = weighed(learn(replay, residuals), bins, plain.plant, rng)
+        tables += [] if correction is None else [correction.table]
+        remarks += [] if why is None else [why]
     return Diagnosis(
         verdict=verdict,
         where=() if verdict == "none" else where_it_lies(found, bins, excess, blamed, rng),
         effects=found_effects(found),
         candidates=ranking(found, bins, rng),
+        correction=correction,
+        remarks=tuple(remarks),
         gap=gap_of(found.plain, found.after, bins, found.validation, rng),
         posterior=found.posterior,
         component_probability=_by_component(found.posterior, unknown),
