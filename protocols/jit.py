@@ -1,12 +1,42 @@
-"""Compilation of the kernels, with types that mypy can follow."""
+"""Compilation of the kernels, with types that mypy can follow; numba is loaded when the first of them is called."""
 
 from collections.abc import Callable
+from functools import cache, cached_property, update_wrapper
+from importlib import import_module
 from typing import Any, Generic, ParamSpec, TypeVar, cast
-
-import numba
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+class Kernel(Generic[P, R]):
+    """A function that is compiled when it is first called: what only looks at a station does without the compiler.
+
+    Attributes
+    ----------
+    py_func : callable
+        The plain Python function.
+    dispatcher : numba's dispatcher
+        Finds the machine code for the types of arguments, and compiles what there is none of.
+    """
+
+    def __init__(self, py_func: Callable[P, R], options: dict[str, Any]) -> None:
+        self.py_func = py_func
+        self._options = options
+        update_wrapper(self, py_func)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call the machine code."""
+        return cast("R", self.dispatcher(*args, **kwargs))
+
+    def __reduce__(self) -> str:
+        """By name, as a function: each process compiles for itself, or loads what is on disk."""
+        return self.py_func.__qualname__
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Numba's, made at the first use."""
+        return _numba().njit(**self._options)(self.py_func)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -18,7 +48,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     Numba takes the code on disk for new while the file of the function that is called from Python is unchanged:
     after a change in a function that it calls, touch it. The plain Python function is its attribute `py_func`.
     """
-    return cast("Callable[P, R]", numba.njit(**_OPTIONS)(function))
+    return Kernel(function, _OPTIONS)
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
@@ -26,7 +56,12 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 
     What unpacks the arguments takes longest to compile where they are tuples of arrays.
     """
-    return cast("Callable[P, R]", numba.njit(**_OPTIONS | {"no_cpython_wrapper": True})(function))
+    return Kernel(function, _OPTIONS | {"no_cpython_wrapper": True})
+
+
+def plain(function: Callable[P, R]) -> Callable[P, R]:
+    """The Python function of a kernel that calls no other: for a few numbers, without the compiler."""
+    return cast("Callable[P, R]", cast("Any", function).py_func)
 
 
 class SameTypes(Generic[P, R]):
@@ -49,13 +84,21 @@ class SameTypes(Generic[P, R]):
 
 def _code_for(function: Callable[P, R], args: tuple[Any, ...]) -> Callable[P, R]:
     """Machine code of a compiled function for arguments of these types."""
-    dispatcher = cast("Any", function)
-    if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
+    dispatcher = cast("Any", getattr(function, "dispatcher", function))
+    if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT, or a plain function
         return function
-    signature = tuple(map(numba.typeof, args))
+    signature = tuple(map(_numba().typeof, args))
     if signature not in dispatcher.overloads:
         dispatcher.compile(signature)
     return cast("Callable[P, R]", dispatcher.overloads[signature].entry_point)
+
+
+@cache
+def _numba() -> Any:
+    """The compiler, which knows that a kernel stands for its machine code; loading it takes longest of all."""
+    numba, extending = import_module("numba"), import_module("numba.extending")
+    extending.typeof_impl.register(Kernel, lambda kernel, _: numba.typeof(kernel.dispatcher))
+    return numba
 
 
 _OPTIONS: dict[str, Any] = {

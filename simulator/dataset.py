@@ -20,6 +20,7 @@ from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.station.sump import Sump
 from wetwell.protocols.timestamps import LEARNING_S
+from wetwell.simulator.control.drivable import check_driven
 from wetwell.simulator.duty import check_operable, duty_flows_m3h
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import FAULTS
@@ -28,7 +29,6 @@ from wetwell.simulator.inflow import INFLOWS
 from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.power import electrical_power_kw
 from wetwell.simulator.scenario import Scenario
-from wetwell.simulator.simulation import check_driven
 
 FaultClass = Literal["normal", "pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault"]
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.jit import plain
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, POWER, AnalogueQuantity
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
@@ -304,7 +305,7 @@ def _rated_power(pump: Pump, electrical: Electrical, rated_m3h: float, rated_m: 
     points = shaft_points(pump.coefficients, pump.power_points, pump.efficiency_points)
     share = electrical.shutoff_power_share
     if not points:
-        return hydraulic_power_kw(rated_m3h, rated_m) / electrical.efficiency, share
+        return plain(hydraulic_power_kw)(rated_m3h, rated_m) / electrical.efficiency, share
     shutoff_kw, slope_kwh_m3 = power_line(points, share, rated_m3h)
     rated_kw = shutoff_kw + slope_kwh_m3 * rated_m3h
     return rated_kw, shutoff_kw / rated_kw

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wetwell.protocols.jit import compiled
+from wetwell.protocols.jit import compiled, plain
 
 Points = Sequence[tuple[float, float]]
 
@@ -109,7 +109,7 @@ def shaft_points(
         return power_points
     c0, c1, c2 = curve
     return [
-        (flow_m3h, hydraulic_power_kw(flow_m3h, c0 + (c1 + c2 * flow_m3h) * flow_m3h) / share)
+        (flow_m3h, plain(hydraulic_power_kw)(flow_m3h, c0 + (c1 + c2 * flow_m3h) * flow_m3h) / share)
         for flow_m3h, share in efficiency_points or ()
     ]
 

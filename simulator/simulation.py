@@ -12,6 +12,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.control import check_levels
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.simulator.control.drivable import check_driven
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.profile import ChannelFault, PumpFault, SensorFault, SystemFault
@@ -189,21 +190,6 @@ class Simulation:
                 f"truth_pump{i + 1}_power_kw": true.power_kw[i],
             }
         return columns
-
-
-def check_driven(station: Station) -> None:
-    """Refuse a station whose pumps nothing in the simulator may start or stop.
-
-    Raises
-    ------
-    ValueError
-        One line.
-    """
-    if station.control.is_external:
-        raise ValueError(
-            f"station '{station.name}': control.mode: 'external': nobody knows when pumps start: replay a recording "
-            "of the station instead"
-        )
 
 
 def _measured(measured: Floats, pumps: int) -> dict[str, Floats]:

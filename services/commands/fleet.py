@@ -7,7 +7,7 @@ import typer
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.inputs import about
-from wetwell.services.commands.options import RUN, ConfigOption, ZenohOption, run, settings_of
+from wetwell.services.commands.options import RUN, ConfigOption, ZenohOption, number, run, settings_of
 
 app = typer.Typer()
 
@@ -21,8 +21,8 @@ def fleet(
         str | None,
         typer.Option(metavar="ADDRESS", help="Dask scheduler, such as tcp://HOST:8786; default: here."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Workers to start, if no scheduler is given.")] = None,
-    shards: Annotated[int | None, typer.Option(min=1, help="Parts that move between workers as a whole.")] = None,
+    workers: Annotated[int | None, number(low=1, help="Workers to start, if no scheduler is given.")] = None,
+    shards: Annotated[int | None, number(low=1, help="Parts that move between workers as a whole.")] = None,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
 ) -> None:

@@ -17,6 +17,7 @@ from wetwell.services.commands.options import (
     TimeZoneOption,
     all_there,
     cores,
+    number,
     positive,
     print_batch,
     print_result,
@@ -31,7 +32,7 @@ app = typer.Typer(no_args_is_help=True, help="The gap between simulation and rea
 def gap_trial(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")],
     seed: SeedOption = 1,
-    cases: Annotated[int, typer.Option(min=1, help="Number of sealed cases.")] = 50,
+    cases: Annotated[int, number(low=1, help="Number of sealed cases.")] = 50,
     plant: Annotated[
         Literal["fine", "swmm", "elastic", "both", "all"],
         typer.Option(help="What stands for reality; both: fine and swmm."),
@@ -51,9 +52,9 @@ def gap_trial(
         str, typer.Option("--without-signals", help="Of level, inflow, flow, head, power; with commas.")
     ] = "",
     with_inflow: Annotated[
-        float, typer.Option("--with-inflow", min=0.0, max=1.0, help="Share of the cases with an inflow meter.")
+        float, number("--with-inflow", low=0.0, high=1.0, help="Share of the cases with an inflow meter.")
     ] = 0.5,
-    workers: Annotated[int, typer.Option(min=1, help="Diagnoses at once.")] = 1,
+    workers: Annotated[int, number(low=1, help="Diagnoses at once.")] = 1,
     scheduler: SchedulerOption = None,
     recalibration: Annotated[
         bool, typer.Option("--recalibration", help="Diagnose each case once more by recalibration only.")
@@ -153,7 +154,7 @@ def gap_diagnose(
         list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes for several recordings; default: as many as cores.")
+        int | None, number(low=1, help="Processes for several recordings; default: as many as cores.")
     ] = None,
     scheduler: SchedulerOption = None,
     as_station: AsStationOption = False,

@@ -38,10 +38,11 @@ def gateway(
     if not files:
         raise ConfigError("gateway: give --plc FILE, or gateway.plcs in the settings")
     from wetwell.protocols.modbus.device_map import check_stations, load_plcs
-    from wetwell.services.gateway.daemon import serve_gateway
 
     plcs = tuple(each for file in files for each in load_plcs(file))
     check_stations(plcs, ", ".join(map(str, files)))
+    from wetwell.services.gateway.daemon import serve_gateway
+
     run(settings, serve_gateway(settings, plcs))
 
 
@@ -49,9 +50,11 @@ def gateway(
 def check(file: PlcOption, as_json: JsonOption = False) -> None:
     """Check a file of PLCs, its maps and station files; show what would be read."""
     from wetwell.protocols.modbus.device_map import load_plcs
+
+    plcs = load_plcs(file)
     from wetwell.services.gateway.survey import described
 
-    print_result({plc.station: described(plc) for plc in load_plcs(file)}, as_json=as_json)
+    print_result({plc.station: described(plc) for plc in plcs}, as_json=as_json)
 
 
 @app.command(cls=about("--plc"))
@@ -60,9 +63,11 @@ def read(file: PlcOption, as_json: JsonOption = False) -> None:
     import asyncio
 
     from wetwell.protocols.modbus.device_map import load_plcs
+
+    plcs = load_plcs(file)
     from wetwell.services.gateway.survey import read_all
 
-    results = asyncio.run(read_all(load_plcs(file)))
+    results = asyncio.run(read_all(plcs))
     print_result(results, as_json=as_json)
     if any("error" in result for result in results.values() if isinstance(result, dict)):
         raise typer.Exit(1)

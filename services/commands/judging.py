@@ -17,6 +17,7 @@ from wetwell.services.commands.options import (
     TimeZoneOption,
     all_there,
     cores,
+    number,
     positive,
     print_batch,
     print_result,
@@ -78,8 +79,8 @@ def backtest(
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", metavar="NAME", help="To simulate; may be given again.")
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds of each scenario.")] = 1,
-    first_seed: Annotated[int, typer.Option("--first-seed", min=0, help="The first of them.")] = 1,
+    seeds: Annotated[int, number(low=1, help="Number of seeds of each scenario.")] = 1,
+    first_seed: Annotated[int, number("--first-seed", low=0, help="The first of them.")] = 1,
     days: Annotated[float | None, typer.Option(help="Length of each; default: the scenario's.")] = None,
     dataset: Annotated[
         Path | None, typer.Option("--dataset", metavar="DIR", help="Folder that `wetwell dataset` has made.")
@@ -93,9 +94,9 @@ def backtest(
         typer.Option(metavar="NAMES", help="With commas between; `all` for every one, FILE.py:CLASS for your own."),
     ] = "wetwell,paper_f_test,paper_tangent,paper_f_shift,paper_tangent_segments",
     learning_h: Annotated[
-        float, typer.Option("--learning-h", min=0.0, help="Runs that end in these first hours are not scored.")
+        float, number("--learning-h", low=0.0, help="Runs that end in these first hours are not scored.")
     ] = 6.0,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    workers: Annotated[int | None, number(low=1, help="Processes; default: as many as cores.")] = None,
     scheduler: SchedulerOption = None,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,

@@ -112,7 +112,7 @@ def modbus_map(
 
     from wetwell.protocols.modbus.registers import register_csv, register_table
     from wetwell.services.stations import find_station
-    from wetwell.simulator.simulation import check_driven
+    from wetwell.simulator.control.drivable import check_driven
 
     plant = find_station(station)
     try:

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -24,6 +24,7 @@ from wetwell.services.commands.options import (
     WordOrderOption,
     ZenohOption,
     live_plant,
+    number,
     parse_duration_s,
     positive,
     print_result,
@@ -33,10 +34,6 @@ from wetwell.services.commands.options import (
     station_name,
     with_data,
 )
-
-if TYPE_CHECKING:
-    from wetwell.services.runtime.settings import Settings
-    from wetwell.services.simulator.daemon import PlantStart
 
 app = typer.Typer()
 
@@ -122,7 +119,7 @@ def simulator(
     ] = False,
     held: Annotated[bool, typer.Option("--held", help="Let the plant stand until an order lets it go.")] = False,
     begin: Annotated[
-        int, typer.Option(min=0, metavar="SECONDS", help="So many seconds were told before: begin behind them.")
+        int, number(low=0, metavar="SECONDS", help="So many seconds were told before: begin behind them.")
     ] = 0,
     stand_at_end: Annotated[
         bool, typer.Option("--stand-at-end", help="Let the plant stand where its scenario ends.")
@@ -133,18 +130,12 @@ def simulator(
     config: ConfigOption = None,
 ) -> None:
     """Simulate a station live and publish its samples on Zenoh."""
-    from wetwell.services.simulator.daemon import PlantStart
+    settings = settings_of(config, zenoh, modbus, word_order)
+    plant, speed = live_plant(station, scenario, seed, speed)
+    from wetwell.services.simulator.daemon import PlantStart, serve_simulator
 
-    _serve_plant(
-        settings_of(config, zenoh, modbus, word_order),
-        station,
-        scenario,
-        seed,
-        speed,
-        zenoh=True,
-        modbus=modbus_server,
-        start=PlantStart(begin, is_held=held, stands_at_end=stand_at_end),
-    )
+    start = PlantStart(begin, is_held=held, stands_at_end=stand_at_end)
+    run(settings, serve_simulator(settings, plant, speed, start, zenoh=True, modbus=modbus_server))
 
 
 @app.command(cls=about("--station"), rich_help_panel=RUN)
@@ -158,9 +149,11 @@ def plc(
     config: ConfigOption = None,
 ) -> None:
     """Simulate a station live behind a Modbus TCP server, as its PLC would show it; needs no Zenoh."""
-    _serve_plant(
-        settings_of(config, None, modbus, word_order), station, scenario, seed, speed, zenoh=False, modbus=True
-    )
+    settings = settings_of(config, None, modbus, word_order)
+    plant, speed = live_plant(station, scenario, seed, speed)
+    from wetwell.services.simulator.daemon import PlantStart, serve_simulator
+
+    run(settings, serve_simulator(settings, plant, speed, PlantStart(), zenoh=False, modbus=True))
 
 
 detector_app = typer.Typer(invoke_without_command=True)
@@ -190,7 +183,7 @@ def detector(
 
 @detector_app.command()
 def rebaseline(
-    pump: Annotated[int, typer.Option(min=1, help="Pump, from 1.")],
+    pump: Annotated[int, number(low=1, help="Pump, from 1.")],
     by: Annotated[str, typer.Option(help="Who orders it; kept in the log and in the verdict.")],
     station: StationOption = "alpha",
     revert: Annotated[bool, typer.Option("--revert", help="Take the baseline back that was put aside last.")] = False,
@@ -251,20 +244,3 @@ def router(zenoh: ZenohOption = None, config: ConfigOption = None) -> None:
     from wetwell.services.router.daemon import serve_router
 
     run(settings, serve_router(settings))
-
-
-def _serve_plant(
-    settings: "Settings",
-    station: str,
-    scenario: str,
-    seed: int,
-    speed: float | None,
-    *,
-    zenoh: bool,
-    modbus: bool,
-    start: "PlantStart | None" = None,
-) -> None:
-    plant, speed = live_plant(station, scenario, seed, speed)
-    from wetwell.services.simulator.daemon import PlantStart, serve_simulator
-
-    run(settings, serve_simulator(settings, plant, speed, start or PlantStart(), zenoh=zenoh, modbus=modbus))

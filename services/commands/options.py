@@ -37,6 +37,24 @@ def built_in(kind: Literal["stations", "scenarios"]) -> Callable[[str], list[str
     return names
 
 
+def number(
+    *names: str,
+    low: float,
+    high: float | None = None,
+    help: str,  # noqa: A002 - as typer calls it
+    metavar: str = "NUMBER",
+) -> Any:
+    """Option of a number of which the help says in words between what it must lie."""
+    limits = f"at least {low:g}" if high is None else f"{low:g} to {high:g}"
+
+    def checked(value: float | None) -> float | None:
+        if value is not None and (value < low or (high is not None and value > high)):
+            raise typer.BadParameter(f"got {value:g}, must be {limits}")
+        return value
+
+    return typer.Option(*names, callback=checked, metavar=metavar, help=f"{help.removesuffix('.')}; {limits}.")
+
+
 StationOption = Annotated[
     str,
     typer.Option(
@@ -58,7 +76,7 @@ ScenarioOption = Annotated[
         autocompletion=built_in("scenarios"),
     ),
 ]
-SeedOption = Annotated[int, typer.Option(min=0, help="Same seed, same numbers.")]
+SeedOption = Annotated[int, number(low=0, metavar="SEED", help="Same seed, same numbers.")]
 SpeedOption = Annotated[
     float | None, typer.Option(help="Seconds of the station in a second on the wall; default: the scenario's.")
 ]

@@ -21,6 +21,7 @@ from wetwell.services.commands.options import (
     TimeZoneOption,
     all_there,
     cores,
+    number,
     plant_of,
     positive,
     print_batch,
@@ -64,7 +65,7 @@ def dataset(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder that is made or completed.")
     ] = None,
-    count: Annotated[int, typer.Option(min=1, help="Number of recordings.")] = 100,
+    count: Annotated[int, number(low=1, help="Number of recordings.")] = 100,
     seed: SeedOption = 1,
     station: Annotated[
         list[str] | None, typer.Option("--station", metavar="FILE", help="Base station; may be given again.")
@@ -73,7 +74,7 @@ def dataset(
     form: Annotated[
         Literal["parquet", "csv.gz"], typer.Option("--format", help="Form of the recordings.")
     ] = "parquet",
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as cores.")] = None,
+    workers: Annotated[int | None, number(low=1, help="Processes; default: as many as cores.")] = None,
     scheduler: SchedulerOption = None,
     check: Annotated[
         Path | None, typer.Option("--check", metavar="DIR", help="Make nothing: verify the checksums of a dataset.")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.options import ConfigOption, JsonOption, print_result
+from wetwell.services.commands.options import ConfigOption, JsonOption, number, print_result
 from wetwell.services.security.role import Role
 
 app = typer.Typer(no_args_is_help=True, help="Tokens of people and programs that use the dashboard.")
@@ -22,7 +22,7 @@ def new(
     name: NameOption,
     role: Annotated[Role, typer.Option("--role", help="viewer: may look; operator: may also act.")] = "viewer",
     days: Annotated[
-        int, typer.Option("--days", min=0, max=3650, metavar="DAYS", help="Days until it ends; 0: it does not end.")
+        int, number("--days", low=0, high=3650, metavar="DAYS", help="Days until it ends; 0: it does not end.")
     ] = 365,
     file: FileOption = None,
     config: ConfigOption = None,

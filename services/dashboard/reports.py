@@ -1,5 +1,6 @@
 """Reports that lie in a folder of the site, such as those of `wetwell gap diagnose`."""
 
+import contextlib
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -38,7 +39,8 @@ def find_report(folder: Path | None, name: str) -> Path:
         If there is none in the folder.
     """
     if folder is not None:
-        path = (folder / name).resolve()
-        if path.suffix == SUFFIX and path.is_file() and path.is_relative_to(folder.resolve()):
-            return path
+        with contextlib.suppress(ValueError, OSError):  # no file can have such a name: a zero byte, or too long
+            path = (folder / name).resolve()
+            if path.suffix == SUFFIX and path.is_file() and path.is_relative_to(folder.resolve()):
+                return path
     raise RefusalError(404, f"no report '{name}'")

@@ -1,7 +1,8 @@
-"""What an engineer reads first of a diagnosis: what, where, how large, how sure, what to do."""
+"""What an engineer reads first of a diagnosis: what, where, how large, how sure."""
 
 import numpy as np
 
+from wetwell.services.reports.charts import percent
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.diagnosis.report import FoundEffect, GapReport
 from wetwell.sim2real.recording.traces import Traces
@@ -9,32 +10,58 @@ from wetwell.sim2real.replay.replay import Prediction
 
 FULL_SPEED = 0.995
 """Share of a pump's highest frequency from which it runs at full speed."""
+SEEN = 0.001
+"""Share of a signal under which a difference is not told."""
 NAMES_OF = {"flow_m3h": ("flow", "m³/h"), "head_m": ("head", "m"), "power_kw": ("power", "kW")}
 
 
 def lead(report: GapReport, diagnosis: Diagnosis) -> str:
-    """One or two sentences, with sizes in physical units."""
-    before = differences(diagnosis.traces, diagnosis.replay.run())
-    sizes = ", ".join(
-        f"{NAMES_OF[name][0]} {value:+.3g} {NAMES_OF[name][1]} ({share:+.1%})"
-        for name, (value, share) in before.items()
-    )
-    seen = f" At full speed the station differs from its simulator on average by: {sizes}." if sizes else ""
+    """One sentence: what, where, how large in physical units, how sure."""
+    sizes = _sizes(differences(diagnosis.traces, diagnosis.replay.run()))
     where = report.where[0].component.replace("_", " ") if report.where else "station"
-    low, high = report.gap.shrinkage_ci
+    sure = f"with a probability of {percent(report.posterior[0].probability)}" if report.posterior else "as it seems"
     if report.verdict == "none":
-        return f"Station {report.station} runs as its simulator says, but for what its sensors may be off.{seen}"
+        seen = f": at full speed it has {sizes}" if sizes else ""
+        return f"Station {report.station} runs as its simulator says, but for what does not matter, {sure}{seen}."
+    seen = f": at full speed it has {sizes} than its simulator says" if sizes else ""
     if report.verdict == "unknown":
         return (
             f"Something in the {where} of station {report.station} is otherwise than its file says, and no effect of "
-            f"the library explains it.{seen}"
+            f"the library explains it, {sure}{seen}."
         )
     told = " and ".join(_told(effect) for effect in report.effects)
+    return f"In the {where} of station {report.station} there is {told}, {sure}{seen}."
+
+
+def shrinkage_words(report: GapReport) -> str:
+    """How much of the gap the effects close."""
+    low, high = report.gap.shrinkage_ci
     return (
-        f"In the {where} of station {report.station} there is {told}. With it the simulator closes "
-        f"{report.gap.shrinkage:.0%} of the gap on cycles that it was not fitted to (95 % interval {low:.0%} to "
-        f"{high:.0%}).{seen}"
+        f"With it the simulator closes {percent(report.gap.shrinkage)} of the gap (95 % interval {percent(low)} to "
+        f"{percent(high)}), on cycles that it was not fitted to. The file station.toml beside this page holds it."
     )
+
+
+def effect_words(name: str) -> str:
+    """Name of an effect or of its parameter, in words."""
+    return name.replace("_", " ")
+
+
+def _sizes(found: dict[str, tuple[float, float]]) -> str:
+    """Differences that one can see, in words.
+
+    Examples
+    --------
+    >>> _sizes({"flow_m3h": (-19.4, -0.097), "head_m": (1.44, 0.055), "power_kw": (0.001, 0.0)})
+    'flow 19.4 m³/h (9.7 %) lower and head 1.44 m (5.5 %) higher'
+    """
+    told = [
+        f"{NAMES_OF[name][0]} {abs(value):.3g} {NAMES_OF[name][1]} ({percent(abs(share))}) "
+        f"{'higher' if value > 0.0 else 'lower'}"
+        for name, (value, share) in found.items()
+        if abs(share) >= SEEN
+    ]
+    return " and ".join(filter(None, [", ".join(told[:-1]), *told[-1:]]))
 
 
 def differences(traces: Traces, predicted: Prediction) -> dict[str, tuple[float, float]]:
@@ -68,4 +95,4 @@ def _told(effect: FoundEffect) -> str:
     other = (
         f", or {' or '.join(effect.equivalent)}, which these data cannot tell from it" if effect.equivalent else ""
     )
-    return f"{effect.name.replace('_', ' ')} ({'; '.join(sizes)}){other}".replace("_", " ")
+    return f"{effect_words(effect.name)} ({'; '.join(sizes)}){other}".replace("_", " ")

@@ -3,11 +3,13 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from wetwell.protocols.recordings.kpi import Kpis
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.text_table import SCREEN_WIDTH, text_table
+
+if TYPE_CHECKING:
+    from wetwell.protocols.recordings.kpi import Kpis
 
 
 def as_json(value: object) -> str:
@@ -43,7 +45,7 @@ def as_lines(result: Mapping[str, object], indent: str = "") -> str:
     return "\n".join(lines)
 
 
-def kpi_table(figures: Kpis, labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:
+def kpi_table(figures: "Kpis", labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:
     """Figures of a recording by day and in total, and by hour where asked for; what is not known is None.
 
     Parameters

@@ -43,17 +43,17 @@ def described_schema(model: type[BaseModel], mode: JsonSchemaMode = "validation"
     'm²'
     """
     schema = model.model_json_schema(mode=mode)
-    describe(schema, [model, *_parts(model)])
+    describe(schema, [model])
     return schema
 
 
 def describe(schema: dict[str, Any], models: Iterable[type[BaseModel]]) -> None:
-    """Write into a schema what the docstrings of its models, and of what they build on, say of each key.
+    """Write into a schema what the docstrings of its models, and of what they build on and hold, say of each key.
 
     A key of which they say nothing, and whose value is a table, has what is said of that table.
     """
     tables = schema.get("$defs", {})
-    for part in dict.fromkeys(models):
+    for part in dict.fromkeys(part for model in models for part in (model, *_parts(model))):
         table = schema if part.__name__ == schema.get("title") else tables.get(part.__name__)
         if table is None:
             continue

@@ -4,8 +4,11 @@ import importlib
 import os
 from pathlib import Path
 
-import numba.core.dispatcher
+import numba
 import pytest
+from numba.core.dispatcher import Dispatcher
+
+from wetwell.protocols.jit import Kernel
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("protocols", "simulator", "detector", "sim2real")
@@ -24,7 +27,7 @@ def test_every_compiled_function_is_in_the_name_of_the_folder(sources):
         Path(value.py_func.__code__.co_filename).resolve()
         for module in modules
         for value in vars(module).values()
-        if isinstance(value, numba.core.dispatcher.Dispatcher)
+        if isinstance(value, (Kernel, Dispatcher))
     }
     assert len(compiled) > 20
     assert compiled <= set(sources)

@@ -5,9 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import Store
-from wetwell.services.historian.store.postgres_store import PostgresStore
 from wetwell.services.runtime.settings import HistorianSettings
 
 
@@ -30,11 +28,15 @@ def open_store(settings: HistorianSettings, *, alone: bool = True, must_exist: b
         "keep_days": settings.keep_days,
     }
     if settings.url is not None:
+        from wetwell.services.historian.store.postgres_store import PostgresStore  # noqa: PLC0415 - each site has one
+
         url = settings.url.get_secret_value()
         store = PostgresStore(url, password_file=settings.password_file, is_alone=alone, **limits)
     else:
         if must_exist and not settings.folder.is_dir():
             raise ConfigError(f"historian.folder: {settings.folder}: there is no history")
+        from wetwell.services.historian.store.folder_store import FolderStore  # noqa: PLC0415
+
         store = folder = FolderStore(settings.folder, **limits)
         lock = folder.alone() if alone else lock
     with contextlib.closing(store), lock:

@@ -8,6 +8,7 @@ from wetwell.services.reports.charts.bar_chart import bar_chart
 from wetwell.services.reports.charts.heat_map import heat_map
 from wetwell.services.reports.charts.line_chart import Series, Span, line_chart, scatter
 from wetwell.services.reports.charts.page import Section, folded, page, paragraph, table
+from wetwell.services.reports.charts.share_bars import percent, share_bars
 
 __all__ = [
     "Section",
@@ -19,6 +20,8 @@ __all__ = [
     "line_chart",
     "page",
     "paragraph",
+    "percent",
     "scatter",
+    "share_bars",
     "table",
 ]

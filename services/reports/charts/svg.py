@@ -11,10 +11,10 @@ PENS = ("#22506e", "#7a5a1e", "#5c4b80", "#2f6a58", "#9a3b4c", "#4d565f")
 INK, MUTED, GRID = "var(--ink,#1c2126)", "var(--muted,#4d565f)", "var(--soft,#ced3d7)"
 
 
-def svg(title: str, description: str, body: Iterable[str], height: float = HEIGHT) -> str:
+def svg(title: str, description: str, body: Iterable[str], height: float = HEIGHT, width: int = WIDTH) -> str:
     """Whole chart, with what is read to those who cannot see it."""
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {WIDTH} {height:g}" width="{WIDTH}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width} {height:g}" width="{width}" '
         f'height="{height:g}" font-family="system-ui,sans-serif" font-size="12">'
         f"<title>{escape(title)}</title><desc>{escape(description)}</desc>"
         f'<text x="4" y="18" font-size="14" font-weight="600" style="fill:{INK}">{escape(title)}</text>'

@@ -22,6 +22,7 @@ class PartTable(Table):
     column : str, optional
         Name of that column, without its prefix.
     shape : str
+        How it goes by that.
     size : float
         Share of the term's reference. [1]
     centre, scale : float

@@ -2,11 +2,10 @@
 
 import sys
 
-from numba.core.dispatcher import Dispatcher
-
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import blocks
+from wetwell.protocols.jit import Kernel
 from wetwell.services.detector.kernels import load_kernels
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
@@ -17,11 +16,11 @@ DEMO_S = 64_800
 def compiled() -> dict[str, int]:
     """Number of compiled forms of each function of the detector that is called from Python."""
     return {
-        f"{name}.{each}": len(value.signatures)
+        f"{name}.{each}": len(value.dispatcher.signatures)
         for name, module in list(sys.modules.items())
         if name.startswith("wetwell.detector")
         for each, value in vars(module).items()
-        if isinstance(value, Dispatcher)
+        if isinstance(value, Kernel)
     }
 
 
