@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wetwell.services.reports.charts import Series, line_chart, paragraph, scatter, table
+from wetwell.services.reports.charts import Series, paragraph, scatter, table
 from wetwell.sim2real.correction.wording import COVARIATES_IN_WORDS, name_of
 from wetwell.sim2real.diagnosis.correction import Correction
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
@@ -13,7 +13,7 @@ DRAWN_BINS = 1500
 
 
 def correction_section(correction: Correction, diagnosis: Diagnosis) -> str:
-    """HTML of a correction that was taken: a sentence, the equation, sizes, and a picture of each thing it goes by."""
+    """HTML of a correction that was taken: a sentence, the equation, sizes, a picture of each thing it goes by."""
     report = correction.report
     low, high = report.shrinkage_ci
     words = [

@@ -269,7 +269,7 @@ class CorrectionAddend(_Part):
     Parameters
     ----------
     covariate : str
-        What it goes by: a name of the table of covariates, the name of a column, or `offset` for one that is constant.
+        What it goes by: a covariate, a column by its name, or `offset` for one that is constant.
     shape : str, optional
         Name of its shape; none for an offset.
     size : float
