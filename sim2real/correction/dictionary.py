@@ -10,7 +10,7 @@ from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.simulator.corrections.parts import SHAPES, Shape, shapes_at
 from wetwell.simulator.effects.station.correction_part import PartTable
 
-RANGE = (0.01, 0.99)
+KNOWN_RANGE = (0.01, 0.99)
 """Quantiles of a covariate between which its shapes are known."""
 DECAYS_S = (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
 """Time constants that are tried."""
@@ -19,7 +19,7 @@ STEPS_S = (15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 180.0, 300.0)
 LOGARITHM_S = 60.0
 """Time after which a logarithm of a time begins to bend. [s]"""
 PERIOD_RATIO = 1.15
-FINER = 15
+FINER_PERIODS = 15
 LONGEST_PERIOD, SHORTEST_PERIOD = 2.0, 0.125
 """Ratio of periods of days that are tried one after the other, and how many around the best are tried then; the
 longest and the shortest over the length of the recording."""
@@ -124,7 +124,7 @@ ALIKE = 0.9995
 
 
 def _atoms(place: Place, values: Floats, known: Floats) -> list[Atom]:
-    low, high = (float(value) for value in np.quantile(known, RANGE))
+    low, high = (float(value) for value in np.quantile(known, KNOWN_RANGE))
     if low >= high:
         low, high = float(known.min()), float(known.max())
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -171,7 +171,7 @@ def near(atom: Atom, values: Floats) -> list[Atom]:
     """A swing over the days, with periods around its own; any other atom as it is."""
     if atom.place[0] != "days" or atom.shape != "cosine":
         return [atom]
-    scales = atom.scale * PERIOD_RATIO ** np.linspace(-1.0, 1.0, FINER)
+    scales = atom.scale * PERIOD_RATIO ** np.linspace(-1.0, 1.0, FINER_PERIODS)
     return [_made(atom.place, values, "cosine", 0.0, float(scale), (atom.low, atom.high)) for scale in scales]
 
 

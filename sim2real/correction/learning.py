@@ -9,7 +9,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.sim2real.correction.bin_covariates import Place, bin_covariates
-from wetwell.sim2real.correction.dictionary import Atom, dictionary, near
+from wetwell.sim2real.correction.dictionary import PERIOD_RATIO, Atom, dictionary, near
 from wetwell.sim2real.correction.means import means_of
 from wetwell.sim2real.correction.selection import PROPOSED, SIZE_PRIOR, Gram, Proposal, proposals
 from wetwell.sim2real.likelihood.posterior import TEMPER
@@ -24,7 +24,7 @@ from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 
 PROBE = 0.01
 """Correction by which the slopes of a term are found. [1]"""
-ROUNDS = 4
+REFINEMENTS = 4
 """Refinements of a proposal in the simulator."""
 LOOKS = 2
 """Looks at all terms after the first, each without what the one before has shown to be far off."""
@@ -133,7 +133,7 @@ class Workshop:
     def tried(self, proposal: Proposal) -> _Tried | None:
         """A proposal refined in the simulator; None where no station works with it, or none of it matters."""
         found: _Tried | None = None
-        for _ in range(ROUNDS):
+        for _ in range(REFINEMENTS):
             try:
                 now = self._at(proposal)
             except ValueError:
@@ -141,7 +141,7 @@ class Workshop:
             if found is not None and now.proposal.log <= found.proposal.log:
                 break
             found = now
-            _, sizes = now.gram.gain(range(proposal.sizes.size), proposal.sizes)
+            _, sizes = self._robust(now).gain(range(proposal.sizes.size), proposal.sizes)
             proposal = replace(proposal, sizes=sizes)
         if found is None:
             return None
@@ -149,6 +149,11 @@ class Workshop:
         if not kept.atoms and not self._means.matters(found.slopes[:, 0] * found.proposal.sizes[0]):
             return None
         return found if len(kept.atoms) == len(found.proposal.atoms) else self.tried(kept)
+
+    def _robust(self, tried: _Tried) -> Gram:
+        """Products of residuals that count by what the loss makes of them: the weights of the next step."""
+        root = np.sqrt(_weight(tried.residuals))
+        return Gram(self._means, tried.residuals * root, tried.slopes * root[:, None])
 
     def _material(self, found: _Tried) -> Proposal:
         """The proposal without addends that matter nowhere."""
@@ -178,15 +183,33 @@ class Workshop:
         """(bins,) residuals where each part of the time is predicted by sizes that the others gave."""
         bins = self.bins
         block = np.minimum(bins.second * BLOCKS // (int(bins.second.max()) + 1), BLOCKS - 1)
-        weight = 1.0 / (1.0 + bins.material**2)
+        weight = _weight(tried.residuals) / (1.0 + bins.material**2)
         start, found = tried.proposal.sizes, tried.residuals.copy()
         for one in range(BLOCKS):
             given = block != one
             slopes = tried.slopes[given]
             curvature = slopes.T @ (weight[given, None] * slopes) + np.eye(start.size) / SIZE_PRIOR**2
-            pull = slopes.T @ (weight[given] * asinh_loss(tried.residuals[given])) + start / SIZE_PRIOR**2
+            pull = slopes.T @ (weight[given] * tried.residuals[given]) + start / SIZE_PRIOR**2
             found[~given] -= tried.slopes[~given] @ np.linalg.solve(curvature, pull)
         return found
+
+
+def _weight(residuals: Floats) -> Floats:
+    """(bins,) weights of squares under which least squares goes where the loss leads."""
+    known = np.where(residuals == 0.0, 1.0, residuals)
+    return np.where(residuals == 0.0, 1.0, asinh_loss(known) / known)
+
+
+def _of_calendar(proposal: Proposal, atoms: Sequence[Atom]) -> Proposal | None:
+    """The proposal with the hour of the day in the place of a swing whose period is about that; None without one."""
+    found = list(proposal.atoms)
+    for place, atom in enumerate(found):
+        if atom.place[0] == "days" and atom.shape == "cosine":
+            for other in atoms:
+                is_near = abs(np.log(24.0 * atom.scale / other.scale)) < np.log(PERIOD_RATIO)
+                if other.place[0] == "hour_of_day" and is_near:
+                    found[place] = other
+    return None if found == list(proposal.atoms) else replace(proposal, atoms=tuple(found))
 
 
 def _first_of_each(found: Sequence[Proposal]) -> list[list[Proposal]]:
@@ -239,6 +262,8 @@ def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
     best: _Tried | None = None
     for proposals_of_term in _first_of_each(shop.proposals(atoms, covariates)):
         tried = next((one for one in map(shop.tried, proposals_of_term) if one is not None), None)
+        if tried is not None and (daily := _of_calendar(tried.proposal, atoms)) is not None:
+            tried = max(tried, shop.tried(daily) or tried, key=lambda one: one.proposal.log)
         if tried is not None and tried.proposal.log > (0.0 if best is None else best.proposal.log):
             best = tried
     if best is None:

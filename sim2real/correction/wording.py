@@ -21,7 +21,12 @@ TERMS_IN_WORDS: dict[Term, str] = {
     "level_balance": "the flow into the wet well",
     "level_reading": "the reading of the level sensor",
 }
-UNITS: dict[Term, str] = {"static_head": "m", "head_reading": "m", "level_balance": "m³/h", "level_reading": "m"}
+UNITS_OF_TERMS: dict[Term, str] = {
+    "static_head": "m",
+    "head_reading": "m",
+    "level_balance": "m³/h",
+    "level_reading": "m",
+}
 """Units of terms that a correction is added to; all others it multiplies."""
 COVARIATES_IN_WORDS: dict[Covariate, tuple[str, str, str]] = {
     "level_m": ("the level", "m", "what the level covers or opens: air drawn in, a bench, a siphon"),
@@ -60,7 +65,7 @@ def amount(value: float, term: Term, reference: float, *, signed: bool = True) -
     ('+12 %', '-2.6 m')
     """
     sign = "+" if signed else ""
-    unit = UNITS.get(term)
+    unit = UNITS_OF_TERMS.get(term)
     return f"{100.0 * value:{sign}.3g} %" if unit is None else f"{reference * value:{sign}.3g} {unit}"
 
 
@@ -79,7 +84,7 @@ def equation(effect: LearntCorrection, reference: float) -> str:
     >>> equation(LearntCorrection.model_validate({"term": "head_loss", "offset": 0.05, "part": [part]}), 1.0)
     'head_loss × (1 + 0.05 + 0.12 · cos 2π(hour_of_day − 5 h) / 24 h)'
     """
-    unit = UNITS.get(effect.term)
+    unit = UNITS_OF_TERMS.get(effect.term)
     scale = 1.0 if unit is None else reference
     of_unit = "" if unit is None else f" {unit}"
     addends = [f"{_signed(scale * effect.offset)}{of_unit}"] if effect.offset else []

@@ -7,7 +7,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.correction.learning import Learnt
-from wetwell.sim2real.correction.wording import UNITS, equation, name_of, sentence
+from wetwell.sim2real.correction.wording import UNITS_OF_TERMS, equation, name_of, sentence
 from wetwell.sim2real.diagnosis.report import CorrectionAddend, CorrectionReport, Gap
 from wetwell.sim2real.diagnosis.shrinkage import gap_of
 from wetwell.sim2real.residuals.bins import Bins
@@ -76,7 +76,7 @@ def weighed(
 
 def _addends(learnt: Learnt, reference: float) -> tuple[CorrectionAddend, ...]:
     effect, ends = learnt.effect, np.cumsum([0, 1, *(atom.columns.shape[1] for atom in learnt.atoms)])
-    unit = UNITS.get(effect.term)
+    unit = UNITS_OF_TERMS.get(effect.term)
     scale = 1.0 if unit is None else reference
     names = [("offset", None), *((name_of(part), part.shape) for part in effect.part)]
     values = [effect.offset, *(part.size for part in effect.part)]

@@ -42,7 +42,7 @@ def correct(plant: PlantRecords, state: PlantState, forcing: Forcing, second: in
         for i in range(state.pumps.size):
             if part.pump not in (ALL, i) or part.main not in (ALL, plant.pumps[i].main):
                 continue
-            if part.term < LEVEL_BALANCE and not _is_used(state, i):
+            if part.term < LEVEL_BALANCE and not _is_used(part.term, i, plant, state):
                 continue
             value = _covariate(part.covariate, part.column, part.term, i, plant, state, forcing, second, level_m)
             shape = shape_at(part.shape, value, part.centre, part.scale, part.low, part.high)
@@ -59,9 +59,15 @@ def _is_seen(j: int, i: int, term: int, plant: PlantRecords) -> bool:
 
 
 @inlined
-def _is_used(state: PlantState, i: int) -> bool:
-    """Whether pump i turns, or water moves in it."""
-    return state.pumps[i].frequency_hz > 0.0 or state.mean_flow_m3h[i] > 0.0 or state.pumps[i].shaft_ratio > 0.0
+def _is_used(term: int, i: int, plant: PlantRecords, state: PlantState) -> bool:
+    """Whether a pump that counts for a term at pump i turns, or water moves in it."""
+    for j in range(state.pumps.size):
+        pump = state.pumps[j]
+        if (pump.frequency_hz > 0.0 or pump.shaft_ratio > 0.0 or state.mean_flow_m3h[j] > 0.0) and _is_seen(
+            j, i, term, plant
+        ):
+            return True
+    return False
 
 
 @inlined
