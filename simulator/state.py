@@ -8,7 +8,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.orders import AUTOMATIC, first_place
-from wetwell.simulator.corrections.parts import COVARIATES, TERMS
+from wetwell.simulator.corrections.parts import TERMS
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import channels
@@ -90,7 +90,6 @@ class PlantState(NamedTuple):
     flow_before_m3h: Floats
     mean_flow_m3h: Floats
     correction: Floats
-    covariates: Floats
     past: Floats
     level_history: Floats
     started: Integers
@@ -125,7 +124,6 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         flow_before_m3h=np.zeros(pumps),
         mean_flow_m3h=np.zeros(pumps),
         correction=np.zeros((len(TERMS), pumps)),
-        covariates=np.zeros(len(COVARIATES)),
         past=np.full((channels(pumps), PAST_S), np.nan),
         level_history=np.full(PAST_S, np.nan),
         started=np.zeros(pumps, dtype=np.int64),

@@ -27,6 +27,8 @@ app = typer.Typer()
 station_app = typer.Typer(no_args_is_help=True, help="Station files.")
 config_app = typer.Typer(no_args_is_help=True, help="Settings of the services.")
 app.add_typer(station_app, name="station", rich_help_panel=ADMINISTER)
+effects_app = typer.Typer(help="Effects that a station file may name.")
+app.add_typer(effects_app, name="effects", rich_help_panel=ADMINISTER)
 app.add_typer(config_app, name="config", rich_help_panel=ADMINISTER)
 
 
@@ -126,9 +128,11 @@ def modbus_map(
         typer.echo(register_csv(table), nl=False)
 
 
-@app.command(rich_help_panel=ADMINISTER)
-def effects(*, as_json: JsonOption = False) -> None:
-    """List the effects that a station file may name, with their parameters."""
+@effects_app.callback(invoke_without_command=True)
+def effects(context: typer.Context, *, as_json: JsonOption = False) -> None:
+    """List the effects that a station file may name, with their parameters; or write a new one."""
+    if context.invoked_subcommand is not None:
+        return
     from wetwell.services.reports.part_tables import effect_lines
     from wetwell.simulator.effects import effect_table
 
@@ -137,6 +141,21 @@ def effects(*, as_json: JsonOption = False) -> None:
         print_result({"effects": table}, as_json=True)
     else:
         typer.echo(effect_lines(table))
+
+
+@effects_app.command("new")
+def effects_new(
+    diagnosis: Annotated[
+        Path, typer.Option("--from", metavar="DIR", help="Folder of a diagnosis that has taken a correction.")
+    ],
+    name: Annotated[str, typer.Option("--name", metavar="NAME", help="Of the effect, such as night_grease.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="For its source, its test and what else to do.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Write the files of a new effect from the correction of a diagnosis, for a person to finish."""
+    from wetwell.services.batch.new_effect import new_effect
+
+    print_result(new_effect(diagnosis, name, out), as_json=as_json)
 
 
 @app.command(rich_help_panel=ADMINISTER)

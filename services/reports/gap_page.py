@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from wetwell.services.reports.charts import Section, folded, page, paragraph, share_bars, table
+from wetwell.services.reports.gap_correction import correction_section
 from wetwell.services.reports.gap_lead import effect_words, lead, shrinkage_words
 from wetwell.services.reports.gap_pictures import duty_picture, trace_pictures
 from wetwell.services.reports.gap_statistics import statistics
@@ -23,6 +24,9 @@ def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
         *(paragraph(f"Note: {note}.") for note in report.notes),
     ]
     sections = [Section("What it says", "".join(first)), Section("How sure that is", _posterior(report))]
+    if diagnosis.correction is not None:
+        section = correction_section(diagnosis.correction, diagnosis)
+        sections.append(Section("An equation for what nobody has named", section))
     if {"flow_m3h", "head_m"} <= diagnosis.traces.signals.keys():
         sections.append(Section("Head over flow", duty_picture(diagnosis)))
     sections.append(Section("Measured and simulated", trace_pictures(diagnosis)))

@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.sim2real.attribution.attribution import Attribution, attribute
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.trials import Each
+from wetwell.sim2real.correction.learning import columns_of_no_use, learn
+from wetwell.sim2real.diagnosis.correction import Correction, weighed
 from wetwell.sim2real.diagnosis.findings import found_effects, noise_check, ranking, where_it_lies
 from wetwell.sim2real.diagnosis.limitations import limitations
 from wetwell.sim2real.diagnosis.localisation import localise
@@ -48,7 +51,9 @@ from wetwell.simulator.effects.effect import Component
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """All that is found; `station` has the effects added. `attribution` and what follows are for drawings.
+    """All that is found; `station` has the effects, or the correction, added; `remarks` are on that and on columns.
+
+    `attribution` and what follows are for drawings.
 
     `own_effects` are the effects with their sizes by this recording alone, without what other stations say.
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
@@ -62,6 +67,8 @@ class Diagnosis:
     own_effects: tuple[FoundEffect, ...]
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
+    correction: Correction | None
+    remarks: tuple[str, ...]
     posterior: tuple[SetProbability, ...]
     component_probability: dict[str, float]
     proposals: Proposals
@@ -97,6 +104,7 @@ class Diagnosis:
             ),
             candidates=self.candidates,
             gap=self.gap,
+            correction=None if self.correction is None else self.correction.report,
             closed_loop=closed_loop,
             detector=detector,
             signals=tuple(self.gap.by_signal),
@@ -106,7 +114,7 @@ class Diagnosis:
             not_tested=tuple(
                 UntestedEffect(effect=one.effect, reason=one.reason) for one in self.attribution.not_tested
             ),
-            notes=(*notes, *limitations(self.traces)),
+            notes=(*notes, *self.remarks, *limitations(self.traces)),
             recordings=_recordings(self.traces),
             experiments=proposed_acts(self.proposals),
             refused=refused_acts(self.proposals),
@@ -154,7 +162,8 @@ def diagnose(
     library = candidates_of(len(station.pump), len(station.mains), only=only, without=without)
     is_external = station.control.is_external
     candidates = [each for each in library if not (is_external and each.component == "controller")]
-    traces = _taken([recording] if isinstance(recording, Recording) else recording, station)
+    recordings = [recording] if isinstance(recording, Recording) else recording
+    traces = _taken(recordings, station)
     regimes = regimes_of(traces, station)
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
@@ -170,13 +179,25 @@ def diagnose(
     effects = () if found.accepted is None else found.accepted.effects
     conditions = conditions_of(traces, station)
     possible = found.possible if verdict != "unknown" else ()
-    tables = tuple(EffectTable.model_validate(effect.model_dump()) for effect in effects)
+    tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
+    correction: Correction | None = None
+    columns = list(dict.fromkeys(name for one in recordings for name in one.covariates))
+    remarks = [
+        f"column '{COVARIATE_PREFIX}{name}' {why}: nothing is told by it"
+        for name, why in columns_of_no_use(replay, bins, columns)
+    ]
+    if verdict == "unknown":
+        correction, why = weighed(learn(replay, residuals), bins, plain.plant, rng)
+        tables += [] if correction is None else [correction.table]
+        remarks += [] if why is None else [why]
     return Diagnosis(
         verdict=verdict,
         where=() if verdict == "none" else where_it_lies(found, bins, excess, blamed, rng),
         effects=found_effects(found.accepted, found.ends, found.equivalent),
         own_effects=found_effects(found.own, found.own_ends, found.equivalent),
         candidates=ranking(found, bins, rng),
+        correction=correction,
+        remarks=tuple(remarks),
         gap=gap_of(found.plain, found.after, bins, found.validation, rng),
         posterior=found.posterior,
         component_probability=_by_component(found.posterior, unknown),

@@ -8,6 +8,7 @@ from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.sim2real.experiments.reported import ProposedAct, RefusedAct
 from wetwell.sim2real.recording.regimes import Regime
 from wetwell.sim2real.residuals.bins import Signal
+from wetwell.simulator.corrections.parts import Term
 from wetwell.simulator.effects.effect import Component
 
 Short = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
@@ -284,6 +285,63 @@ class DiagnosedRecording(_Part):
     is_by_hand: bool
 
 
+class CorrectionAddend(_Part):
+    """An addend of a correction.
+
+    Parameters
+    ----------
+    covariate : str
+        What it goes by: a covariate, a column by its name, or `offset` for one that is constant.
+    shape : str, optional
+        Name of its shape; none for an offset.
+    size : float
+        How large it is where its shape is 1.
+    ci : (float, float)
+        In which the true size lies with 95 %, if term and covariate are right.
+    unit : str
+        Of the size; "1" for a share of the term.
+    """
+
+    covariate: str
+    shape: str | None
+    size: Short
+    ci: ShortInterval
+    unit: str
+
+
+class CorrectionReport(_Part):
+    """What is added to one term of the model where no effect of the library explains a gap.
+
+    Parameters
+    ----------
+    term : str
+        The term that is corrected.
+    component : str
+        Where the cause then lies.
+    covariates : list of str
+        What the correction goes by; empty for a constant.
+    equation : str
+        With units.
+    sentence : str
+        What it says, and what to look for.
+    addends : list of CorrectionAddend
+        The offset, then the others.
+    shrinkage : float
+        Share of the gap that it closes on parts of the time that its sizes do not come from. [1]
+    shrinkage_ci : (float, float)
+        In which that lies with 95 %. [1]
+    """
+
+    term: Term
+    component: Component
+    covariates: tuple[str, ...]
+    equation: str
+    sentence: str
+    addends: tuple[CorrectionAddend, ...]
+    shrinkage: Short
+    shrinkage_ci: ShortInterval
+
+
 class GapReport(_Part):
     """What `wetwell gap diagnose` writes.
 
@@ -310,6 +368,9 @@ class GapReport(_Part):
         Single effects, the best first.
     gap : Gap
         How far the simulator is off, before and after.
+    correction : CorrectionReport, optional
+        An equation for what no effect explains, where the verdict is `unknown` and one was found; else a note says
+        why there is none.
     closed_loop : ClosedLoopComparison, optional
         The simulator running free; none where level or inflow do not allow it.
     detector : DetectorVerdicts, optional
@@ -348,6 +409,7 @@ class GapReport(_Part):
     noise_check: tuple[NoiseCheck, ...] = ()
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
+    correction: CorrectionReport | None = None
     closed_loop: ClosedLoopComparison | None
     detector: DetectorVerdicts | None = None
     signals: tuple[str, ...]

@@ -12,7 +12,6 @@ from wetwell.simulator.corrections.parts import (
     IDLE_BEFORE,
     LEVEL_BALANCE,
     LEVEL_COVARIATE,
-    PUMPS_ON_MAIN,
     SINCE_START,
     SPEED_COVARIATE,
     STATIC_HEAD,
@@ -43,11 +42,9 @@ def correct(plant: PlantRecords, state: PlantState, forcing: Forcing, second: in
         for i in range(state.pumps.size):
             if part.pump not in (ALL, i) or part.main not in (ALL, plant.pumps[i].main):
                 continue
-            if part.covariate == COLUMN:
-                value = forcing.columns[part.column, second]
-            else:
-                _look(part.term, i, plant, state, forcing, second, level_m)
-                value = state.covariates[part.covariate]
+            if part.term < LEVEL_BALANCE and not _is_used(part.term, i, plant, state):
+                continue
+            value = _covariate(part.covariate, part.column, part.term, i, plant, state, forcing, second, level_m)
             shape = shape_at(part.shape, value, part.centre, part.scale, part.low, part.high)
             added[part.term, i] += part.size * shape
 
@@ -62,27 +59,69 @@ def _is_seen(j: int, i: int, term: int, plant: PlantRecords) -> bool:
 
 
 @inlined
-def _look(
-    term: int, i: int, plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, level_m: float
-) -> None:
-    """Set the covariates of a term at pump i, but for columns of a user."""
-    seen = state.covariates
+def _is_used(term: int, i: int, plant: PlantRecords, state: PlantState) -> bool:
+    """Whether a pump that counts for a term at pump i turns, or water moves in it."""
+    for j in range(state.pumps.size):
+        pump = state.pumps[j]
+        if (pump.frequency_hz > 0.0 or pump.shaft_ratio > 0.0 or state.mean_flow_m3h[j] > 0.0) and _is_seen(
+            j, i, term, plant
+        ):
+            return True
+    return False
+
+
+@inlined
+def _covariate(
+    covariate: int,
+    column: int,
+    term: int,
+    i: int,
+    plant: PlantRecords,
+    state: PlantState,
+    forcing: Forcing,
+    second: int,
+    level_m: float,
+) -> float:
+    """Value of a covariate for a term at pump i."""
+    value = level_m
     days = forcing.clock_s[second] / DAY_S
-    seen[LEVEL_COVARIATE] = level_m
-    seen[DAYS], seen[HOUR_OF_DAY], seen[DAY_OF_WEEK] = days, (days % 1.0) * 24.0, (days - FIRST_MONDAY_D) % 7.0
-    seen[FLOW_COVARIATE] = seen[SPEED_COVARIATE] = seen[SINCE_START] = seen[PUMPS_ON_MAIN] = 0.0
-    seen[IDLE_BEFORE] = state.pumps[i].idle_before_s
+    if covariate == COLUMN:
+        value = forcing.columns[column, second]
+    elif covariate == HOUR_OF_DAY:
+        value = (days % 1.0) * 24.0
+    elif covariate == DAY_OF_WEEK:
+        value = (days - FIRST_MONDAY_D) % 7.0
+    elif covariate == DAYS:
+        value = days
+    elif covariate != LEVEL_COVARIATE:
+        value = _of_pumps(covariate, term, i, plant, state)
+    return value
+
+
+@inlined
+def _of_pumps(covariate: int, term: int, i: int, plant: PlantRecords, state: PlantState) -> float:
+    """Value of a covariate that is of a pump, or of all on its header, or of all of a station."""
+    flow_m3h = fastest = longest_s = count = 0.0
+    idle_s = state.pumps[i].idle_before_s
     for j in range(state.pumps.size):
         pump = state.pumps[j]
         if pump.frequency_hz > 0.0 and plant.pumps[j].main == plant.pumps[i].main:
-            seen[PUMPS_ON_MAIN] += 1.0
+            count += 1.0
         if _is_seen(j, i, term, plant):
-            seen[FLOW_COVARIATE] += state.mean_flow_m3h[j]
-            seen[SPEED_COVARIATE] = max(
-                seen[SPEED_COVARIATE], pump.frequency_hz / plant.pumps[j].nominal_frequency_hz
-            )
-            if pump.turned_s > seen[SINCE_START]:
-                seen[SINCE_START], seen[IDLE_BEFORE] = pump.turned_s, pump.idle_before_s
+            flow_m3h += state.mean_flow_m3h[j]
+            fastest = max(fastest, pump.frequency_hz / plant.pumps[j].nominal_frequency_hz)
+            if pump.turned_s > longest_s:
+                longest_s, idle_s = pump.turned_s, pump.idle_before_s
+    value = count
+    if covariate == FLOW_COVARIATE:
+        value = flow_m3h
+    elif covariate == SPEED_COVARIATE:
+        value = fastest
+    elif covariate == SINCE_START:
+        value = longest_s
+    elif covariate == IDLE_BEFORE:
+        value = idle_s
+    return value
 
 
 @inlined

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled
 
 Term = Literal[
@@ -115,3 +116,12 @@ def shape_at(shape: int, value: float, centre: float, scale: float, low: float, 
     elif shape == STEP:
         ratio = 1.0 if ratio >= 0.0 else 0.0
     return ratio
+
+
+@compiled
+def shapes_at(
+    shape: int, values: Floats, centre: float, scale: float, low: float, high: float, found: Floats
+) -> None:
+    """Set (n,) `found` to the values of a shape."""
+    for k in range(values.size):
+        found[k] = shape_at(shape, values[k], centre, scale, low, high)

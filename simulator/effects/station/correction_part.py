@@ -15,7 +15,7 @@ Size = Annotated[float, Field(ge=-4.0, le=4.0, allow_inf_nan=False)]
 class PartTable(Table):
     """One addend: data of a fixed form, nothing that is evaluated.
 
-    Attributes
+    Parameters
     ----------
     covariate : str
         What it goes by; "column" is a column of a user.
@@ -32,13 +32,13 @@ class PartTable(Table):
     """
 
     covariate: Covariate
-    column: Annotated[str, Field(pattern=COVARIATE_PATTERN)] | None = None
+    column: Annotated[str, Field(pattern=COVARIATE_PATTERN, examples=["rain_mm_h"])] | None = None
     shape: Shape
     size: Size
     centre: Finite = 0.0
     scale: Positive = 1.0
-    low: Finite | None = None
-    high: Finite | None = None
+    low: Annotated[Finite | None, Field(examples=[0.0])] = None
+    high: Annotated[Finite | None, Field(examples=[20.0])] = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

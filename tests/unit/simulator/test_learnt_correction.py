@@ -35,6 +35,7 @@ def run(station, seconds=SECONDS):
     return {**recording.columns, **recording.truth}
 
 
+@pytest.mark.parametrize("layout", ["individual", "common"])
 @pytest.mark.parametrize(
     ("term", "offset", "named"),
     [
@@ -46,12 +47,14 @@ def run(station, seconds=SECONDS):
         ("level_balance", 0.08, {"name": "unmetered_inflow", "flow_m3h": 0.08}),
     ],
 )
-def test_a_constant_correction_is_the_effect_that_has_a_name(term, offset, named, quiet_alpha):
-    station = under(quiet_alpha, learnt(term, offset=offset))
+def test_a_constant_correction_is_the_effect_that_has_a_name(term, offset, named, layout, quiet_alpha):
+    main = quiet_alpha.rising_main.model_copy(update={"layout": layout})
+    plain = quiet_alpha.model_copy(update={"rising_main": main})
+    station = under(plain, learnt(term, offset=offset))
     (effect,) = effects_of(station)
     reference = effect.reference(plant_parameters(station))
     named = {key: value * reference if key in {"offset_m", "flow_m3h"} else value for key, value in named.items()}
-    ours, theirs = run(station), run(under(quiet_alpha, named))
+    ours, theirs = run(station), run(under(plain, named))
     compared = [name for name in ours if not name.startswith("truth_")]
     for name in compared:
         np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-9, atol=1e-9, err_msg=name)

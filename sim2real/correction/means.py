@@ -1,0 +1,79 @@
+"""Means of the residuals of a group in a cycle, and what a right model may leave of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.likelihood.covariance import CHANGING
+from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.phases import group_of, phase
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Means:
+    r"""Cells: one group (signal, pump, regime, span of time since it began) in one cycle.
+
+    $$C = \operatorname{diag}\left(\overline{f} / n + 1 - \overline{f} + (k\,m)^2\right) + \sum_g m_g^2\,1_g 1_g^T$$
+
+    with the share f of a bin's variance that is noise, its n bins, and the material size m, of which the share
+    `CHANGING` k may change from cycle to cycle: an offset of a group g that all cycles share is none while it is
+    small.
+
+    Attributes
+    ----------
+    of_bin : (bins,) array
+        Cell of each bin.
+    counts : (cells,) array
+        Bins of each cell.
+    group : (cells,) array
+        From 0.
+    weight : (cells,) array
+        Inverse of the diagonal.
+    group_material : (groups,) array
+        m_g.
+    """
+
+    of_bin: Integers
+    counts: Floats
+    group: Integers
+    weight: Floats
+    group_material: Floats
+
+    def of(self, columns: Floats) -> Floats:
+        """(cells, k) means of (bins, k) columns."""
+        sums = [np.bincount(self.of_bin, column, self.counts.size) for column in columns.T]
+        return np.array(sums).reshape(-1, self.counts.size).T / self.counts[:, None]
+
+    def products(self, columns: Floats) -> Floats:
+        """(k, k) products of (cells, k) columns under the inverse of C, by Woodbury's identity."""
+        weighted = columns * self.weight[:, None]
+        by_group = np.array([np.bincount(self.group, column) for column in weighted.T]).T
+        ones = np.bincount(self.group, self.weight) + self.group_material**-2
+        return np.asarray(columns.T @ weighted - by_group.T @ (by_group / ones[:, None]), dtype=np.float64)
+
+    def matters(self, signature: Floats) -> bool:
+        """Whether (bins,) changes of the residuals are more than what is material, in some group."""
+        squares = np.bincount(self.group, self.of(signature[:, None])[:, 0] ** 2) / np.bincount(self.group)
+        return bool(np.any(squares > self.group_material**2))
+
+
+def means_of(bins: Bins) -> Means:
+    """Cells of the bins of a recording."""
+    spans = int(phase(bins).max(initial=0)) + 1
+    group_of_bin = np.unique(group_of(bins) * spans + phase(bins), return_inverse=True)[1]
+    cycles = int(bins.cycle.max(initial=0)) + 1
+    keys, of_bin = np.unique(group_of_bin * cycles + bins.cycle, return_inverse=True)
+    group, counts = keys // cycles, np.bincount(of_bin).astype(np.float64)
+    noise, material = (np.bincount(of_bin, values) / counts for values in (bins.floor, bins.material))
+    return Means(
+        of_bin=of_bin,
+        counts=counts,
+        group=group,
+        weight=1.0 / (noise / counts + 1.0 - noise + (CHANGING * material) ** 2),
+        group_material=np.maximum(np.bincount(group, material) / np.bincount(group), LEAST_MATERIAL),
+    )
+
+
+LEAST_MATERIAL = 1e-3
+"""Material size at the least, in units of noise: nothing is told better than that. [1]"""

@@ -1,0 +1,159 @@
+"""Which term, going with what, explains the residuals best: a sparse regression under the likelihood's covariance."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.correction.dictionary import Atom
+from wetwell.sim2real.correction.means import Means
+from wetwell.sim2real.likelihood.posterior import TEMPER
+from wetwell.simulator.corrections.parts import TERMS, Term
+
+SIZE_PRIOR = 0.3
+"""Standard deviation of the size of an addend before anything is seen, as a share of its term. [1]"""
+PART_PRIOR = 0.1
+"""Probability of one more addend. [1]"""
+MOST_PARTS = 3
+PROPOSED = 3
+"""Terms that are tried in the simulator, the most probable first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """A term with its addends.
+
+    Attributes
+    ----------
+    term : Term
+    atoms : tuple of Atom
+    sizes : (columns,) array
+        The offset, then those of the columns of each atom. [1]
+    prior, log : float
+        Logarithms of its prior probability, and of its probability over that of no correction.
+    """
+
+    term: Term
+    atoms: tuple[Atom, ...]
+    sizes: Floats
+    prior: float
+    log: float
+
+
+class Gram:
+    r"""Products of columns under the inverse of the covariance of the cells, and what follows for some of them.
+
+    $$\Delta \ln L = \tfrac12 g^T (G + 1/\tau^2)^{-1} g - \tfrac12 \ln\det(1 + \tau^2 G), \qquad
+    G = A^T C^{-1} A, \quad g = -A^T C^{-1} r$$
+
+    with a prior of the sizes that is normal around 0 with `SIZE_PRIOR` τ.
+
+    Parameters
+    ----------
+    means : Means
+    residuals : (bins,) array
+    columns : (bins, k) array
+        Change of the residuals with the size of each addend.
+
+    Attributes
+    ----------
+    nothing : float
+        Logarithm of the evidence of no correction, but for a constant.
+
+    References
+    ----------
+    .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
+    """
+
+    def __init__(self, means: Means, residuals: Floats, columns: Floats) -> None:
+        self._products = means.products(means.of(np.column_stack([residuals, columns])))
+        self.nothing = -0.5 * float(self._products[0, 0])
+
+    def gain(self, chosen: Sequence[int] | Integers, base: Floats | None = None) -> tuple[float, Floats]:
+        """Logarithm of the evidence, but for the same constant, and the best sizes.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Columns that act.
+        base : (columns,) array, optional
+            Sizes at which the residuals are; 0 by default.
+        """
+        rows = np.asarray(chosen, dtype=np.int64) + 1
+        start = np.zeros(rows.size) if base is None else base
+        inner, slope = self._products[np.ix_(rows, rows)], self._products[rows, 0]
+        pull = slope + start / SIZE_PRIOR**2
+        step = -np.linalg.solve(inner + np.eye(rows.size) / SIZE_PRIOR**2, pull)
+        occam = float(np.linalg.slogdet(np.eye(rows.size) + SIZE_PRIOR**2 * inner)[1])
+        log = self.nothing - 0.5 * (float(pull @ step) + float(start @ start) / SIZE_PRIOR**2 + occam)
+        return log, start + step
+
+    def at(self, sizes: Floats) -> float:
+        """Logarithm of the evidence, but for the same constant, of residuals that are those at the sizes."""
+        inner = self._products[1:, 1:]
+        occam = float(np.linalg.slogdet(np.eye(sizes.size) + SIZE_PRIOR**2 * inner)[1])
+        return self.nothing - 0.5 * (float(sizes @ sizes) / SIZE_PRIOR**2 + occam)
+
+    def covariance(self, chosen: Sequence[int] | Integers) -> Floats:
+        """(columns, columns) covariance of the sizes; errors of the cells are dependent, so that it is tempered."""
+        rows = np.asarray(chosen, dtype=np.int64) + 1
+        inner = TEMPER * self._products[np.ix_(rows, rows)]
+        return np.asarray(np.linalg.inv(inner + np.eye(rows.size) / SIZE_PRIOR**2))
+
+
+def proposals(
+    means: Means, residuals: Floats, atoms: Sequence[Atom], sensitivities: Mapping[Term, Floats]
+) -> list[Proposal]:
+    """The best addends of each term, and the best of each smaller number; the most probable proposal first.
+
+    Parameters
+    ----------
+    means : Means
+    residuals : (bins,) array
+    atoms : sequence of Atom
+    sensitivities : mapping of (bins,) arrays
+        Change of the residuals with a constant correction of each term; what a correction that varies does is taken
+        to be its product with that.
+    """
+    places = [atom.place for atom in atoms]
+    costs = [float(np.log(PART_PRIOR / len(set(places)) / places.count(place))) for place in places]
+    found: list[Proposal] = []
+    for term, slope in sensitivities.items():
+        columns = [slope]
+        of_atom: dict[int, list[int]] = {-1: [0]}
+        for number, atom in enumerate(atoms):
+            of_atom[number] = list(range(len(columns), len(columns) + atom.columns.shape[1]))
+            columns += [slope * values for values in atom.columns.T]
+        gram = Gram(means, residuals, np.array(columns).T)
+        found += _path(term, gram, atoms, of_atom, costs)
+    return sorted(found, key=lambda one: -one.log)
+
+
+def _path(
+    term: Term, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]], costs: Sequence[float]
+) -> list[Proposal]:
+    """The best addends by their number: one more as long as that pays, and each exchanged for a better one."""
+
+    def weighed(numbers: tuple[int, ...]) -> Proposal:
+        log, sizes = gram.gain([k for number in (-1, *numbers) for k in of_atom[number]])
+        prior = sum(costs[number] for number in numbers) - float(np.log(len(TERMS)))
+        chosen = tuple(atoms[number] for number in numbers)
+        return Proposal(term=term, atoms=chosen, sizes=sizes, prior=prior, log=TEMPER * (log - gram.nothing) + prior)
+
+    best: list[tuple[Proposal, tuple[int, ...]]] = [(weighed(()), ())]
+    while len(best) <= MOST_PARTS:
+        before, chosen = best[-1]
+        others = [number for number in range(len(atoms)) if number not in chosen]
+        tried = [(*chosen, number) for number in others]
+        top = max(((weighed(numbers), numbers) for numbers in tried), key=lambda pair: pair[0].log, default=None)
+        if top is None or top[0].log <= before.log:
+            break
+        exchanged = [
+            tuple(number if one == gone else one for one in top[1])
+            for gone in top[1][:-1]
+            for number in range(len(atoms))
+            if number not in top[1]
+        ]
+        best.append(max([top, *((weighed(numbers), numbers) for numbers in exchanged)], key=lambda pair: pair[0].log))
+    return [proposal for proposal, _ in best]

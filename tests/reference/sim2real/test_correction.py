@@ -1,0 +1,104 @@
+"""Corrections of recordings of another plant with a deviation that the library does not hold: learnt and run with."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.station.station_file import load_station
+from wetwell.services.batch.field_data import write_station
+from wetwell.services.reports.gap_page import gap_page
+from wetwell.sim2real.correction.learning import learn
+from wetwell.sim2real.diagnosis.correction import weighed
+from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.sim2real.truth.case import Deviation
+from wetwell.sim2real.truth.sampling import case_of
+from wetwell.sim2real.truth.truth_plant import run
+from wetwell.simulator.effects import effects_of
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
+
+HOURS_S = 43_200
+
+
+def truth(name, seed, **parameters):
+    rng = np.random.default_rng(seed)
+    case = case_of((name,) if name else (), "s", rng, seconds=HOURS_S)
+    return replace(case, deviations=(Deviation(name=name, parameters=parameters),)) if parameters else case
+
+
+def residuals_of(recording, station):
+    traces = traces_of(recording, station)
+    replay = Replay(traces, station, effects_of(station))
+    regimes = regimes_of(traces, station)
+    return replay, StationResiduals(traces, station, regimes, replay.run(), replay.doubt())
+
+
+@pytest.fixture(scope="module")
+def drifting():
+    return truth("flow_meter_drift", 970_931, drift=0.15, turns=2.0)
+
+
+@pytest.fixture(scope="module")
+def diagnosis(drifting):
+    return diagnose(run(drifting, truth=False), drifting.station, only=["flow_meter_lag"])
+
+
+def test_a_drift_that_nobody_named_gets_its_equation(diagnosis):
+    report = diagnosis.report()
+    assert report.verdict == "unknown"
+    assert report.effects == ()
+    found = report.correction
+    assert (found.term, found.component) == ("flow_reading", "flow_meter")
+    assert set(found.covariates) <= {"days", "hour_of_day"}
+    assert found.equation.startswith("flow_reading × (1 ")
+    assert "look for" in found.sentence
+    assert found.shrinkage > 0.9
+    swing = max(found.addends, key=lambda addend: abs(addend.size) * (addend.shape is not None))
+    assert swing.ci[0] < swing.size < swing.ci[1]
+
+
+def test_the_page_shows_equation_and_residuals_against_what_it_goes_by(diagnosis):
+    page = gap_page(diagnosis.report(), diagnosis)
+    assert "An equation for what nobody has named" in page
+    assert "with the correction" not in page or "without the correction" in page
+    for covariate in diagnosis.correction.report.covariates:
+        assert f"residual of the flow against {covariate}" in page
+
+
+def test_a_fresh_recording_is_nearer_with_it_and_nothing_is_left_to_learn(diagnosis, drifting, tmp_path):
+    write_station(diagnosis.station, tmp_path / "station.toml")
+    station = load_station(tmp_path / "station.toml")
+    (effect,) = effects_of(station)
+    assert effect == diagnosis.correction.learnt.effect
+    fresh = run(replace(drifting, seed=drifting.seed + 1), truth=False)
+    replay, residuals = residuals_of(fresh, drifting.station)
+    before, after = (float(np.mean(np.arcsinh(residuals.of(replay.run(own))) ** 2)) for own in ((), (effect,)))
+    right = float(np.mean(np.arcsinh(residuals.of(replay.run())[residuals.bins.signal != 0]) ** 2))
+    assert before > 2.0 * after
+    assert after < 1.5 * right
+    again, left = residuals_of(fresh, station)
+    assert weighed(learn(again, left), left.bins, again.run().plant, np.random.default_rng(0))[0] is None
+    assert Simulation(station, Scenario(name="s"), seed=1).advance(600).columns["level_m"].size == 600
+
+
+@pytest.mark.parametrize("seed", [970_941, 970_942])
+def test_a_truth_as_its_file_says_gets_none(seed):
+    case = truth(None, seed)
+    replay, residuals = residuals_of(run(case, truth=False), case.station)
+    taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    assert taken is None
+    assert why.startswith("no correction")
+
+
+def test_a_cause_that_nothing_goes_with_gets_none():
+    """Foam comes when it likes."""
+    case = truth("foam", 970_951, foam_m=0.2, foam_s=300.0)
+    replay, residuals = residuals_of(run(case, truth=False), case.station)
+    taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    assert taken is None
+    assert "\n" not in why
