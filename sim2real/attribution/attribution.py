@@ -7,10 +7,12 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.changes import MOST_CHANGED, changed
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import are_there, intervals_of
+from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
@@ -19,6 +21,7 @@ from wetwell.sim2real.likelihood.posterior import SetProbability, best_set, equi
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 
 LEAST_DOUBTED = 0.02
@@ -45,6 +48,8 @@ class Attribution:
         Bins that are fitted, and those on which gaps are measured.
     posterior : tuple of SetProbability
         Best first.
+    possible : tuple of PossibleSet
+        Sets that may be the truth, as they were fitted.
     not_tested : tuple of NotTested
         Candidates that the recording cannot show.
     """
@@ -57,6 +62,7 @@ class Attribution:
     training: Flags
     validation: Flags
     posterior: tuple[SetProbability, ...]
+    possible: tuple[PossibleSet, ...]
     not_tested: tuple[NotTested, ...] = ()
 
     @property
@@ -93,9 +99,13 @@ def attribute(
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
-    hypotheses = Hypotheses(fitter, cells_of(residuals.bins, has_inflow=replay.traces.inflow_m3h is not None), each)
+    condition = conditions_of(residuals.bins, replay.traces, replay.station)
+    cells = cells_of(residuals.bins, condition, has_inflow=replay.traces.inflow_m3h is not None)
+    hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
+    hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
+    hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     posterior = _posterior(fitter, hypotheses, len(singles))
     accepted: Fit | None = None
     equal: dict[str, tuple[str, ...]] = {}
@@ -112,6 +122,7 @@ def attribute(
         training=training,
         validation=validation,
         posterior=posterior,
+        possible=possible_sets(fitter, cells, hypotheses, posterior),
         not_tested=not_tested,
     )
 

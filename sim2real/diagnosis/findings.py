@@ -24,6 +24,7 @@ def found_effects(found: Attribution) -> tuple[FoundEffect, ...]:
             name=candidate.name,
             component=candidate.component,
             equivalent=equivalent,
+            differs=tuple(dict.fromkeys(free.name.partition("@")[0] for free in candidate.free if "@" in free.name)),
             parameters=_parameters(candidate, point, interval),
         )
         for candidate, point, interval, equivalent in zip(
@@ -33,10 +34,11 @@ def found_effects(found: Attribution) -> tuple[FoundEffect, ...]:
 
 
 def _parameters(candidate: Candidate, point: Floats, ends: Floats) -> dict[str, FittedParameter]:
-    """What is fixed first, then what was fitted."""
+    """What is fixed first, then what was fitted; of what differs between periods the last one has the plain name."""
+    last = f"@{candidate.periods}"
     fixed = {name: FittedParameter(value=value, ci=None, unit="") for name, value in candidate.fixed}
     return fixed | {
-        free.name: FittedParameter(
+        free.name.removesuffix(last): FittedParameter(
             value=free.value(float(one)), ci=(free.value(float(low)), free.value(float(high))), unit=free.unit
         )
         for free, one, (low, high) in zip(candidate.free, point, ends, strict=True)
