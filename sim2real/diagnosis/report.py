@@ -228,7 +228,7 @@ class UntestedEffect(_Part):
 
 
 class NoiseCheck(_Part):
-    """How large the residuals of a signal in a regime are under the answer.
+    """How large what is left of a signal in a regime is under the answer.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class NoiseCheck(_Part):
     regime : str
         What the station was doing.
     mean_square : float
-        1 is all that a right model may be off. [1]
+        Over what is expected of a good model; more in starts and stops, where a right one may be poor. [1]
     noise_share : float
         What the sensors alone make of that; a right answer lies between it and 1. [1]
     """
@@ -332,6 +332,8 @@ class GapReport(_Part):
         Acts at the station that would tell apart what is left, the best first.
     refused : list of RefusedAct
         Acts that may not be done at the station.
+    prior_stations : int
+        Stations whose diagnoses were the prior of this one; 0 where effects and sizes were all alike before.
     next_experiment : str
         What to do next to learn more, in a sentence: the best act where there is one.
     """
@@ -357,4 +359,5 @@ class GapReport(_Part):
     recordings: tuple[DiagnosedRecording, ...] = ()
     experiments: tuple[ProposedAct, ...] = ()
     refused: tuple[RefusedAct, ...] = ()
+    prior_stations: int = 0
     next_experiment: str
