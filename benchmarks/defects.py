@@ -7,7 +7,10 @@ python benchmarks/defects.py --first-seed 70000 --budget-s 180 --only "second de
 import argparse
 import json
 import os
+import re
+import select
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -17,6 +20,7 @@ from pathlib import Path
 from past_defects import PAST_DEFECTS, PastDefect
 
 ROOT = Path(__file__).parents[1]
+MOST_SITES = 10_000
 PARTS = ("benchmarks", "detector", "protocols", "services", "sim2real", "simulator", "src", "tests")
 
 
@@ -38,25 +42,29 @@ def put_back(folder: Path, defect: PastDefect) -> None:
 
 
 def looked_for(folder: Path, first_seed: int, budget_s: float) -> dict[str, object]:
-    """What a copy of the project breaks within some seconds: seed and rule, None where nothing was found."""
+    """What a copy of the project breaks within some seconds: seed and rule; None where nothing was found."""
     begin_s = time.perf_counter()
     script = folder / "benchmarks" / "simulation.py"
-    command = [sys.executable, str(script), "--stations", "2", "--sites", "1"]
-    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
-    sites = 0
-    while time.perf_counter() - begin_s < budget_s:
-        run = subprocess.run(  # noqa: S603 - our own script
-            [*command, "--first-seed", str(first_seed + sites)],
-            capture_output=True,
-            text=True,
-            env=environment,
-            cwd=folder,
-            check=True,
-        )
-        sites += 1
-        for seed, rules in json.loads(run.stdout)["broken"].items():
-            return {"seed": int(seed), "rule": rules[0][:200], "sites": sites, "s": _since(begin_s)}
-    return {"seed": None, "rule": None, "sites": sites, "s": _since(begin_s)}
+    command = [sys.executable, str(script), "--stations", "2", "--sites", str(MOST_SITES)]
+    run = subprocess.Popen(  # noqa: S603 - our own script
+        [*command, "--first-seed", str(first_seed)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": str(folder / "src")},
+        cwd=folder,
+        start_new_session=True,
+    )
+    try:
+        is_found, _, _ = select.select([run.stderr], [], [], budget_s)
+        told = run.stderr.readline().decode() if is_found else ""
+    finally:
+        os.killpg(run.pid, signal.SIGKILL)  # it and its worker
+        run.wait()
+    broken = re.match(r"seed (\d+): (.*)", told)
+    if told and broken is None:
+        raise SystemExit(f"{script}: {told}")
+    seed, rule = (None, None) if broken is None else (int(broken[1]), broken[2][:200])
+    return {"seed": seed, "rule": rule, "s": _since(begin_s)}
 
 
 def _since(begin_s: float) -> float:

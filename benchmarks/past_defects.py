@@ -48,8 +48,8 @@ PAST_DEFECTS = (
         "messages are not checked when they are read",
         "41fcdb9",
         f"{STORE}/live_database.py",
-        "elif is_event_intact(payload, digest):",
-        "elif isinstance(payload, bytes):",
+        "elif is_event_intact(*row):",
+        "elif isinstance(row[4], bytes):",
     ),
     PastDefect(
         "a daily file of another station or day is taken",
@@ -90,8 +90,8 @@ PAST_DEFECTS = (
         "a row that is damaged keeps the same one from coming again",
         "769a621",
         f"{STORE}/live_database.py",
-        '"WHERE payload != excluded.payload"',
-        '"WHERE payload = excluded.payload AND payload != payload"',
+        '"WHERE payload != excluded.payload OR crc != excluded.crc"',
+        '"WHERE payload != payload"',
     ),
     PastDefect(
         "pages of daily files are not checked",

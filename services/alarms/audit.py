@@ -1,7 +1,7 @@
 """The audit of alarms: who has done what to which alarm, one JSON object a line, never changed afterwards.
 
 Each line ends with a link: the SHA-256 of the link before and of the line itself. A line that is changed, missing or
-put in shows; lines that were cut off at the end do not, unless the last link was written down elsewhere.
+put in shows. The last link also stands in a file of its own, so that lines that were cut off at the end show too.
 """
 
 import hashlib
@@ -10,6 +10,7 @@ import logging
 import os
 from pathlib import Path
 
+from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.timestamps import to_iso
 
@@ -38,18 +39,50 @@ class Audit:
         if self.path is None:
             return
         try:
-            before = _last_link(self.path) if self._link is None else self._link
-            link = link_of(before, entry)
-            line = json.dumps(entry | {LINK: link}, ensure_ascii=False)
-            is_new = not self.path.exists()
-            with self.path.open("ab") as file:
-                start = b"" if is_new or _ends_with_newline(self.path) else b"\n"  # a power cut left half a line
-                file.write(start + line.encode() + b"\n")
-                file.flush()
-                os.fsync(file.fileno())
-            self._link = link
+            if self._link is None:
+                self._link = _last_link(self.path)
+                if is_cut_off(self.path):
+                    log.error("%s: lines at its end are lost", self.path)
+                    self._append(
+                        self.path, {"time": entry["time"], "act": "found that lines before this one are lost"}
+                    )
+            self._append(self.path, entry)
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror or error}") from error
+
+    def _append(self, path: Path, entry: dict[str, object]) -> None:
+        self._link, before = None, self._link or ""  # as long as it is not on the disk nobody knows
+        link = link_of(before, entry)
+        line = json.dumps(entry | {LINK: link}, ensure_ascii=False)
+        is_new = not path.exists()
+        with path.open("ab") as file:
+            start = b"" if is_new or _ends_with_newline(path) else b"\n"  # a power cut left half a line
+            file.write(start + line.encode() + b"\n")
+            file.flush()
+            os.fsync(file.fileno())
+        with atomic_file(end_of(path)) as file:
+            file.write(link.encode())
+        self._link = link
+
+
+def end_of(path: Path) -> Path:
+    """File that holds the last link of an audit."""
+    return path.with_suffix(".end")
+
+
+def is_cut_off(path: Path) -> bool:
+    """Whether the audit does not reach to the link that was written down as its last one.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    try:
+        end = end_of(path).read_text(encoding="utf-8", errors="replace")
+    except FileNotFoundError:
+        return False  # of an earlier version, or of an audit that has not begun
+    return end not in _links(path)
 
 
 def link_of(before: str, entry: dict[str, object]) -> str:
@@ -75,6 +108,8 @@ def broken_lines(path: Path) -> list[int]:
         If the file cannot be read.
     """
     broken, before = [], ""
+    if not path.exists():
+        return []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
         entry = _entry(line)
         link = None if entry is None else entry.pop(LINK, None)
@@ -96,12 +131,18 @@ def _entry(line: str) -> dict[str, object] | None:
 
 def _last_link(path: Path) -> str:
     """Link of the last line that has one; empty where none has."""
+    links = _links(path)
+    return links[-1] if links else ""
+
+
+def _links(path: Path) -> list[str]:
+    """Links of all lines that have one."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:
-        return ""
-    links = (entry.get(LINK) for entry in map(_entry, reversed(lines)) if entry is not None)
-    return next((link for link in links if isinstance(link, str)), "")
+        return []
+    links = (entry.get(LINK) for entry in map(_entry, lines) if entry is not None)
+    return [link for link in links if isinstance(link, str)]
 
 
 def _ends_with_newline(path: Path) -> bool:

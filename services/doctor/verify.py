@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from wetwell.services.alarms.audit import Audit, broken_lines
+from wetwell.services.alarms.audit import Audit, broken_lines, end_of, is_cut_off
 from wetwell.services.alarms.state_file import DamagedStateError, read_state
 from wetwell.services.detector.checkpoint import is_intact
 from wetwell.services.doctor.finding import Finding
@@ -60,8 +60,9 @@ def _alarms(folder: Path | None) -> Iterator[Finding]:
         except (DamagedStateError, ValidationError):
             damage = [state.name]
         yield _finding("alarms", str(state), damage, "they begin anew at their next start; or bring a backup back")
-    if audit is not None and audit.exists():
+    if audit is not None and (audit.exists() or end_of(audit).exists()):
         broken = [f"line {number}" for number in broken_lines(audit)]
+        broken += ["lines at its end are lost"] if is_cut_off(audit) else []
         yield _finding("audit", str(audit), broken, "compare it with a backup: lines were changed, lost or put in")
 
 

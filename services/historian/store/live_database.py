@@ -23,6 +23,7 @@ from wetwell.services.historian.store.interface import (
     DAY_NS,
     Batch,
     EventKind,
+    EventRow,
     StationSpan,
     StoreError,
     day_of,
@@ -32,6 +33,7 @@ from wetwell.services.historian.store.live_salvage import salvage
 from wetwell.services.historian.store.live_schema import prepare
 from wetwell.services.historian.store.refused_rows import RefusedRows
 from wetwell.services.historian.store.row_checksum import (
+    event_checksum,
     hour_checksum,
     is_event_intact,
     is_hour_intact,
@@ -63,9 +65,9 @@ _INSERT_SAMPLE = (
     "WHERE NOT is_intact(station, time_ns, seq, quality, size, data, crc)"
 )
 _INSERT_EVENT = (
-    "INSERT INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?) "
-    "ON CONFLICT (kind, station, time_ns, digest) DO UPDATE SET payload = excluded.payload "
-    "WHERE payload != excluded.payload"
+    "INSERT INTO event (kind, station, time_ns, digest, payload, crc) VALUES (?, ?, ?, ?, ?, ?) "
+    "ON CONFLICT (kind, station, time_ns, digest) DO UPDATE SET payload = excluded.payload, crc = excluded.crc "
+    "WHERE payload != excluded.payload OR crc != excluded.crc"
 )
 """What comes again changes nothing, unless it was damaged meanwhile."""
 
@@ -141,7 +143,7 @@ class LiveDatabase:
             before = database.total_changes
             database.executemany(
                 _INSERT_EVENT,
-                [(row.kind, ids[row.station], row.time_ns, row.digest, row.payload) for row in batch.events],
+                [_event_values(row, ids[row.station]) for row in batch.events],
             )
             new += database.total_changes - before
             database.executemany(
@@ -260,17 +262,17 @@ class LiveDatabase:
         """The last so many verdicts or alarms, oldest first."""
         with self._reading() as database:
             rows = database.execute(
-                "SELECT payload, digest, kind, time_ns, id FROM event WHERE kind = ? "
+                "SELECT kind, station, time_ns, digest, payload, crc, id FROM event WHERE kind = ? "
                 "AND station = (SELECT id FROM station WHERE name = ?) "
                 "AND time_ns >= ? AND time_ns < ? ORDER BY time_ns DESC, id DESC LIMIT ?",
                 (kind, station, start_ns, end_ns, last),
             ).fetchall()
         intact = []
-        for payload, digest, its_kind, time_ns, number in reversed(rows):
-            if its_kind != kind or not start_ns <= time_ns < end_ns:
+        for *row, number in reversed(rows):
+            if row[0] != kind or not start_ns <= row[2] < end_ns:
                 self.is_damaged = True  # a page in the place of another
-            elif is_event_intact(payload, digest):
-                intact.append(payload)
+            elif is_event_intact(*row):
+                intact.append(row[4])
             else:
                 self._refused.note("event", number)
         return intact
@@ -435,6 +437,11 @@ def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:
     """Values for `_TOUCHING`."""
     hour_ns = max(start_ns // HOUR_NS * HOUR_NS, -(2**63))
     return {"station": station, "hour": hour_ns, "start": start_ns, "end": end_ns}
+
+
+def _event_values(row: EventRow, station: int) -> tuple[str, int, int, bytes, bytes, int]:
+    crc = event_checksum(row.kind, station, row.time_ns, row.payload)
+    return row.kind, station, row.time_ns, row.digest, row.payload, crc
 
 
 def _key(row: SampleRow) -> int:

@@ -12,6 +12,8 @@ from wetwell.services.historian.store.row_checksum import is_event_intact, is_ho
 Row = tuple[Any, ...]
 
 _SAMPLE = "station, time_ns, seq, quality, data, size, last_ns, crc"
+CHECKED_VERSION = 3
+"""The first one whose rows have checksums."""
 MOST_SKIPPED = 10_000
 """Hours, or hundreds of messages, that are looked for behind the last row that could be read."""
 
@@ -22,9 +24,10 @@ def damage_of(path: Path) -> list[str]:
         with _reading(path) as database:
             told = [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
             version = int(database.execute("PRAGMA user_version").fetchone()[0])
-            messages = database.execute("SELECT payload, digest FROM event")
+            crc = "crc" if version >= CHECKED_VERSION else "NULL"
+            messages = database.execute(f"SELECT kind, station, time_ns, digest, payload, {crc} FROM event")  # noqa: S608
             counts = {"messages": sum(not is_event_intact(*row) for row in messages)}
-            if version >= 3:
+            if version >= CHECKED_VERSION:
                 samples = database.execute(f"SELECT {_SAMPLE} FROM sample")  # noqa: S608 - names of above
                 counts["rows of samples"] = sum(not _is_sample(row) for row in samples)
                 hours = database.execute("SELECT station, hour_ns, data, crc FROM hour")
@@ -73,9 +76,9 @@ def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], 
     samples = (row for number in numbers for row in _samples(database, number))
     yield "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", samples, _is_sample
     yield (
-        "INSERT OR IGNORE INTO event (payload, digest, kind, station, time_ns) VALUES (?, ?, ?, ?, ?)",
+        "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload, crc) VALUES (?, ?, ?, ?, ?, ?)",
         _events(database),
-        lambda row: is_event_intact(*row[:2]) and row[3] in numbers,
+        lambda row: is_event_intact(*row) and row[1] in numbers,
     )
     hours = _readable(database, "SELECT station, hour_ns, data, crc FROM hour")
     yield "INSERT OR IGNORE INTO hour VALUES (?, ?, ?, ?)", iter(hours), _is_hour
@@ -104,7 +107,7 @@ def _events(database: sqlite3.Connection) -> Iterator[Row]:
     for begin in range(max(0, most - 100 * MOST_SKIPPED), most + 1, 100):
         yield from _readable(
             database,
-            "SELECT payload, digest, kind, station, time_ns FROM event WHERE id > ? AND id <= ?",
+            "SELECT kind, station, time_ns, digest, payload, crc FROM event WHERE id > ? AND id <= ?",
             (begin, begin + 100),
         )
 

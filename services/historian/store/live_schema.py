@@ -27,7 +27,7 @@ CREATE TABLE sample (
 ) WITHOUT ROWID;
 CREATE TABLE event (
     id INTEGER PRIMARY KEY, kind TEXT NOT NULL, station INTEGER NOT NULL, time_ns INTEGER NOT NULL,
-    digest BLOB NOT NULL, payload BLOB NOT NULL, UNIQUE (kind, station, time_ns, digest)
+    digest BLOB NOT NULL, payload BLOB NOT NULL, crc INTEGER, UNIQUE (kind, station, time_ns, digest)
 );
 CREATE TABLE hour (
     station INTEGER NOT NULL, hour_ns INTEGER NOT NULL, data BLOB NOT NULL, crc INTEGER,
@@ -53,6 +53,7 @@ COMMIT;
 BEGIN IMMEDIATE;
 ALTER TABLE sample ADD COLUMN crc INTEGER;
 ALTER TABLE hour ADD COLUMN crc INTEGER;
+ALTER TABLE event ADD COLUMN crc INTEGER;
 {_REFUSED}
 PRAGMA user_version = 3;
 COMMIT;

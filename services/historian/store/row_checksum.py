@@ -45,6 +45,15 @@ def is_hour_intact(station: int, hour_ns: int, data: bytes, crc: int | None) -> 
         return False
 
 
-def is_event_intact(payload: bytes, digest: bytes) -> bool:
-    """Whether a message is what was written."""
-    return isinstance(payload, bytes) and hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest() == digest
+def event_checksum(kind: str, station: int, time_ns: int, payload: bytes) -> int:
+    """CRC-32 of a message and of its place."""
+    return zlib.crc32(kind.encode(), zlib.crc32(payload, zlib.crc32(_KEY.pack(station, time_ns, 0, 0, 0))))
+
+
+def is_event_intact(kind: str, station: int, time_ns: int, digest: bytes, payload: bytes, crc: int | None) -> bool:
+    """Whether a message is what was written, and where; of one of an earlier version the place is not known."""
+    try:
+        is_same = hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest() == digest
+        return is_same and (crc is None or crc == event_checksum(kind, station, time_ns, payload))
+    except (AttributeError, TypeError, struct.error):
+        return False

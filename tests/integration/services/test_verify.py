@@ -9,7 +9,7 @@ from memory_bus import MemoryBus
 
 from wetwell.protocols.messages.alarm import AlarmAct
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.services.alarms.audit import Audit, broken_lines
+from wetwell.services.alarms.audit import Audit, broken_lines, end_of, is_cut_off
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import Checkpoint
@@ -122,6 +122,41 @@ def test_a_line_of_the_audit_that_is_not_as_it_was_shows(kept, tmp_path, damage)
     assert broken_lines(path)
     path.write_text("\n".join(lines) + "\n")
     assert broken_lines(path) == []
+
+
+@pytest.mark.parametrize("left", [b"", b"line", None])
+def test_lines_that_are_cut_off_at_the_end_of_the_audit_show_and_stay_told(tmp_path, left):
+    audit = Audit(tmp_path)
+    for number in range(4):
+        audit.write(NOW_NS, act="shelve", number=number)
+    assert not is_cut_off(audit.path)
+    lines = audit.path.read_bytes().splitlines(keepends=True)
+    if left is None:
+        audit.path.unlink()
+    else:
+        audit.path.write_bytes(b"".join(lines[:2]) + left)
+    settings = Settings(
+        alarms=AlarmSettings(state_dir=tmp_path), historian=HistorianSettings(folder=tmp_path / "none")
+    )
+    (finding,) = verify_kept(settings)
+    assert (finding.check, finding.level) == ("audit", "error")
+    assert "lines at its end are lost" in finding.text
+    Audit(tmp_path).write(NOW_NS, act="shelve", number=4)
+    told = [json.loads(line).get("act") for line in audit.path.read_text().splitlines() if line.startswith("{")]
+    assert told[-2:] == ["found that lines before this one are lost", "shelve"]
+    assert not is_cut_off(audit.path)
+
+
+def test_an_audit_that_was_killed_before_its_end_was_written_down_is_whole(tmp_path):
+    audit = Audit(tmp_path)
+    audit.write(NOW_NS, act="shelve", number=1)
+    end = end_of(audit.path).read_bytes()
+    audit.write(NOW_NS, act="shelve", number=2)
+    end_of(audit.path).write_bytes(end)
+    assert not is_cut_off(audit.path)
+    Audit(tmp_path).write(NOW_NS, act="shelve", number=3)
+    assert broken_lines(audit.path) == []
+    assert len(audit.path.read_text().splitlines()) == 3
 
 
 def test_the_chain_goes_on_after_a_restart_and_behind_lines_of_an_earlier_version(tmp_path):

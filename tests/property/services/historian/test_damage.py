@@ -150,3 +150,13 @@ def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
         assert len(store.samples("alpha", 0, 2**62)) == TIMES - 1
         assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == TIMES // 10 - 1
         assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
+
+
+def test_a_message_whose_place_was_changed_is_not_told_twice_when_it_comes_again(content, tmp_path):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.live._writer.execute("UPDATE event SET time_ns = 1231 WHERE payload = ?", (payload("alpha", 1_230),))
+        store.write(batch("alpha", 0, TIMES))
+        told = [payload("alpha", number) for number in range(0, TIMES, 10)]
+        assert store.events("verdicts", "alpha", 0, 2**62, 10_000) == told
+    assert damage_of(tmp_path / "live.sqlite") == ["1 messages are not what was written"]
