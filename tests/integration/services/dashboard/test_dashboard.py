@@ -270,7 +270,8 @@ def test_reports_are_listed_and_nothing_outside_of_their_folder_is_served(tmp_pa
     assert page.text == "<p>gap</p>"
     assert "script-src" not in page.headers["content-security-policy"]
     assert "sandbox" in page.headers["content-security-policy"]
-    for name in ("../secret.html", "%2e%2e/secret.html", "link.html", "gap", "none.html", "a%00.html", f"{'a' * 300}.html"):
+    outside = ("../secret.html", "%2e%2e/secret.html", "link.html")
+    for name in (*outside, "gap", "none.html", "a%00.html", f"{'a' * 300}.html"):
         assert get(f"/reports/{name}", app_state).status_code == 404, name
     assert get("/api/reports").json()["reason"] == "the setting dashboard.reports names no folder of HTML reports"
 
