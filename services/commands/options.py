@@ -203,10 +203,12 @@ def _address(flag: str, text: str, example: str) -> dict[str, Any]:
 def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":
     """Simulation of a scenario on a station that can run it."""
     from wetwell.services.stations import find_station
+
+    plant = find_station(station)
     from wetwell.simulator.simulation import Simulation
 
     try:
-        return Simulation(find_station(station), scenario, seed, start_ns)
+        return Simulation(plant, scenario, seed, start_ns)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 
