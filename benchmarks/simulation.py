@@ -1,13 +1,13 @@
 """Station-days of whole sites on a virtual clock, with accidents: one JSON object on standard output.
 
 python benchmarks/simulation.py --sites 500 --workers 2
-python benchmarks/simulation.py --first-seed SEED --sites 1    # a seed that failed, again
+python benchmarks/simulation.py --first-seed SEED --sites 1 --shrink   # a seed that failed, as the shortest test
 python benchmarks/simulation.py --kind alpha --period-s 60 --stations 5 --sites 10
 """
 
 import argparse
+import gc
 import json
-import logging
 import sys
 import tempfile
 import time
@@ -18,7 +18,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "simulation"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 
+from accidents import Plan, plan_of
 from rules import broken_rules
+from shrinking import as_test, shrunk
 from site_kinds import KINDS
 
 MEMORY = Path("/dev/shm")  # noqa: S108 -- each site has a folder of its own there
@@ -26,12 +28,27 @@ MEMORY = Path("/dev/shm")  # noqa: S108 -- each site has a folder of its own the
 
 def lived(task: tuple[str, int, int, float, int]) -> tuple[int, list[str], Counter[str], float]:
     """Seed, broken rules, accidents and seconds of one core of a site."""
-    kind, seed, stations, days, period_s = task
-    logging.disable(logging.CRITICAL)
     begin_s = time.process_time()
+    rules, accidents = life_of(task)
+    return task[1], rules, Counter(accidents), time.process_time() - begin_s
+
+
+def life_of(task: tuple[str, int, int, float, int], plan: Plan | None = None) -> tuple[list[str], list[str]]:
+    """Broken rules and accidents of a site; without a plan with that of its seed."""
+    kind, seed, stations, days, period_s = task
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
-        site = KINDS[kind](seed, stations, days, period_s, Path(folder))
-        return seed, broken_rules(site), Counter(site.accidents), time.process_time() - begin_s
+        site = KINDS[kind](seed, stations, days, period_s, Path(folder), plan)
+        life = broken_rules(site), site.accidents
+    del site
+    gc.collect()  # a site is full of circles, and the detector has frozen what was there when it began
+    return life
+
+
+def shortest_test(task: tuple[str, int, int, float, int], rule: str) -> str:
+    """The shortest test of a seed that still breaks the rule."""
+    kind, seed, stations, days, period_s = task
+    plan = shrunk(lambda plan: life_of(task, plan)[0], plan_of(seed, days * 86_400.0), rule)
+    return as_test(kind, seed, stations, days, period_s, plan)
 
 
 def main() -> None:
@@ -43,6 +60,7 @@ def main() -> None:
     parser.add_argument("--days", type=float, default=2.0)
     parser.add_argument("--period-s", type=int, default=300)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--shrink", action="store_true", help="print the shortest test of what breaks a rule")
     given = parser.parse_args()
     begin_s = time.perf_counter()
     tasks = [
@@ -59,6 +77,9 @@ def main() -> None:
             if rules:
                 broken[seed] = rules
                 print(f"seed {seed}: {rules[0]}", file=sys.stderr)
+    for task in tasks if given.shrink else ():
+        if task[1] in broken:
+            print(shortest_test(task, broken[task[1]][0]), file=sys.stderr)
     result = {
         "station_days": given.sites * given.stations * given.days,
         "kind": given.kind,

@@ -21,6 +21,7 @@ from wetwell.services.alarms.service import SOURCES, AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.folder_lock import folder_held
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
 
@@ -53,9 +54,22 @@ async def serve_alarms(settings: Settings, stations: Sequence[Station]) -> None:
 
 async def _run(settings: Settings, stations: Sequence[Station]) -> None:
     with await connect(settings) as bus:
-        service = AlarmService(bus, settings.alarms, stations, clocks)
+        await keep_alone(settings, bus, stations)
+
+
+async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) -> None:
+    """Keep the alarms of a site for ever, as the one who keeps their state in this folder; it is saved at the end.
+
+    Raises
+    ------
+    ConfigError
+        If others work there, or the folder cannot be used.
+    """
+    kept = settings.alarms
+    with folder_held(kept.state_dir, "alarms.state_dir", "alarms"):
+        service = AlarmService(bus, kept, stations, clocks)
         try:
-            if settings.alarms.state_dir is None:
+            if kept.state_dir is None:
                 log.info("alarms.state_dir is not set: acts are only logged, and the state ends with the process")
             await keep(bus, service, settings.health.period_s)
         finally:

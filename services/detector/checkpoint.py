@@ -21,6 +21,12 @@ log = logging.getLogger(__name__)
 CHECKPOINT_SCHEMA = "wetwell.detector-checkpoint/1"
 
 
+_CHECKSUM = "sha256"
+"""Of the other entries of the first line and of the snapshot behind it."""
+_OF_EARLIER = {"schema", "answers", "verdicts", "acts"}
+"""All entries of a first line of an earlier version, which has no checksum."""
+
+
 @dataclass(frozen=True)
 class Told:
     """What was told: answers to orders that were carried out, by their ids, last verdicts, acts of maintenance."""
@@ -80,7 +86,9 @@ class Checkpoint:
             "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
             "acts": [record.model_dump(mode="json") for record in told.acts],
         }
-        return self._encoded, json.dumps(head).encode() + b"\n" + detector.snapshot()
+        snapshot = detector.snapshot()
+        checked = head | {_CHECKSUM: _checksum(head, snapshot)}
+        return self._encoded, json.dumps(checked).encode() + b"\n" + snapshot
 
     def write(self, number: int, content: bytes) -> None:
         """Write what `encode` gave, in any thread; what is older than the file is left out."""
@@ -102,6 +110,9 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         header = json.loads(head)
         if not isinstance(header, dict) or header.get("schema") != CHECKPOINT_SCHEMA:
             return Told({}), data
+        is_earlier = header.keys() <= _OF_EARLIER
+        if header.pop(_CHECKSUM, None) != _checksum(header, rest) and not is_earlier:
+            raise SnapshotError("checkpoint: damaged, its checksum differs")
         answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
         verdicts = [Verdict.model_validate(verdict) for verdict in header["verdicts"]]
         acts = [MaintenanceRecord.model_validate(record) for record in header.get("acts", [])]
@@ -110,8 +121,12 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
 
 
+def _checksum(head: Mapping[str, object], snapshot: bytes) -> str:
+    return hashlib.sha256(json.dumps(head, sort_keys=True).encode() + snapshot).hexdigest()
+
+
 def is_intact(data: bytes) -> bool:
-    """Whether a checkpoint is what was written, by the checksum of its snapshot."""
+    """Whether a checkpoint is what was written, by its checksums."""
     try:
         _, snapshot = _parted(data)
         head, _, body = snapshot.partition(b"\n")

@@ -18,6 +18,7 @@ from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.folder_lock import folder_held
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
 
@@ -32,6 +33,18 @@ async def serve_detector(settings: Settings, stations: Sequence[Station]) -> Non
 async def _run(settings: Settings, stations: Sequence[Station]) -> None:
     await asyncio.to_thread(load_kernels)  # before it shows that it is there: samples come then
     with await connect(settings) as bus:
+        await judge_alone(settings, bus, stations)
+
+
+async def judge_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) -> None:
+    """Judge stations for ever, as the one detector that keeps its state in this folder.
+
+    Raises
+    ------
+    ConfigError
+        If another detector works there, or the folder cannot be used.
+    """
+    with folder_held(settings.detector.state_dir, "detector.state_dir", "detector"):
         await judge_all(settings, bus, stations, "detector")
 
 

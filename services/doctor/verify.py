@@ -10,7 +10,7 @@ from wetwell.services.alarms.state_file import DamagedStateError, read_state
 from wetwell.services.detector.checkpoint import is_intact
 from wetwell.services.doctor.finding import Finding
 from wetwell.services.historian.store.archive import Archive
-from wetwell.services.historian.store.live_database import damage_of
+from wetwell.services.historian.store.live_salvage import damage_of
 from wetwell.services.runtime.settings import Settings
 
 MOST_TOLD = 5

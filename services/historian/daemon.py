@@ -1,7 +1,9 @@
 """The historian daemon: bus, clock and threads around `Historian`."""
 
 import asyncio
+import contextlib
 import logging
+from collections.abc import Iterator
 
 from wetwell.protocols.bus.interface import ALL_KEPT, Bus, Request, Subscription
 from wetwell.protocols.bus.keys import (
@@ -14,6 +16,7 @@ from wetwell.protocols.bus.keys import (
     sample_key,
     verdict_key,
 )
+from wetwell.protocols.errors import WetwellError
 from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
@@ -43,10 +46,19 @@ async def _run(settings: Settings) -> None:
     with open_store(settings.historian) as store:
         historian = Historian(store, spool_rows=settings.historian.spool_rows)
         try:
-            with await connect(settings) as bus:
-                await keep(bus, historian, *periods_s)
+            while True:
+                with await connect(settings) as bus, _again_after_damage():
+                    await keep(bus, historian, *periods_s)
         finally:
             _finish(historian)
+
+
+@contextlib.contextmanager
+def _again_after_damage() -> Iterator[None]:
+    try:
+        yield
+    except* DamagedHistoryError:
+        log.warning("what was lost is taken from the publishers, as far as they keep it")
 
 
 def _finish(historian: Historian) -> None:
@@ -60,8 +72,18 @@ def _finish(historian: Historian) -> None:
         )
 
 
+class DamagedHistoryError(WetwellError):
+    """Something that was kept was damaged, and is put aside: what publishers still have is to be taken anew."""
+
+
 async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: float, health_s: float) -> None:
-    """Take, commit, maintain, answer and report for ever."""
+    """Take, commit, maintain, answer and report for ever.
+
+    Raises
+    ------
+    ExceptionGroup
+        With a `DamagedHistoryError` if something has to be fetched again, on a new connection.
+    """
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
         "samples": bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY),
         "blocks": bus.subscribe(sample_block_key("*"), history=ALL_KEPT, capacity=CAPACITY),
@@ -94,9 +116,12 @@ async def _handle(historian: Historian, kind: PayloadKind, subscription: Subscri
 
 
 async def _commit(historian: Historian, period_s: float) -> None:
+    damages = historian.damages
     while True:
         await asyncio.sleep(period_s)
         await asyncio.to_thread(historian.commit, now_ns())
+        if historian.damages > damages:
+            raise DamagedHistoryError("something that was kept was damaged")
 
 
 async def _maintain(historian: Historian, period_s: float) -> None:

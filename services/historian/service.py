@@ -26,6 +26,8 @@ from wetwell.services.historian.store.interface import Batch, EventRow, Store, S
 log = logging.getLogger(__name__)
 
 MAX_NAME = 64
+SCRUBBED_AT_ONCE = 10
+"""Days of a station that are looked through in each pause; a year of 1,000 stations takes a month."""
 MAX_BATCH = 20_000
 """Samples, verdicts and alarms of one transaction."""
 
@@ -70,6 +72,7 @@ class Historian:
         self._committed_at_ns: int | None = None
         self._is_failing = False
         self._commits = threading.Lock()
+        self._scrubbing = store.scrub()
 
     def handle(self, kind: PayloadKind, payload: bytes) -> None:
         """Handle one payload; what is not of its kind is counted as `malformed` and left out."""
@@ -129,6 +132,11 @@ class Historian:
             self._is_failing = False
         return acknowledged
 
+    @property
+    def damages(self) -> int:
+        """How often the store has put something aside that was not what was written."""
+        return self._store.damages
+
     def answer(self, station: str, payload: bytes) -> bytes:
         """`History` that answers a `HistoryQuery`; knows what was committed."""
         return answer(self._store, station, payload).encode()
@@ -141,10 +149,24 @@ class Historian:
             self._counts["failed_maintenance"] += 1
             log.warning("%s", error)
             return False
-        if done is not None:
-            self._counts["maintained"] += 1
-            log.info("%s", done)
-        return done is not None
+        if done is None:
+            self._scrub()
+            return False
+        self._counts["maintained"] += 1
+        log.info("%s", done)
+        return True
+
+    def _scrub(self) -> None:
+        """Look through some more of what is kept, and begin again at the end."""
+        try:
+            for _ in range(SCRUBBED_AT_ONCE):
+                next(self._scrubbing)
+        except StopIteration:
+            self._scrubbing = self._store.scrub()
+            self._counts["scrubs"] += 1
+        except StoreError as error:
+            self._scrubbing = self._store.scrub()
+            log.warning("%s", error)
 
     def figures(self, now_ns: int) -> dict[str, float]:
         """Health figures: counts; what waits; age of the last commit and of the newest row that is kept."""
@@ -152,6 +174,7 @@ class Historian:
         figures["waiting"] = float(self._spool.waiting)
         figures["lost"] = float(self._spool.lost)
         figures["is_failing"] = float(self._is_failing)
+        figures["damages"] = float(self.damages)
         if self._committed_at_ns is not None:
             figures["commit_age_s"] = (now_ns - self._committed_at_ns) / NS_PER_S
         if self._newest_ns:

@@ -143,7 +143,8 @@ def test_an_upgrade_that_is_killed_leaves_the_earlier_database(tmp_path: Path, s
             "CREATE TABLE earlier (station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, "
             "quality INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (station, time_ns, seq)) WITHOUT ROWID;"
             "INSERT INTO earlier SELECT station, time_ns, seq, quality, data FROM sample;"
-            "DROP TABLE sample; ALTER TABLE earlier RENAME TO sample; PRAGMA user_version = 1"
+            "DROP TABLE sample; ALTER TABLE earlier RENAME TO sample; DROP TABLE refused;"
+            "ALTER TABLE hour DROP COLUMN crc; PRAGMA user_version = 1"
         )
     killed = subprocess.run([sys.executable, "-c", UPGRADER, str(path), statement], check=False)
     assert killed.returncode == -9

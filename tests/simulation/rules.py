@@ -1,24 +1,41 @@
-"""What must hold of a site after all accidents."""
+"""What must hold of a site after all accidents.
+
+What could be saved is there, once, as it was; what could not be saved is missing and never something else, and where
+the product had it once and has lost it, the operator was told.
+"""
 
 import hashlib
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 from accidents import CLOCK_STEP_S
+from judged import once
+from network import Sent
 from simulated_site import Site
+from windows import MARGIN_S, Way, until_s
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.protocols.bus.keys import sample_key
+from wetwell.protocols.bus.keys import alarm_key, sample_key
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
+from wetwell.services.doctor.verify import verify_kept
+from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import StoreError
+
+Key = tuple[int, int]
+"""Time and number of a sample."""
+NEVER_S = float("-inf")
 
 
 def broken_rules(site: Site) -> list[str]:
     """In words; empty if all is well."""
-    return [*_verdicts(site), *_history(site), *_alarms(site)]
+    with site.heard():
+        return [*site.crashes, *_judged(site), *_verdicts(site), *_verified(site), *_history(site), *_alarms(site)]
 
 
 def fingerprint(site: Site) -> str:
@@ -29,57 +46,222 @@ def fingerprint(site: Site) -> str:
     return digest.hexdigest()
 
 
-def _verdicts(site: Site) -> Iterator[str]:
-    """The stream of verdicts is that of a detector that gets each published sample once, in order."""
+def _judged(site: Site) -> Iterator[str]:
+    """The detector was given what was published, as far as it could get there since it last went on from a file."""
+    for station in site.judged.unknown:
+        yield f"{station}: the detector went on from a state that no detector was in"
+    way = Way(site, "gateway", "detector", MARGIN_S)
+    restarts = [span.end_s for span in site.spans if (span.what, span.name) == ("away", "detector")]
     for station in site.stations:
-        detector = Detector(station.name, datasheet_of(station))
-        wanted = {verdict.encode() for sample in _samples(site, station) for verdict in detector.update(sample)}
+        published = _published(site, station)
+        known = {key: one.payload for key, one in published.items()}
+        branches = site.judged.branches.get(station.name, [[]])
+        for sample in once(branches[-1]):
+            if known.get(key_of(sample)) != sample.encode():
+                yield f"{station.name}: sample {key_of(sample)} was judged, but never published like that"
+        given = {key_of(sample) for sample in branches[-1]}
+        begin_s = max(restarts, default=NEVER_S)
+        sent = list(published.values())
+        missing = [
+            place
+            for place, (key, one) in enumerate(published.items())
+            if key not in given and way.is_open(max(one.at_s, begin_s), until_s(sent, place))
+        ]
+        if missing:
+            first = sent[missing[0]]
+            yield f"{station.name}: {len(missing)} samples were never judged, the first from {first.at_s:.0f} s"
+
+
+def _verdicts(site: Site) -> Iterator[str]:
+    """The stream of verdicts is that of a detector that gets once and in order what this one was given.
+
+    Where a clock went back, the historian gives samples in another order than the bus, and some may be judged twice:
+    there it is that of a detector which gets just the same.
+    """
+    is_stepped = any(accident.startswith("clock") for accident in site.accidents)
+    for station in site.stations:
+        branches = [branch if is_stepped else once(branch) for branch in site.judged.branches.get(station.name, [[]])]
         heard = site.told.get(station.name, {}).keys()
+        wanted = _verdicts_on(station, branches[-1])
         if missing := wanted - heard:
             yield f"{station.name}: {len(missing)} of {len(wanted)} verdicts were not told, such as {_begin(missing)}"
+        for branch in branches[:-1]:
+            if heard <= wanted:
+                break
+            if [key_of(sample) for sample in branch] != [key_of(sample) for sample in branches[-1][: len(branch)]]:
+                wanted |= _verdicts_on(station, branch)
         if more := heard - wanted:
             yield f"{station.name}: {len(more)} verdicts should not have been told, such as {_begin(more)}"
 
 
+def _verdicts_on(station: Station, samples: Iterable[Sample]) -> set[bytes]:
+    detector = Detector(station.name, datasheet_of(station))
+    return {verdict.encode() for sample in samples for verdict in detector.update(sample)}
+
+
 def _history(site: Site) -> Iterator[str]:
-    """What was published was kept, once."""
+    """What was published was kept, once, as it was."""
+    harms = [harm for harm in site.harms if harm.name == "historian"]
+    is_told = any(harm.kind == "backup" for harm in harms) or any(
+        finding.check == "history" and finding.level == "error" for finding in verify_kept(site.settings)
+    )
     store = site.kept()
     for station in site.stations:
-        published = {(sample.time, sample.seq) for sample in _samples(site, station)}
-        samples = store.samples(station.name, 0, MAX_STAMP_NS)
-        kept = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
-        if kept != sorted(published):
-            yield f"{station.name}: {len(kept)} samples were kept of {len(published)}"
-        verdicts = store.events("verdicts", station.name, 0, MAX_STAMP_NS, 1_000_000)
-        if len(verdicts) != len(set(verdicts)) or set(verdicts) != site.told.get(station.name, {}).keys():
-            yield f"{station.name}: {len(verdicts)} verdicts were kept of {len(site.told.get(station.name, {}))}"
+        try:
+            samples = store.samples(station.name, 0, MAX_STAMP_NS)
+            verdicts = store.events("verdicts", station.name, 0, MAX_STAMP_NS, 1_000_000)
+        except StoreError as error:
+            if not harms:
+                yield f"{station.name}: its history cannot be read: {error}"
+            continue
+        published = _published(site, station)
+        yield from _kept(station.name, samples, published)
+        yield from _lost_samples(site, station.name, samples, published, is_told=is_told)
+        yield from _lost_verdicts(site, station.name, verdicts)
+    yield from _lost_alarms(site, store)
     store.close()
+
+
+def _harms_s(site: Site) -> tuple[float, float]:
+    """When files of the historian were harmed first and last."""
+    at_s = [harm.at_s for harm in site.harms if harm.name == "historian"]
+    return min(at_s, default=float("inf")), max(at_s, default=NEVER_S)
+
+
+def _commit_s(site: Site) -> float:
+    return 2.0 * site.settings.historian.commit_s + MARGIN_S
+
+
+def _lost_samples(
+    site: Site, station: str, samples: Samples, published: dict[Key, Sent], *, is_told: bool
+) -> Iterator[str]:
+    """What could be kept since the last harm was; what was kept before and is lost was told."""
+    first_s, last_s = _harms_s(site)
+    way = Way(site, "gateway", "historian", _commit_s(site))
+    kept = set(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
+    sent = list(published.values())
+    missing = [
+        (one.at_s, until_s(sent, place)) for place, (key, one) in enumerate(published.items()) if key not in kept
+    ]
+    lost = [at_s for at_s, end_s in missing if way.is_open(max(at_s, last_s), end_s)]
+    if lost:
+        yield f"{station}: {len(lost)} samples that could be kept were not, the first from {lost[0]:.0f} s"
+    if not is_told and not is_told_since(site, first_s):
+        gone = [at_s for at_s, end_s in missing if way.is_open(at_s, end_s)]
+        if gone:
+            yield f"{station}: the sample of {gone[0]:.0f} s was kept and is lost, and nobody was told"
+
+
+def _lost_verdicts(site: Site, station: str, verdicts: list[bytes]) -> Iterator[str]:
+    """Verdicts that were told are kept, each once, and no others."""
+    told = site.told.get(station, {})
+    if len(verdicts) != len(set(verdicts)) or set(verdicts) - told.keys():
+        yield f"{station}: the history has verdicts twice, or some that nobody told"
+    way, (_, last_s) = Way(site, "detector", "historian", _commit_s(site)), _harms_s(site)
+    lost = {
+        payload
+        for payload in told.keys() - set(verdicts)
+        if any(way.is_open(max(at_s, last_s), _end_s(site, payload, at_s)) for at_s in site.heard_s[payload])
+    }
+    if lost:
+        yield f"{station}: {len(lost)} verdicts were told, but not kept, such as {_begin(lost)}"
+
+
+def _lost_alarms(site: Site, store: FolderStore) -> Iterator[str]:
+    """The last that was said of each alarm is kept; of the site itself too."""
+    way, (_, last_s) = Way(site, "alarms", "historian", _commit_s(site)), _harms_s(site)
+    for (station, name), changes in site.alarms.items():
+        try:
+            kept = set(store.events("alarms", station, 0, MAX_STAMP_NS, 1_000_000))
+        except StoreError:
+            continue  # told as that of the samples
+        sent = [one for one in site.network.sent[alarm_key(station, name)] if one.payload == changes[-1].encode()]
+        if not kept & {one.payload for one in sent} and any(
+            way.is_open(max(one.at_s, last_s), one.bus.died_s) for one in sent
+        ):
+            yield f"{station}: the last change of alarm {name} is not in the history"
+
+
+def is_told_since(site: Site, first_s: float) -> bool:
+    """Whether the historian has said since then that something is wrong."""
+    return any(told.at_s >= first_s and told.logger.startswith("wetwell.services.historian") for told in site.log)
+
+
+def _kept(station: str, samples: Samples, published: dict[Key, Sent]) -> Iterator[str]:
+    """What is kept is what was published, each once, with its values."""
+    keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
+    if len(keys) != len(set(keys)):
+        yield f"{station}: {len(keys) - len(set(keys))} samples were kept twice"
+    columns = dict(zip(samples.columns, samples.values.T, strict=True))
+    recording = Recording(time_ns=samples.time_ns, columns=columns)
+    for number, sample in zip(samples.seq.tolist(), recording.samples(station), strict=True):
+        one = published.get((sample.time, number))
+        wanted = None if one is None else Sample.decode(one.payload)
+        if wanted is None or wanted.model_copy(update={"quality": "good"}) != sample.model_copy(
+            update={"seq": number}
+        ):
+            yield f"{station}: sample {number} of {sample.time} ns was kept, but never published like that"
+            return
+
+
+def _end_s(site: Site, payload: bytes, at_s: float) -> float:
+    """Until when a verdict that was heard then can be had from who has told it."""
+    told = [one for sent in site.network.sent.values() for one in sent if one.payload == payload and one.at_s <= at_s]
+    return max((one.bus.died_s for one in told), default=at_s)
 
 
 def _begin(payloads: set[bytes]) -> str:
     return repr(min(payloads)[:300])
 
 
-def _samples(site: Site, station: Station) -> list[Sample]:
-    return [Sample.decode(payload) for payload in site.published.get(sample_key(station.name), [])]
+def _published(site: Site, station: Station) -> dict[Key, Sent]:
+    """Samples that were given to the bus, in order."""
+    published: dict[Key, Sent] = {}
+    for sent in site.network.sent.get(sample_key(station.name), []):
+        published.setdefault(key_of(Sample.decode(sent.payload)), sent)
+    return published
+
+
+def key_of(sample: Sample) -> Key:
+    """What tells a sample from others."""
+    return sample.time, sample.seq
 
 
 def _alarms(site: Site) -> Iterator[str]:
-    """An alarm is raised once each time that its condition comes; every pump fault that is told raises one."""
+    """An alarm is raised once each time that its condition comes; every pump fault that is told raises one.
+
+    Files of the alarms that were harmed may have it raised again.
+    """
     is_stepped = any(accident.startswith("clock") for accident in site.accidents)
-    step_ns = round(CLOCK_STEP_S * NS_PER_S) if is_stepped else 0
+    step_ns = round(len(site.accidents) * CLOCK_STEP_S * NS_PER_S) if is_stepped else 0
+    is_harmed = any(harm.name == "alarms" for harm in site.harms)
     for (station, name), changes in site.alarms.items():
         raised = [change.raised for change in changes if change.raised is not None]
-        if any(later < earlier - step_ns for earlier, later in pairwise(raised)):
+        if any(later < earlier - step_ns for earlier, later in pairwise(raised)) and not is_harmed:
             yield f"{station}: alarm {name} goes back in time"
         for before, after in pairwise(changes):
-            if before.is_active and after.is_active and after.raised != before.raised:
+            if before.is_active and after.is_active and after.raised != before.raised and not is_harmed:
                 yield f"{station}: alarm {name} is raised twice"
+    way = Way(site, "detector", "alarms", MARGIN_S)
     for station in site.stations:
-        faulty = _faulty_pumps(site.told.get(station.name, {}).values())
+        told = site.told.get(station.name, {})
+        faulty = _faulty_pumps(
+            verdict
+            for payload, verdict in told.items()
+            if any(way.is_open(at_s, _end_s(site, payload, at_s)) for at_s in site.heard_s[payload])
+        )
         alarmed = {pump for pump in faulty if (station.name, f"pump{pump}.pump_fault") in site.alarms}
         if faulty - alarmed:
             yield f"{station.name}: pump faults {sorted(faulty - alarmed)} raised no alarm"
+
+
+def _verified(site: Site) -> Iterator[str]:
+    """What no accident has harmed is what was written."""
+    harmed = {harm.name for harm in site.harms}
+    checks = {"history": "historian", "detector": "detector", "alarms": "alarms", "audit": "alarms"}
+    for finding in verify_kept(site.settings):
+        if finding.level == "error" and checks[finding.check] not in harmed:
+            yield f"doctor --verify: {finding}"
 
 
 def _faulty_pumps(verdicts: Iterable[Verdict]) -> set[int]:

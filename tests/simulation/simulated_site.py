@@ -1,68 +1,195 @@
 """A whole site on a virtual clock: PLCs, gateway, bus, detector, historian, alarms; what befalls them, by one seed.
 
 The daemons are the real ones, without their processes: the coroutine that each runs on its bus. What is simulated is
-the network, the PLCs, the clock, and that disks are full.
+the network, the PLCs, the clock, and what disks do to files.
 """
 
 import asyncio
 import contextlib
+import contextvars
+import logging
 import random
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
-from accidents import happen
+from accidents import SLOW_S, Plan, happen
+from judged import Judged
 from network import Network, SimulatedBus
 from simulated_plc import SimulatedPlc
+from virtual_loop import LIFE, Life
 
 from wetwell.protocols import atomic_file
-from wetwell.protocols.bus.interface import Keyed
-from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
-from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.bus.keys import alarm_key, verdict_key
+from wetwell.protocols.errors import RecordingError, WetwellError
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.alarms import daemon as alarms_daemon
-from wetwell.services.alarms.service import AlarmService
-from wetwell.services.detector.daemon import judge_all
+from wetwell.services.detector.daemon import judge_alone
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import Batch, StoreError
-from wetwell.services.runtime.settings import AlarmSettings, DetectorSettings, HealthSettings, Settings
+from wetwell.services.historian.store.opening import open_store
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.runtime.settings import (
+    AlarmSettings,
+    DetectorSettings,
+    HealthSettings,
+    HistorianSettings,
+    Settings,
+)
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-START_NS = 1_735_689_600 * NS_PER_S
+START_NS = (1_735_689_600 + 43_200) * NS_PER_S
+"""At noon: a life of two days has a day that becomes a file."""
+RESTART_S = 10.0
+"""After so long a daemon that has ended with an error is started again."""
 QUIET_S = 1_800.0
 """Virtual time after the last sample in which everything may settle."""
 
 
-@dataclass
-class Process:
-    """A daemon that can die and come back."""
+class Span(NamedTuple):
+    """What kept something from working, and how long."""
 
+    what: str
     name: str
-    work: Callable[[SimulatedBus], Coroutine[Any, Any, None]]
-    bus: SimulatedBus | None = None
-    task: asyncio.Task[None] | None = None
+    begin_s: float
+    end_s: float
 
-    def start(self, network: Network) -> None:
-        """Begin, with a connection of its own."""
-        self.bus = network.join(self.name)
-        self.task = asyncio.create_task(self.work(self.bus), name=self.name)
+
+class Harm(NamedTuple):
+    """What was done to the files of a daemon, and when."""
+
+    kind: str
+    name: str
+    at_s: float
+
+
+class Told(NamedTuple):
+    """A warning or an error that a daemon has logged."""
+
+    at_s: float
+    logger: str
+    text: str
+
+
+class Process:
+    """A daemon that can die, stand and come back; what ends it must end before it is there again."""
+
+    def __init__(self, site: "Site", name: str, work: Callable[[SimulatedBus], Coroutine[Any, Any, None]]) -> None:
+        self.name = name
+        self._site = site
+        self._work = work
+        self._away = 1
+        self._stalls = 0
+        self._gone_s: float | None = 0.0
+        self._cut_s = {"mute": 0.0, "deaf": 0.0}
+        self.bus: SimulatedBus | None = None
+        self.task: asyncio.Task[None] | None = None
+        self.life = Life(name)
+
+    def start_again(self) -> None:
+        """Begin, with a connection of its own, when nothing else keeps it down."""
+        self._away -= 1
+        if not self._away:
+            self._begin()
+
+    def _begin(self) -> None:
+        assert self._gone_s is not None
+        self._site.spans.append(Span("away", self.name, self._gone_s, _now_s()))
+        self._gone_s = None
+        self.bus = self._site.network.join(self.name)
+        self.bus.mute_s, self.bus.deaf_s = self._cut_s["mute"], self._cut_s["deaf"]
+        self.life = Life(self.name, disk_s=self._site.disk_s)
+        context = contextvars.copy_context()
+        context.run(LIFE.set, self.life)
+        self.task = asyncio.create_task(self._run(self.bus), name=self.name, context=context)
+        if self._stalls:
+            self._stand()
+
+    async def _run(self, bus: SimulatedBus) -> None:
+        """Work; what ends with an error is begun again after a while, as systemd does."""
+        try:
+            await self._work(bus)
+        except* WetwellError:
+            pass  # one line and no daemon
+        except* Exception as errors:  # noqa: BLE001 -- told as a broken rule
+            if not self.life.is_dead:
+                self._site.crashes.append(f"{self.name}: {_leaf(errors)!r}")
+        bus.kill()
+        if self._gone_s is None:
+            self._gone_s = _now_s()
+            asyncio.get_running_loop().call_later(RESTART_S, self._revive, self.life, context=contextvars.Context())
+
+    def _revive(self, life: Life) -> None:
+        if not self._away and self.life is life:
+            self._begin()
 
     async def kill(self) -> None:
-        """End it as SIGKILL does: nothing is sent or saved any more. An error of its own is raised."""
+        """End it as SIGKILL does: nothing is sent or saved any more."""
+        if self._begin_to_be_away():
+            assert self.bus is not None
+            self.life.is_dead = True
+            self.bus.kill()
+            await self._end()
+
+    async def stop(self) -> None:
+        """End it as SIGTERM does; one that stands is killed instead, as by whoever has waited for it."""
+        if self._stalls:
+            await self.kill()
+        elif self._begin_to_be_away():
+            assert self.bus is not None
+            await self._end()
+            self.bus.kill()
+
+    def stall(self) -> None:
+        """Let it stand, as SIGSTOP does: its connection is silent too."""
+        self._stalls += 1
+        if not self._away:
+            self._stand()
+
+    def go_on(self) -> None:
+        """End one stall; it goes on when there is no other."""
+        self._stalls -= 1
+        if self._stalls or self._away or self.bus is None:
+            return
+        self.bus.mute_s, self.bus.deaf_s = self._cut_s["mute"], self._cut_s["deaf"]
+        self.life.go_on()
+
+    def cut(self, seconds: float, *, is_mute: bool, is_deaf: bool) -> None:
+        """Cut its link for a while, whether it lives or not."""
+        for way, is_cut in (("mute", is_mute), ("deaf", is_deaf)):
+            if is_cut:
+                self._cut_s[way] = max(self._cut_s[way], _now_s() + seconds)
+        if self.bus is not None:
+            self.bus.cut(seconds, is_mute=is_mute, is_deaf=is_deaf)
+
+    def _stand(self) -> None:
         assert self.bus is not None
+        self.life.is_stalled = True
+        self.bus.mute_s = self.bus.deaf_s = float("inf")
+
+    def _begin_to_be_away(self) -> bool:
+        """Whether it was there until now."""
+        self._away += 1
+        if self._away > 1 or self._gone_s is not None:
+            return False
+        self._gone_s = _now_s()
+        return True
+
+    async def _end(self) -> None:
         assert self.task is not None
-        self.bus.kill()
+        if self.life.is_stalled:
+            self.life.go_on()
         self.task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self.task
@@ -74,14 +201,20 @@ class Site:
 
     Attributes
     ----------
-    published : dict
-        Samples that the gateway has published, by their key, in order, repeats left out.
     told : dict
-        Verdicts that were heard, by station, each payload once.
+        Verdicts that were heard, by station, each payload once, with the times at which it was heard.
     alarms : dict
         Alarms that were heard, by station and id, in order, repeats left out.
     accidents : list of str
         What has happened, in order.
+    spans, harms : list
+        When what could not work, and what was done to files.
+    crashes : list of str
+        Errors of the program itself that have ended a daemon.
+    log : list of Told
+        What the operator was told by the logs.
+    judged : Judged
+        What the detector was given.
     """
 
     seed: int
@@ -90,15 +223,21 @@ class Site:
     seconds: int
     period_s: int
     folder: Path
-    published: dict[str, list[bytes]] = field(default_factory=dict)
+    plan: Plan
     told: dict[str, dict[bytes, Verdict]] = field(default_factory=dict)
+    heard_s: dict[bytes, list[float]] = field(default_factory=dict)
     alarms: dict[tuple[str, str], list[Alarm]] = field(default_factory=dict)
     accidents: list[str] = field(default_factory=list)
+    spans: list[Span] = field(default_factory=list)
+    harms: list[Harm] = field(default_factory=list)
+    crashes: list[str] = field(default_factory=list)
+    log: list[Told] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.dice = random.Random(self.seed)
         self.network = Network(self.dice)
-        self.is_disk_full = False
+        self.judged = Judged()
+        self.full = self.slow = 0
         self.clock_s = 0.0
         self.settings = Settings(
             health=HealthSettings(period_s=60.0 * self.period_s),
@@ -106,37 +245,73 @@ class Site:
             alarms=AlarmSettings(
                 state_dir=self.folder / "alarms", stale_after_s=5.0 * self.period_s, silent_after_s=600.0
             ),
+            historian=HistorianSettings(
+                folder=self.folder / "history", commit_s=2.0 * self.period_s, maintain_s=3600
+            ),
         )
         self.plcs = {
             station.name: SimulatedPlc(station.name, self._feed(number, station), self.period_s, self.dice)
             for number, station in enumerate(self.stations)
         }
-        self.processes = {
-            "gateway": Process("gateway", self._poll),
-            "detector": Process("detector", self._detect),
-            "historian": Process("historian", self._keep),
-            "alarms": Process("alarms", self._alarm),
+        self._work = {
+            "gateway": self._poll,
+            "detector": self._detect,
+            "historian": self._keep,
+            "alarms": self._alarm,
         }
+        self.processes = {name: Process(self, name, work) for name, work in self._work.items()}
 
     async def live(self) -> None:
         """Let the site live from the first to the last sample, with its accidents, and become quiet."""
         with self._simulated_world():
-            observer = Process("observer", self._observe)
-            observer.start(self.network)
+            observer = Process(self, "observer", self._observe)
+            observer.start_again()
             for process in self.processes.values():
-                process.start(self.network)
+                process.start_again()
             async with asyncio.TaskGroup() as group:
                 group.create_task(asyncio.sleep(self.seconds - 0.5 * self.period_s))
-                group.create_task(happen(self), name="accidents")
-            await self.processes["gateway"].kill()
+                group.create_task(happen(self, self.plan), name="accidents")
+            await self.processes["gateway"].stop()
             await asyncio.sleep(QUIET_S)
             for name in ("detector", "alarms", "historian"):
-                await self.processes[name].kill()
+                await self.processes[name].stop()
             await observer.kill()
+
+    @contextlib.contextmanager
+    def heard(self) -> Iterator[None]:
+        """Hear the logs when the life is over, too."""
+        with _heard_logs(self.log, lambda: self.seconds + QUIET_S):
+            yield
 
     def kept(self) -> FolderStore:
         """What the historian has kept."""
-        return FolderStore(self.folder / "history", keep_live_days=1)
+        return FolderStore(self.folder_of("historian"), keep_live_days=1)
+
+    def folder_of(self, name: str) -> Path:
+        """Where a daemon keeps what it has."""
+        return self.folder / {"historian": "history"}.get(name, name)
+
+    def twin_of(self, name: str) -> Process:
+        """A second daemon of one name: it must be refused while the first is there."""
+        return Process(self, f"twin of {name}", self._work[name])
+
+    @property
+    def disk_s(self) -> float:
+        """How long a write waits for the disk. [s]"""
+        return SLOW_S if self.slow else 0.0
+
+    @contextlib.contextmanager
+    def span(self, what: str, name: str) -> Iterator[None]:
+        """Note from when to when something could not work."""
+        begin_s = _now_s()
+        for process in self.processes.values():
+            process.life.disk_s = self.disk_s
+        yield
+        self.spans.append(Span(what, name, begin_s, _now_s()))
+
+    def harm(self, kind: str, name: str) -> None:
+        """Note what was done to the files of a daemon."""
+        self.harms.append(Harm(kind, name, _now_s()))
 
     def _feed(self, number: int, station: Station) -> Recording:
         recording = Simulation(station, self.scenario, self.seed * 1000 + number).advance(self.seconds, truth=False)
@@ -150,40 +325,33 @@ class Site:
         await gateway_daemon.poll_all(bus, plcs, health_s=60.0 * self.period_s, longest_wait_s=30.0)
 
     async def _detect(self, bus: SimulatedBus) -> None:
-        await judge_all(self.settings, bus, self.stations, "detector")
+        await judge_alone(self.settings, bus, self.stations)
 
     async def _keep(self, bus: SimulatedBus) -> None:
-        store = self.kept()
-        historian = Historian(store)
-        try:
-            await historian_daemon.keep(
-                bus, historian, commit_s=2.0 * self.period_s, maintain_s=3_600.0, health_s=60.0 * self.period_s
-            )
-        finally:
-            store.close()
+        kept = self.settings.historian
+        with open_store(kept) as store:
+            historian = Historian(store, spool_rows=kept.spool_rows)
+            try:
+                await historian_daemon.keep(
+                    bus, historian, kept.commit_s, kept.maintain_s, self.settings.health.period_s
+                )
+            finally:
+                historian.commit(now_ns())
 
     async def _alarm(self, bus: SimulatedBus) -> None:
-        service = AlarmService(bus, self.settings.alarms, self.stations, alarms_daemon.clocks)
-        await alarms_daemon.keep(bus, service, health_period_s=60.0 * self.period_s)
+        await alarms_daemon.keep_alone(self.settings, bus, self.stations)
 
     async def _observe(self, bus: SimulatedBus) -> None:
-        samples = bus.collect([sample_key(station.name) for station in self.stations], capacity=1_000_000)
         verdicts = bus.subscribe(verdict_key("*"), capacity=1_000_000)
         alarms = bus.subscribe(alarm_key("*"), capacity=1_000_000)
         async with asyncio.TaskGroup() as group:
-            group.create_task(_each(samples, self._note_sample))
             group.create_task(_each(verdicts, self._note_verdict))
             group.create_task(_each(alarms, self._note_alarm))
-
-    def _note_sample(self, sample: Keyed) -> None:
-        key, payload = sample
-        heard = self.published.setdefault(key, [])
-        if not heard or heard[-1] != payload:
-            heard.append(payload)
 
     def _note_verdict(self, payload: bytes) -> None:
         verdict = Verdict.decode(payload)
         self.told.setdefault(verdict.station, {}).setdefault(payload, verdict)
+        self.heard_s.setdefault(payload, []).append(_now_s())
 
     def _note_alarm(self, payload: bytes) -> None:
         alarm = Alarm.decode(payload)
@@ -193,7 +361,7 @@ class Site:
 
     @contextlib.contextmanager
     def _simulated_world(self) -> Iterator[None]:
-        """Clock, PLC connections and disks of this site in place of the real ones."""
+        """Clock, PLC connections, disks and logs of this site in place of the real ones."""
         loop = asyncio.get_running_loop()
         write = FolderStore.write
         real = atomic_file.atomic_file
@@ -201,14 +369,18 @@ class Site:
         def time_ns() -> int:
             return START_NS + round((loop.time() + self.clock_s) * NS_PER_S)
 
+        def is_lost() -> bool:
+            life = LIFE.get()
+            return self.full > 0 or (life is not None and life.is_dead)
+
         def keep(store: FolderStore, batch: Batch) -> int:
-            if self.is_disk_full:
+            if is_lost():
                 raise StoreError("no space left on device (simulated)")
             return write(store, batch)
 
         @contextlib.contextmanager
         def file(path: Path, *args: Any, **kwargs: Any) -> Iterator[Any]:
-            if self.is_disk_full:
+            if is_lost():
                 raise RecordingError(f"{path}: no space left on device (simulated)")
             with real(path, *args, **kwargs) as opened:
                 yield opened
@@ -221,14 +393,53 @@ class Site:
                 ("wetwell.services.alarms.daemon.LOOK_S", 1.0 * self.period_s),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.detector.checkpoint.atomic_file", file),
+                ("wetwell.services.detector.quarantine.atomic_file", file),
                 ("wetwell.services.alarms.state_file.atomic_file", file),
+                ("wetwell.services.historian.store.archive.atomic_file", file),
                 ("wetwell.services.historian.store.folder_store.FolderStore.write", keep),
             ):
                 patches.enter_context(mock.patch(target, replacement))
+            patches.enter_context(self.judged.watched())
+            patches.enter_context(_heard_logs(self.log, _now_s))
             yield
+
+
+class _Listener(logging.Handler):
+    def __init__(self, log: list[Told], now_s: Callable[[], float]) -> None:
+        super().__init__(logging.WARNING)
+        self._log = log
+        self._now_s = now_s
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._log.append(Told(self._now_s(), record.name, record.getMessage()))
+
+
+@contextlib.contextmanager
+def _heard_logs(log: list[Told], now_s: Callable[[], float]) -> Iterator[None]:
+    logger, listener = logging.getLogger("wetwell"), _Listener(log, now_s)
+    before = logger.level, logger.propagate
+    logger.setLevel(logging.WARNING)
+    logger.propagate = False
+    logger.addHandler(listener)
+    try:
+        yield
+    finally:
+        logger.removeHandler(listener)
+        logger.setLevel(before[0])
+        logger.propagate = before[1]
+
+
+def _leaf(error: BaseException) -> BaseException:
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error
 
 
 async def _each(subscription: Any, note: Callable[[bytes], None]) -> None:
     while True:
         for payload in await subscription.receive():
             note(payload)
+
+
+def _now_s() -> float:
+    return asyncio.get_running_loop().time()

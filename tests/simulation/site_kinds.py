@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from accidents import Plan, plan_of
 from simulated_site import Site
 from virtual_loop import run_virtual
 
@@ -13,12 +14,12 @@ GRAIN_S = 0.25
 """Of the clock of a light site."""
 
 
-def alpha_site(seed: int, stations: int, days: float, period_s: int, folder: Path) -> Site:
+def alpha_site(seed: int, stations: int, days: float, period_s: int, folder: Path, plan: Plan | None = None) -> Site:
     """Site of stations like the built-in one, with the paper's faults, after its life."""
-    return _lived(seed, find_station("alpha"), stations, days, period_s, 0.0, folder)
+    return _lived(seed, find_station("alpha"), stations, days, period_s, 0.0, folder, plan)
 
 
-def light_site(seed: int, stations: int, days: float, period_s: int, folder: Path) -> Site:
+def light_site(seed: int, stations: int, days: float, period_s: int, folder: Path, plan: Plan | None = None) -> Site:
     """The same with one pump and a wide wet well, whose long runs can be judged by a sample each five minutes."""
     alpha = find_station("alpha")
     levels = {name: getattr(alpha.control, name)[:1] for name in ("start_levels_m", "stop_levels_m")}
@@ -27,22 +28,32 @@ def light_site(seed: int, stations: int, days: float, period_s: int, folder: Pat
         "sump": alpha.sump.model_copy(update={"area_m2": 80.0}),
         "control": alpha.control.model_copy(update=levels),
     }
-    return _lived(seed, alpha.model_copy(update=parts), stations, days, period_s, GRAIN_S, folder)
+    return _lived(seed, alpha.model_copy(update=parts), stations, days, period_s, GRAIN_S, folder, plan)
 
 
-KINDS: dict[str, Callable[[int, int, float, int, Path], Site]] = {"alpha": alpha_site, "light": light_site}
+KINDS: dict[str, Callable[..., Site]] = {"alpha": alpha_site, "light": light_site}
 
 
 def _lived(
-    seed: int, station: Station, stations: int, days: float, period_s: int, grain_s: float, folder: Path
+    seed: int,
+    station: Station,
+    stations: int,
+    days: float,
+    period_s: int,
+    grain_s: float,
+    folder: Path,
+    plan: Plan | None,
 ) -> Site:
+    """A site after its life; without a plan with that of its seed."""
+    seconds = round(days * 86_400.0)
     site = Site(
         seed=seed,
         stations=[station.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
         scenario=find_scenario("paper"),
-        seconds=round(days * 86_400.0),
+        seconds=seconds,
         period_s=period_s,
         folder=folder,
+        plan=plan_of(seed, seconds) if plan is None else plan,
     )
     run_virtual(site.live(), grain_s)
     return site

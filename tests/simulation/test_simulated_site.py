@@ -1,12 +1,13 @@
-"""The whole service on a virtual clock, with accidents from a seed. A seed that fails, fails again:
+"""The whole service on a virtual clock, with accidents from a seed. A seed that fails becomes a test by
 
-python benchmarks/simulation.py --kind alpha --period-s PERIOD --stations STATIONS --first-seed SEED --sites 1
+python benchmarks/simulation.py --kind alpha --period-s PERIOD --stations N --first-seed SEED --sites 1 --shrink
 """
 
 from collections import Counter
+from itertools import pairwise
 
 import pytest
-from accidents import ACCIDENTS
+from accidents import KINDS, plan_of
 from rules import broken_rules, fingerprint
 from site_kinds import alpha_site
 
@@ -29,5 +30,18 @@ def test_many_seeds_see_every_accident(folder):
     for seed in range(100, 105):
         site = alpha_site(seed, 2, 2.0, 60, folder / str(seed))
         assert broken_rules(site) == [], f"seed {seed}"
-        happened.update(site.accidents)
-    assert set(happened) == set(ACCIDENTS)
+        happened.update(accident.split()[0] for accident in site.accidents)
+    assert set(happened) == set(KINDS)
+
+
+def test_plans_have_every_kind_and_target_and_overlap():
+    plans = [plan_of(seed, 172_800.0) for seed in range(200)]
+    assert {(one.kind, one.target) for plan in plans for one in plan} == {
+        (kind, target) for kind, targets in KINDS.items() for target in targets
+    }
+    assert plans == [plan_of(seed, 172_800.0) for seed in range(200)]
+    overlaps = [later.at_s < before.at_s + before.lasts_s for plan in plans for before, later in pairwise(plan)]
+    assert sum(overlaps) > 1_000
+    kinds = [len({one.kind for one in plan}) for plan in plans]
+    assert min(kinds) < 5
+    assert max(kinds) > 11

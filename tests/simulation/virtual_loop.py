@@ -3,8 +3,42 @@
 import asyncio
 import math
 import selectors
+from collections import deque
 from collections.abc import Coroutine
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from typing import Any
+
+
+@dataclass(eq=False)
+class Life:
+    """One life of a simulated process: all that runs in its context.
+
+    Attributes
+    ----------
+    is_stalled : bool
+        Whether it stands, as after SIGSTOP: what is due waits in `held`.
+    is_dead : bool
+        Whether it was killed: nothing that it writes reaches a disk any more.
+    disk_s : float
+        How long its threads wait for a disk. [s]
+    """
+
+    name: str
+    is_stalled: bool = False
+    is_dead: bool = False
+    disk_s: float = 0.0
+    held: list[asyncio.Handle] = field(default_factory=list)
+
+    def go_on(self) -> None:
+        """End a stall: what was due meanwhile is done, in its order."""
+        self.is_stalled = False
+        asyncio.get_running_loop()._ready.extend(self.held)  # type: ignore[attr-defined]
+        self.held.clear()
+
+
+LIFE: ContextVar[Life | None] = ContextVar("life", default=None)
+"""Of the process whose code runs."""
 
 
 class _NoWait(selectors.SelectSelector):
@@ -23,6 +57,22 @@ class _NoWait(selectors.SelectSelector):
         return []
 
 
+class _Ready(deque[asyncio.Handle]):
+    """What is due; of a process that stands it is held."""
+
+    def __init__(self, nothing: asyncio.Handle) -> None:
+        super().__init__()
+        self._nothing = nothing
+
+    def popleft(self) -> asyncio.Handle:
+        handle = super().popleft()
+        life = handle._context.get(LIFE)  # type: ignore[attr-defined]
+        if life is None or not life.is_stalled:
+            return handle
+        life.held.append(handle)
+        return self._nothing
+
+
 class VirtualLoop(asyncio.SelectorEventLoop):
     """Loop on a virtual clock that begins at 0 s. No threads and no sockets: nothing wakes it from outside.
 
@@ -32,6 +82,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def __init__(self, grain_s: float = 0.0) -> None:
         self._clock = [0.0]
         super().__init__(_NoWait(self._clock, grain_s))
+        nothing = asyncio.Handle(lambda: None, (), self)
+        nothing.cancel()
+        self._ready = _Ready(nothing)
 
     def time(self) -> float:
         """Virtual time. [s]"""
@@ -42,13 +95,23 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return self.call_soon(callback, *args, context=context)
 
     def run_in_executor(self, _executor: Any, func: Any, *args: Any) -> asyncio.Future[Any]:
-        """Done at once, in this thread: what a thread would do takes no virtual time."""
+        """Done in this thread: at once, or when the disk of a simulated process has let it wait."""
         future = self.create_future()
-        try:
-            future.set_result(func(*args))
-        except Exception as error:  # noqa: BLE001 -- as an executor does
-            future.set_exception(error)
+        life = LIFE.get()
+        if life is not None and life.disk_s:
+            self.call_later(life.disk_s, _work, future, func, args)
+        else:
+            _work(future, func, args)
         return future
+
+
+def _work(future: asyncio.Future[Any], func: Any, args: tuple[Any, ...]) -> None:
+    if future.cancelled():
+        return
+    try:
+        future.set_result(func(*args))
+    except Exception as error:  # noqa: BLE001 -- as an executor does
+        future.set_exception(error)
 
 
 def run_virtual(main: Coroutine[Any, Any, Any], grain_s: float = 0.0) -> Any:

@@ -3,6 +3,7 @@
 A file of samples is a recording with two more columns, `seq` and `quality`; it carries its station.
 """
 
+import logging
 import os
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -17,8 +18,10 @@ from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.quantities import columns_of, pumps_of, pumps_of_width
 from wetwell.protocols.recordings.origin import Origin
 from wetwell.services.historian.samples import Samples
-from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.historian.store.interface import DAY_NS, StoreError
 from wetwell.services.historian.summary import Summary
+
+log = logging.getLogger(__name__)
 
 Form = Literal["samples", "minutes"]
 _STAMP = pa.timestamp("ns", tz="UTC")
@@ -49,7 +52,7 @@ class Archive:
 
     def samples(self, station: str, day_ns: int) -> Samples | None:
         """Samples of a day; None if there is no file."""
-        table = self._read(self.path("samples", station, day_ns))
+        table = self._read("samples", station, day_ns)
         if table is None:
             return None
         return Samples(
@@ -70,7 +73,7 @@ class Archive:
 
     def count(self, station: str, day_ns: int, start_ns: int, end_ns: int) -> int:
         """Number of samples of a span in the file of a day; 0 if there is none."""
-        table = self._read(self.path("samples", station, day_ns), ["time"])
+        table = self._read("samples", station, day_ns, ["time"])
         if table is None:
             return 0
         time_ns = _stamps(table)
@@ -78,7 +81,7 @@ class Archive:
 
     def minutes(self, station: str, day_ns: int) -> Summary | None:
         """Minutes of a day; None if there is no file."""
-        table = self._read(self.path("minutes", station, day_ns))
+        table = self._read("minutes", station, day_ns)
         if table is None:
             return None
         names = columns_of(pumps_of(table.column_names))
@@ -108,7 +111,7 @@ class Archive:
         names = columns_of(pumps_of_width(minutes.mean.shape[1]))
         counts = {f"{name}_count": column for name, column in zip(names, minutes.count.T, strict=True)}
         path = self.path("minutes", station, day_ns)
-        _write(path, minutes.time_ns, minutes.columns() | counts, {}, Origin())
+        _write(path, minutes.time_ns, minutes.columns() | counts, {}, Origin(station=station))
         kept = self.minutes(station, day_ns)
         if kept is None or not all(
             np.array_equal(getattr(kept, name), getattr(minutes, name), equal_nan=True)
@@ -123,10 +126,25 @@ class Archive:
             for form in get_args(Form):
                 for day_ns in self.days_ns(form, station):
                     try:
-                        self._read(self.path(form, station, day_ns))
+                        self._read(form, station, day_ns)
                     except StoreError as error:
                         told.append(str(error))
         return told
+
+    def put_aside_damaged(self, form: Form, station: str, day_ns: int) -> bool:
+        """Put the file of a day aside if it is not what was written; whether it was."""
+        path = self.path(form, station, day_ns)
+        try:
+            self._read(form, station, day_ns)
+        except StoreError as error:
+            aside = path.with_name(f"{path.name}.refused")
+            try:
+                path.replace(aside)
+            except OSError as reason:
+                raise StoreError(f"{path}: cannot be put aside: {reason.strerror or reason}") from error
+            log.warning("%s; kept as %s", error, aside.name)
+            return True
+        return False
 
     def delete(self, form: Form, station: str, day_ns: int) -> None:
         """Delete the file of a day."""
@@ -136,13 +154,26 @@ class Archive:
         except OSError as error:
             raise StoreError(f"{path}: cannot be deleted: {error.strerror or error}") from error
 
-    def _read(self, path: Path, columns: list[str] | None = None) -> pa.Table | None:
+    def _read(self, form: Form, station: str, day_ns: int, columns: list[str] | None = None) -> pa.Table | None:
+        """Table of a day; None if there is no file.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be read, is not what was written, or is that of another station or day.
+        """
+        path = self.path(form, station, day_ns)
         try:
-            return pa.parquet.ParquetFile(path, page_checksum_verification=True).read(columns)
+            table = pa.parquet.ParquetFile(path, page_checksum_verification=True).read(columns)
+            said = Origin.of_metadata(table.schema.metadata or {}).station
         except FileNotFoundError:
             return None
-        except (OSError, pa.ArrowException) as error:
+        except (OSError, ValueError, pa.ArrowException) as error:
             raise StoreError(f"{path}: cannot be read: {error}") from error
+        time_ns = _stamps(table)
+        if said not in (station, None) or not np.all((time_ns >= day_ns) & (time_ns < day_ns + DAY_NS)):
+            raise StoreError(f"{path}: is of station '{said}' or of another day")
+        return table
 
 
 def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: dict[str, Any], origin: Origin) -> None:

@@ -1,12 +1,13 @@
 """The store of a folder: live days in SQLite, complete ones in Parquet, read as one."""
 
 import contextlib
-import fcntl
 import logging
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
+from wetwell.protocols.errors import ConfigError
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
@@ -24,6 +25,7 @@ from wetwell.services.historian.store.interface import (
 from wetwell.services.historian.store.live_database import LiveDatabase
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
+from wetwell.services.runtime.folder_lock import folder_held
 
 log = logging.getLogger(__name__)
 
@@ -64,7 +66,13 @@ class FolderStore:
             raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
         self.live = LiveDatabase(folder / "live.sqlite", self.alone)
         self.archive = Archive(folder)
+        self._refused_files = 0
         self._adopt()
+
+    @property
+    def damages(self) -> int:
+        """How often something damaged was put aside."""
+        return self.live.damages + self._refused_files
 
     def close(self) -> None:
         """Close the database."""
@@ -79,16 +87,11 @@ class FolderStore:
         StoreError
             If another holds it, or it cannot be held.
         """
-        lock = self._folder / "lock"
-        try:
-            opened = lock.open("w")
-        except OSError as error:
-            raise StoreError(f"{lock}: cannot be written: {error.strerror or error}") from error
-        with opened as file:
+        with contextlib.ExitStack() as stack:
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                raise StoreError(f"{self._folder}: another historian works here") from error
+                stack.enter_context(folder_held(self._folder, "historian.folder", "historian"))
+            except ConfigError as error:
+                raise StoreError(str(error)) from error
             yield
 
     def write(self, batch: Batch) -> int:
@@ -177,6 +180,20 @@ class FolderStore:
         """Turn one day into a file, or one old file into minutes, or delete one that is too old."""
         return maintain_one(self, now_ns, (self._roll, self._downsample, self._delete_old))
 
+    def scrub(self) -> Iterator[None]:
+        """Look through all that is kept, a part at a time; what is damaged is put aside and told."""
+        self.live.check()
+        yield
+        for span in self.stations():
+            for day_ns in self.live.days_ns(span.station, -(2**63), 2**63 - 1):
+                self.live.put_aside_damaged(span.station, day_ns, day_ns + DAY_NS)
+                yield
+        for station in self.archive.stations():
+            for form in get_args(Form):
+                for day_ns in self.archive.days_ns(form, station):
+                    self._refused_files += self.archive.put_aside_damaged(form, station, day_ns)
+                    yield
+
     def figures(self) -> dict[str, float]:
         """Size of the database, and what is free on its disk."""
         try:
@@ -192,8 +209,12 @@ class FolderStore:
             days_ns = sorted({*self.archive.days_ns("samples", station), *self.archive.days_ns("minutes", station)})
             if days_ns:
                 spans.append(StationSpan(station, days_ns[0], days_ns[-1] + DAY_NS - 1))
-        known = {span.station for span in self.stations()}
-        self.live.adopt([span for span in spans if span.station not in known])
+        try:
+            self.live.adopt(spans)
+        except StoreError:
+            if not self.live.is_damaged:
+                raise
+            self.live.adopt(spans)  # into the new one
 
     def _roll(self, station: str, newest_ns: int) -> str | None:
         """Write the file of the oldest day in the database that is complete, then delete its rows.
@@ -204,6 +225,8 @@ class FolderStore:
         if first_ns is None or day_of(first_ns) >= newest_ns - self._keep_live_days * DAY_NS:
             return None
         day_ns = day_of(first_ns)
+        if self.live.put_aside_damaged(station, day_ns, day_ns + DAY_NS):
+            return f"station '{station}': damaged rows put aside"
         live = self.live.samples(station, day_ns, day_ns + DAY_NS)
         filed = self.archive.samples(station, day_ns)
         samples = live if filed is None else merged([filed, live])

@@ -70,7 +70,12 @@ class Store(Protocol):
     """Where the history is kept. Every method raises `StoreError` if it cannot now.
 
     Characteristics: `write` and `maintain` exclude each other · reading is free to go on in other threads meanwhile.
+
     """
+
+    @property
+    def damages(self) -> int:
+        """How often something that was not what was written has been put aside."""
 
     def write(self, batch: Batch) -> int:
         """Keep a batch, and return how many samples, verdicts and alarms of it were new.
@@ -108,6 +113,9 @@ class Store(Protocol):
 
     def maintain(self, now_ns: int) -> str | None:
         """One step of what must be done once in a while; what was done, or None if there is nothing to do."""
+
+    def scrub(self) -> Iterator[None]:
+        """Look through all that is kept, a part at a time; what is damaged is put aside, told and counted."""
 
     def figures(self) -> dict[str, float]:
         """Health figures."""

@@ -5,7 +5,6 @@ a power failure. One connection writes; each reading has a connection of its own
 """
 
 import contextlib
-import hashlib
 import itertools
 import logging
 import operator
@@ -14,14 +13,14 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any, get_args
 
 from wetwell.protocols.quantities import pumps_of_width
 from wetwell.services.historian.hours import Hours
-from wetwell.services.historian.rows import HOUR_NS, SampleRow, unpack
+from wetwell.services.historian.rows import HOUR_NS, PackedSamples, SampleRow, unpack
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.interface import (
     DAY_NS,
-    DIGEST_BYTES,
     Batch,
     EventKind,
     StationSpan,
@@ -29,12 +28,25 @@ from wetwell.services.historian.store.interface import (
     day_of,
     span_of,
 )
+from wetwell.services.historian.store.live_salvage import salvage
 from wetwell.services.historian.store.live_schema import prepare
+from wetwell.services.historian.store.refused_rows import RefusedRows
+from wetwell.services.historian.store.row_checksum import (
+    hour_checksum,
+    is_event_intact,
+    is_hour_intact,
+    is_sample_intact,
+    sample_checksum,
+)
 
 log = logging.getLogger(__name__)
 
+MOST_EVENTS = 1_000_000
+"""Messages of one kind that are looked through at once: more than a station tells in a day."""
 BUSY_S = 10.0
 """So long one process waits for another that writes."""
+
+_DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 _SIZE = operator.attrgetter("size")
 _SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
@@ -45,7 +57,20 @@ _LAST = "coalesce(last_ns, time_ns)"
 _TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
 """Rows that may have a sample of a span: since a row keeps to its hour, none before the hour of the start has one."""
 
-_PACKED = "time_ns, seq, size, quality, data"
+_INSERT_SAMPLE = (
+    "INSERT INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET quality = excluded.quality, "
+    "data = excluded.data, size = excluded.size, last_ns = excluded.last_ns, crc = excluded.crc "
+    "WHERE NOT is_intact(station, time_ns, seq, quality, size, data, crc)"
+)
+_INSERT_EVENT = (
+    "INSERT INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?) "
+    "ON CONFLICT (kind, station, time_ns, digest) DO UPDATE SET payload = excluded.payload "
+    "WHERE payload != excluded.payload"
+)
+"""What comes again changes nothing, unless it was damaged meanwhile."""
+
+_PACKED = "time_ns, seq, size, quality, data, station, crc, (SELECT id FROM station WHERE name = :station)"
+"""A `PackedSamples`, and by what it is checked: a page that stands in the place of another has rows of elsewhere."""
 
 
 class LiveDatabase:
@@ -60,7 +85,15 @@ class LiveDatabase:
     Raises
     ------
     StoreError
-        Here and from every method, if the file cannot be used now. A file that is damaged is put aside, and told.
+        Here and from every method, if the file cannot be used now. A file that is damaged is put aside, and told,
+        by the next writing; what can be read of it and is what was written goes into a new one.
+
+    Attributes
+    ----------
+    is_damaged : bool
+        Whether the file was found damaged, and not yet put aside.
+    damages : int
+        How often something was put aside.
     """
 
     def __init__(self, path: Path, alone: Callable[[], contextlib.AbstractContextManager[None]]) -> None:
@@ -68,14 +101,15 @@ class LiveDatabase:
         self._alone = alone
         self._lock = threading.Lock()
         self._ids: dict[str, int] = {}
+        self._refused = RefusedRows(path)
+        self.is_damaged = False
+        self.damages = 0
         try:
             self._writer = self._open()
         except sqlite3.OperationalError as error:
             raise StoreError(f"{path}: {error}") from error
         except sqlite3.DatabaseError as error:
-            aside = _put_aside(path)
-            log.warning("%s: %s; kept as %s, a new one is begun", path, error, aside.name)
-            self._writer = self._open()
+            self._begin_anew(error)
 
     def close(self) -> None:
         """Close it; twice is fine."""
@@ -97,15 +131,16 @@ class LiveDatabase:
                         row.data,
                         size,
                         None if size == 1 else row.last_ns,
+                        sample_checksum(ids[row.station], row.time_ns, _key(row), row.quality, size, row.data),
                     )
                     for row in rows
                 ]
                 before = database.total_changes
-                database.executemany("INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?)", values)
+                database.executemany(_INSERT_SAMPLE, values)
                 new += size * (database.total_changes - before)
             before = database.total_changes
             database.executemany(
-                "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload) VALUES (?, ?, ?, ?, ?)",
+                _INSERT_EVENT,
                 [(row.kind, ids[row.station], row.time_ns, row.digest, row.payload) for row in batch.events],
             )
             new += database.total_changes - before
@@ -139,7 +174,7 @@ class LiveDatabase:
         """Samples from `start_ns` until before `end_ns`."""
         with self._reading() as database:
             rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", _span(station, start_ns, end_ns)).fetchall()
-        return Samples.of_rows(rows).between(start_ns, end_ns)
+        return Samples.of_rows(self._intact(rows)).between(start_ns, end_ns)
 
     def pumps(self, station: str, start_ns: int, end_ns: int) -> int | None:
         """Number of pumps that the samples of a span speak of; None if there are none."""
@@ -159,7 +194,7 @@ class LiveDatabase:
         with self._reading() as database:
             begun = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
             (time_ns,) = database.execute(f"SELECT min(time_ns) {_OF_STATION} AND time_ns >= :start", span).fetchone()
-        times_ns = Samples.of_rows(begun).time_ns
+        times_ns = Samples.of_rows(self._intact(begun)).time_ns
         times_ns = times_ns[times_ns >= start_ns]
         return min([*times_ns[:1].tolist(), *([] if time_ns is None else [int(time_ns)])], default=None)
 
@@ -196,7 +231,7 @@ class LiveDatabase:
             cut = database.execute(
                 f"SELECT {_PACKED} {_TOUCHING} AND (time_ns < :start OR {_LAST} >= :end)", span
             ).fetchall()
-        return min(most, int(whole) + len(Samples.of_rows(cut).between(start_ns, end_ns)))
+        return min(most, int(whole) + len(Samples.of_rows(self._intact(cut)).between(start_ns, end_ns)))
 
     def delete_samples(self, station: str, samples: Samples) -> None:
         """Delete the rows that hold these samples, and no others: what came meanwhile stays."""
@@ -208,7 +243,7 @@ class LiveDatabase:
             if count == len(samples):
                 database.execute(f"DELETE {_TOUCHING}", span)
                 return
-            rows = database.execute(f"SELECT {_PACKED}, station {_TOUCHING}", span).fetchall()
+            rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
             known = set(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
             others = {
                 number
@@ -225,11 +260,20 @@ class LiveDatabase:
         """The last so many verdicts or alarms, oldest first."""
         with self._reading() as database:
             rows = database.execute(
-                "SELECT payload FROM event WHERE kind = ? AND station = (SELECT id FROM station WHERE name = ?) "
+                "SELECT payload, digest, kind, time_ns, id FROM event WHERE kind = ? "
+                "AND station = (SELECT id FROM station WHERE name = ?) "
                 "AND time_ns >= ? AND time_ns < ? ORDER BY time_ns DESC, id DESC LIMIT ?",
                 (kind, station, start_ns, end_ns, last),
             ).fetchall()
-        return [payload for (payload,) in reversed(rows)]
+        intact = []
+        for payload, digest, its_kind, time_ns, number in reversed(rows):
+            if its_kind != kind or not start_ns <= time_ns < end_ns:
+                self.is_damaged = True  # a page in the place of another
+            elif is_event_intact(payload, digest):
+                intact.append(payload)
+            else:
+                self._refused.note("event", number)
+        return intact
 
     def delete_events(self, station: str, end_ns: int) -> int:
         """Delete verdicts and alarms from before `end_ns`; returns how many."""
@@ -242,19 +286,52 @@ class LiveDatabase:
     def hours(self, station: str, start_ns: int, end_ns: int) -> Hours:
         """Figures that `write_hours` has kept."""
         with self._reading() as database:
-            return Hours.of_rows(
-                database.execute(
-                    "SELECT hour_ns, data FROM hour WHERE station = (SELECT id FROM station WHERE name = ?) "
-                    "AND hour_ns >= ? AND hour_ns < ? ORDER BY 1",
-                    (station, start_ns, end_ns),
-                ).fetchall()
-            )
+            rows = database.execute(
+                "SELECT hour_ns, data, station, crc FROM hour "
+                "WHERE station = (SELECT id FROM station WHERE name = ?) AND hour_ns >= ? AND hour_ns < ? ORDER BY 1",
+                (station, start_ns, end_ns),
+            ).fetchall()
+        intact = []
+        for hour_ns, data, number, crc in rows:
+            if is_hour_intact(number, hour_ns, data, crc):
+                intact.append((hour_ns, data))
+            else:
+                self._refused.note("hour", number, hour_ns)
+        return Hours.of_rows(intact)
 
     def write_hours(self, station: str, hours: Hours) -> None:
         """Keep figures of hours, in place of earlier ones."""
         with self._transaction() as database:
             (number,) = database.execute("SELECT id FROM station WHERE name = ?", (station,)).fetchone()
-            database.executemany("REPLACE INTO hour VALUES (?, ?, ?)", [(number, *row) for row in hours.rows()])
+            database.executemany(
+                "REPLACE INTO hour VALUES (?, ?, ?, ?)",
+                [(number, *row, hour_checksum(number, *row)) for row in hours.rows()],
+            )
+
+    def put_aside_damaged(self, station: str, start_ns: int, end_ns: int) -> int:
+        """Put what is not what was written of a span aside, of samples, messages and hours; how many rows."""
+        self.samples(station, start_ns, end_ns)
+        self.hours(station, start_ns, end_ns)
+        for kind in get_args(EventKind):
+            self.events(kind, station, start_ns, end_ns, MOST_EVENTS)
+        damages = self.damages
+        with self._transaction():
+            pass
+        return self.damages - damages
+
+    def check(self) -> None:
+        """Look through the file, as far as SQLite knows what must be in it; damage is mended by the next writing.
+
+        Raises
+        ------
+        StoreError
+            If it is damaged, or cannot be read now.
+        """
+        with self._reading() as database:
+            told = [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
+        if told:
+            self.is_damaged = True
+            raise StoreError(f"{self._path}: {told[0].splitlines()[-1]}")
 
     def size_bytes(self) -> int:
         """Size of the file and of its log."""
@@ -276,11 +353,17 @@ class LiveDatabase:
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
         with self._lock:
+            if self.is_damaged:
+                self._writer.close()
+                self._begin_anew("damaged")
             try:
                 self._writer.execute("BEGIN IMMEDIATE")
+                damages = self._refused.put_aside(self._writer)
                 yield self._writer
                 self._writer.execute("COMMIT")
+                self.damages += damages
             except sqlite3.Error as error:
+                self._note(error)
                 raise StoreError(f"{self._path}: {error}") from error
             finally:
                 if self._writer.in_transaction:
@@ -294,36 +377,58 @@ class LiveDatabase:
                 database.execute("PRAGMA query_only = 1")
                 yield database
         except sqlite3.Error as error:
+            self._note(error)
             raise StoreError(f"{self._path}: {error}") from error
+
+    def _note(self, error: sqlite3.Error) -> None:
+        """Know from now on that the file is damaged, if that is what the error says."""
+        if getattr(error, "sqlite_errorcode", None) in _DAMAGE:
+            self.is_damaged = True
+
+    def _begin_anew(self, reason: object) -> None:
+        """Put the file aside, and begin a new one with what can be read of it and is what was written."""
+        try:
+            aside = _put_aside(self._path)
+            self._ids.clear()
+            self._writer = self._open()
+            saved, lost = salvage(aside, self._writer)
+        except (sqlite3.Error, OSError) as error:
+            raise StoreError(f"{self._path}: {error}") from error
+        self.is_damaged = False
+        self.damages += 1
+        log.error(
+            "%s: %s; kept as %s, a new one is begun with %d rows of it; at least %d are lost",
+            self._path,
+            reason,
+            aside.name,
+            saved,
+            lost,
+        )
+
+    def _intact(self, rows: Sequence[tuple[Any, ...]]) -> list[PackedSamples]:
+        """Rows that are what was written; the others are told, and left out."""
+        intact: list[PackedSamples] = []
+        for time_ns, seq, size, quality, data, station, crc, asked in rows:
+            if station != asked:
+                self.is_damaged = True  # a page in the place of another
+            elif is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+                intact.append((time_ns, seq, size, quality, data))
+            else:
+                self._refused.note("sample", station, time_ns, seq)
+        return intact
 
     def _open(self) -> sqlite3.Connection:
         database = sqlite3.connect(self._path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             database.execute("PRAGMA journal_mode = WAL")
             database.execute("PRAGMA synchronous = FULL")
+            database.create_function("is_intact", 7, is_sample_intact, deterministic=True)
             prepare(database, self._path, self._alone)
             database.execute("SELECT count(*) FROM station").fetchone()
         except BaseException:
             database.close()
             raise
         return database
-
-
-def damage_of(path: Path) -> list[str]:
-    """What SQLite finds wrong in a file, and messages that are not what was written; nothing is changed.
-
-    Of the rows of samples only their order and form is known: they have no checksum until their day becomes a file.
-    """
-    try:
-        with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
-            told = [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
-            changed = sum(
-                hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest() != digest
-                for digest, payload in database.execute("SELECT digest, payload FROM event")
-            )
-    except sqlite3.Error as error:
-        return [str(error)]
-    return [*told, *([f"{changed} messages are not what was written"] if changed else [])]
 
 
 def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:

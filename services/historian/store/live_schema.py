@@ -10,36 +10,56 @@ from wetwell.services.historian.store.interface import StoreError
 
 log = logging.getLogger(__name__)
 
-VERSION = 2
+VERSION = 3
+
+_REFUSED = """
+CREATE TABLE refused (origin TEXT NOT NULL, key TEXT NOT NULL, content BLOB);
+"""
+"""What stood in rows that are not what was written; their table and key there."""
 
 _LIVE_TABLES = f"""
 BEGIN IMMEDIATE;
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
 CREATE TABLE sample (
     station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, quality INTEGER NOT NULL,
-    data BLOB NOT NULL, size INTEGER NOT NULL DEFAULT 1, last_ns INTEGER, PRIMARY KEY (station, time_ns, seq)
+    data BLOB NOT NULL, size INTEGER NOT NULL DEFAULT 1, last_ns INTEGER, crc INTEGER,
+    PRIMARY KEY (station, time_ns, seq)
 ) WITHOUT ROWID;
 CREATE TABLE event (
     id INTEGER PRIMARY KEY, kind TEXT NOT NULL, station INTEGER NOT NULL, time_ns INTEGER NOT NULL,
     digest BLOB NOT NULL, payload BLOB NOT NULL, UNIQUE (kind, station, time_ns, digest)
 );
 CREATE TABLE hour (
-    station INTEGER NOT NULL, hour_ns INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (station, hour_ns)
+    station INTEGER NOT NULL, hour_ns INTEGER NOT NULL, data BLOB NOT NULL, crc INTEGER,
+    PRIMARY KEY (station, hour_ns)
 ) WITHOUT ROWID;
+{_REFUSED}
 PRAGMA user_version = {VERSION};
 COMMIT;
 """
 """A row of `sample` is a `SampleRow`. For one sample `last_ns` is NULL. For several `seq` is a number below 0, which
-tells rows from each other that begin at the same time."""
+tells rows from each other that begin at the same time. `crc` is the checksum of the row; those of an earlier version
+have none."""
 
-_FROM_VERSION_1 = """
+_UPGRADES = {
+    1: """
 BEGIN IMMEDIATE;
 ALTER TABLE sample ADD COLUMN size INTEGER NOT NULL DEFAULT 1;
 ALTER TABLE sample ADD COLUMN last_ns INTEGER;
 PRAGMA user_version = 2;
 COMMIT;
-"""
-"""Version 1 had rows of one sample. No row is written anew: a large site has some ten gigabytes of them."""
+""",
+    2: f"""
+BEGIN IMMEDIATE;
+ALTER TABLE sample ADD COLUMN crc INTEGER;
+ALTER TABLE hour ADD COLUMN crc INTEGER;
+{_REFUSED}
+PRAGMA user_version = 3;
+COMMIT;
+""",
+}
+"""Version 1 had rows of one sample, version 2 no checksums of rows. No row is written anew: a large site has some ten
+gigabytes of them."""
 
 
 def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], AbstractContextManager[None]]) -> None:
@@ -62,11 +82,11 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
             database.rollback()
             if _version(database) != VERSION:  # else another has made them meanwhile
                 raise
-    elif version == 1:
+    elif version < VERSION:
         with alone():
-            if _version(database) == 1:  # else another has done it meanwhile
-                database.executescript(_FROM_VERSION_1)
-                log.info("%s: upgraded from version 1 to 2", path)
+            while (version := _version(database)) < VERSION:  # else another has done it meanwhile
+                database.executescript(_UPGRADES[version])
+                log.info("%s: upgraded from version %d to %d", path, version, version + 1)
 
 
 def _version(database: sqlite3.Connection) -> int:

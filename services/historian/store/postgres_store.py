@@ -1,5 +1,6 @@
 """The store of a PostgreSQL database, in the schema `wetwell`; for people with SQL its view `wetwell.samples`."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,11 @@ class PostgresStore:
         self._keep_live_days = keep_live_days
         self._downsample_after_days = downsample_after_days
         self._keep_days = keep_days
+
+    @property
+    def damages(self) -> int:
+        """None: pages are checked by the database, if its `data_checksums` are on."""
+        return 0
 
     def close(self) -> None:
         """Close the connection; twice is fine."""
@@ -202,6 +208,10 @@ class PostgresStore:
     def maintain(self, now_ns: int) -> str | None:
         """Sum up one complete day, or turn one old day into minutes, or delete what is too old."""
         return maintain_one(self, now_ns, (self._sum_up, self._downsample, self._delete_old))
+
+    def scrub(self) -> Iterator[None]:
+        """Nothing: pages are checked by the database."""
+        return iter(())
 
     def figures(self) -> dict[str, float]:
         """Whether it is connected."""

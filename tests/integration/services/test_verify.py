@@ -1,5 +1,6 @@
 """`wetwell doctor --verify`: a single bit that flips in anything that is kept shows, and nothing else does."""
 
+import contextlib
 import json
 import shutil
 
@@ -132,3 +133,23 @@ def test_the_chain_goes_on_after_a_restart_and_behind_lines_of_an_earlier_versio
     lines = path.read_text().splitlines()
     path.write_text("\n".join([lines[0], *lines[2:]]) + "\n")
     assert broken_lines(path) == [2]
+
+
+def test_a_daily_file_of_another_station_or_day_is_put_aside_by_a_look_through(kept, tmp_path):
+    folder = tmp_path / "history"
+    shutil.copytree(kept / "history", folder)
+    (file,) = (folder / "samples" / "station=alpha").glob("*.parquet")
+    for station, day in (("beta", file.name), ("alpha", "2031-01-01.parquet")):
+        path = folder / "samples" / f"station={station}" / day
+        path.parent.mkdir(exist_ok=True)
+        shutil.copyfile(file, path)
+    found = verified(tmp_path)["error"]
+    assert [finding.check for finding in found] == ["history"]
+    assert found[0].text.count("or of another day") == 2
+    with contextlib.closing(FolderStore(folder)) as store:
+        for _ in store.scrub():
+            pass
+        assert store.damages == 2
+        assert len(store.samples("alpha", 0, 2**62)) > 0
+    assert {path.name for path in folder.rglob("*.refused")} == {f"{file.name}.refused", "2031-01-01.parquet.refused"}
+    assert file.exists()

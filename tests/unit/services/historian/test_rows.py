@@ -1,6 +1,7 @@
 """Rows of several samples: where they end, what is refused, and a live database of the version before them."""
 
 import contextlib
+import hashlib
 import re
 import sqlite3
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.spool import Spool
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import DAY_NS, Batch, StoreError
+from wetwell.services.historian.store.interface import DAY_NS, DIGEST_BYTES, Batch, StoreError
 from wetwell.services.historian.store.live_database import LiveDatabase
 
 VERSION_1 = """
@@ -196,7 +197,8 @@ def of_version_1(path: Path, rows: int) -> None:
             "INSERT INTO sample VALUES (7, ?, ?, ?, ?)",
             [(row.time_ns, row.seq, row.quality, row.data) for row in packed],
         )
-        database.execute("INSERT INTO event VALUES (1, 'verdicts', 7, 5, x'00', '{}')")
+        digest = hashlib.blake2b(b"{}", digest_size=DIGEST_BYTES).digest()
+        database.execute("INSERT INTO event VALUES (1, 'verdicts', 7, 5, ?, ?)", (digest, b"{}"))
         database.execute("INSERT INTO hour VALUES (7, 0, x'000000000000F03F')")
         database.commit()
 
@@ -212,10 +214,10 @@ def test_a_database_of_version_1_is_upgraded_and_nothing_is_lost(
             expected = samples_of([pack("alpha", sample(number)) for number in range(300)])
             assert samples.time_ns.tolist() == expected.time_ns.tolist()
             assert np.array_equal(samples.values, expected.values, equal_nan=True)
-            assert store.events("verdicts", "alpha", 0, 10, 10) == ["{}"]
+            assert store.events("verdicts", "alpha", 0, 10, 10) == [b"{}"]
             assert store.hours("alpha", 0, DAY_NS).values.tolist() == [[1.0]]
             assert store.write(Batch(samples=[pack("alpha", sample(3))])) == 0
-    assert caplog.text.count("upgraded from version 1 to 2") == 1
+    assert caplog.text.count("upgraded from version 1 to 2") == caplog.text.count("from version 2 to 3") == 1
     with contextlib.closing(FolderStore(tmp_path)) as store:
         historian = Historian(store)
         historian.handle("blocks", block(298, 299, 300).encode())
@@ -236,16 +238,16 @@ def test_a_database_of_version_1_is_not_upgraded_beside_its_historian(tmp_path: 
 
 def test_who_may_not_write_the_lock_cannot_upgrade_a_database_of_version_1(tmp_path: Path) -> None:
     of_version_1(tmp_path / "live.sqlite", 10)
-    (tmp_path / "lock").mkdir()  # root may write any file, but no folder
+    (tmp_path / "historian.lock").mkdir()  # root may write any file, but no folder
     with pytest.raises(StoreError, match=r"lock: cannot be written: Is a directory$"):
         FolderStore(tmp_path)
-    (tmp_path / "lock").rmdir()
+    (tmp_path / "historian.lock").rmdir()
     with contextlib.closing(FolderStore(tmp_path)) as store:
         assert len(store.samples("alpha", 0, DAY_NS)) == 10
 
 
 def test_a_database_of_a_later_version_is_refused(tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(tmp_path / "live.sqlite")) as database:
-        database.execute("PRAGMA user_version = 3")
-    with pytest.raises(StoreError, match="version 3 is newer than 2"):
+        database.execute("PRAGMA user_version = 4")
+    with pytest.raises(StoreError, match="version 4 is newer than 3"):
         FolderStore(tmp_path)

@@ -152,12 +152,16 @@ class Refusing:
     def __init__(self) -> None:
         self.kept: list[Batch] = []
         self.refuses = True
+        self.damages = 0
 
     def write(self, batch: Batch) -> int:
         if self.refuses:
             raise StoreError("disk full")
         self.kept.append(batch)
         return len(batch)
+
+    def scrub(self) -> Iterator[None]:
+        return iter(())
 
     def figures(self) -> dict[str, float]:
         raise StoreError("disk full")

@@ -1,0 +1,143 @@
+"""What can still be read of a live database that is damaged, and whether one is."""
+
+import contextlib
+import sqlite3
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from wetwell.services.historian.rows import HOUR_NS
+from wetwell.services.historian.store.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
+
+Row = tuple[Any, ...]
+
+_SAMPLE = "station, time_ns, seq, quality, data, size, last_ns, crc"
+MOST_SKIPPED = 10_000
+"""Hours, or hundreds of messages, that are looked for behind the last row that could be read."""
+
+
+def damage_of(path: Path) -> list[str]:
+    """What is wrong in a live database, and what in it is not what was written; nothing is changed."""
+    try:
+        with _reading(path) as database:
+            told = [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
+            version = int(database.execute("PRAGMA user_version").fetchone()[0])
+            messages = database.execute("SELECT payload, digest FROM event")
+            counts = {"messages": sum(not is_event_intact(*row) for row in messages)}
+            if version >= 3:
+                samples = database.execute(f"SELECT {_SAMPLE} FROM sample")  # noqa: S608 - names of above
+                counts["rows of samples"] = sum(not _is_sample(row) for row in samples)
+                hours = database.execute("SELECT station, hour_ns, data, crc FROM hour")
+                counts["hours"] = sum(not _is_hour(row) for row in hours)
+    except sqlite3.Error as error:
+        return [str(error)]
+    return [*told, *(f"{count} {what} are not what was written" for what, count in counts.items() if count)]
+
+
+def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
+    """Take the rows that can be read, and are what was written, into a new database.
+
+    Returns
+    -------
+    saved, lost : int
+        Rows that were taken, and rows that were read but are not what was written.
+
+    Raises
+    ------
+    sqlite3.Error
+        If the new database cannot be written.
+    """
+    saved = lost = 0
+    target.execute("BEGIN IMMEDIATE")
+    try:
+        with _reading(damaged) as database:
+            for insert, rows, is_intact in _tables(database):
+                for row in rows:
+                    if not is_intact(row):
+                        lost += 1
+                        continue
+                    with contextlib.suppress(sqlite3.IntegrityError, sqlite3.InterfaceError):
+                        saved += target.execute(insert, row).rowcount
+    except sqlite3.DatabaseError:
+        target.execute("ROLLBACK")
+        return 0, 0
+    target.execute("COMMIT")
+    return saved, lost
+
+
+def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], Callable[[Row], bool]]]:
+    """Of each table how a row is inserted, its rows as far as they can be read, and whether one is intact."""
+    stations = _readable(database, "SELECT id, name, first_ns, last_ns FROM station")
+    yield "INSERT OR IGNORE INTO station VALUES (?, ?, ?, ?)", iter(stations), _is_station
+    numbers = [row[0] for row in stations if _is_station(row)]
+    samples = (row for number in numbers for row in _samples(database, number))
+    yield "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", samples, _is_sample
+    yield (
+        "INSERT OR IGNORE INTO event (payload, digest, kind, station, time_ns) VALUES (?, ?, ?, ?, ?)",
+        _events(database),
+        lambda row: is_event_intact(*row[:2]) and row[3] in numbers,
+    )
+    hours = _readable(database, "SELECT station, hour_ns, data, crc FROM hour")
+    yield "INSERT OR IGNORE INTO hour VALUES (?, ?, ?, ?)", iter(hours), _is_hour
+
+
+def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
+    """Rows of a station from both ends, and between them hour by hour."""
+    query = f"SELECT {_SAMPLE} FROM sample WHERE station = ? ORDER BY time_ns"  # noqa: S608 - names of above
+    first, is_whole = _read(database, query, (station,))
+    yield from first
+    if is_whole:
+        return
+    last, _ = _read(database, f"{query} DESC", (station,))
+    yield from last
+    if first and last:
+        between = f"SELECT {_SAMPLE} FROM sample WHERE station = ? AND time_ns >= ? AND time_ns < ?"  # noqa: S608
+        begin_ns, end_ns = first[-1][1], min(last[-1][1], first[-1][1] + MOST_SKIPPED * HOUR_NS)
+        for hour_ns in range(begin_ns, end_ns, HOUR_NS):
+            yield from _readable(database, between, (station, hour_ns, hour_ns + HOUR_NS))
+
+
+def _events(database: sqlite3.Connection) -> Iterator[Row]:
+    """Messages, a hundred after the other."""
+    ends = _readable(database, "SELECT max(id) FROM event")
+    most = ends[0][0] if ends and isinstance(ends[0][0], int) else 0
+    for begin in range(max(0, most - 100 * MOST_SKIPPED), most + 1, 100):
+        yield from _readable(
+            database,
+            "SELECT payload, digest, kind, station, time_ns FROM event WHERE id > ? AND id <= ?",
+            (begin, begin + 100),
+        )
+
+
+def _readable(database: sqlite3.Connection, query: str, values: Row = ()) -> list[Row]:
+    """Rows until one cannot be read."""
+    return _read(database, query, values)[0]
+
+
+def _read(database: sqlite3.Connection, query: str, values: Row) -> tuple[list[Row], bool]:
+    """Rows until one cannot be read, and whether these are all."""
+    rows: list[Row] = []
+    try:
+        rows.extend(database.execute(query, values))
+    except sqlite3.DatabaseError:
+        return rows, False
+    return rows, True
+
+
+def _is_station(row: Row) -> bool:
+    return isinstance(row[0], int) and isinstance(row[1], str)
+
+
+def _is_sample(row: Row) -> bool:
+    station, time_ns, seq, quality, data, size, _, crc = row
+    return is_sample_intact(station, time_ns, seq, quality, size, data, crc)
+
+
+def _is_hour(row: Row) -> bool:
+    return is_hour_intact(*row)
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+    with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+        yield database

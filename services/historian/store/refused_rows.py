@@ -1,0 +1,51 @@
+"""Rows of a live database that are not what was written: told once, and put aside by the next writing."""
+
+import logging
+import sqlite3
+import threading
+from pathlib import Path
+from typing import Literal
+
+log = logging.getLogger(__name__)
+
+Table = Literal["sample", "event", "hour"]
+
+_ROW_OF: dict[Table, str] = {
+    "sample": "station = ? AND time_ns = ? AND seq = ?",
+    "event": "id = ?",
+    "hour": "station = ? AND hour_ns = ?",
+}
+_CONTENT: dict[Table, str] = {"sample": "data", "event": "payload", "hour": "data"}
+
+
+class RefusedRows:
+    """Rows that were found damaged. As long as one is in its table, what comes again could not take its place.
+
+    Parameters
+    ----------
+    path : Path
+        Of the database, for the log.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._found: dict[tuple[Table, tuple[int, ...]], None] = {}
+
+    def note(self, table: Table, *key: int) -> None:
+        """Know a row by the key of its table, and tell it."""
+        with self._lock:
+            is_new = (table, key) not in self._found
+            self._found[table, key] = None
+        if is_new:
+            log.error("%s: a row of table %s is not what was written, and left out", self._path, table)
+
+    def put_aside(self, database: sqlite3.Connection) -> int:
+        """Move what was found into the table of refused rows, in a transaction of the caller; how many."""
+        with self._lock:
+            found, self._found = self._found, {}
+        for table, key in found:
+            row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
+            database.execute(f"INSERT INTO refused SELECT ?, ?, {content} {row}", (table, str(key), *key))
+            database.execute(f"DELETE {row}", key)
+        return len(found)

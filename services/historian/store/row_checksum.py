@@ -1,0 +1,50 @@
+"""Checksums of rows of the live database: a bit that flips shows, and so does a row in the place of another."""
+
+import hashlib
+import struct
+import zlib
+
+from wetwell.services.historian.store.interface import DIGEST_BYTES
+
+_KEY = struct.Struct("<qqqqq")
+
+
+def sample_checksum(station: int, time_ns: int, seq: int, quality: int, size: int, data: bytes) -> int:
+    """CRC-32 of a row of samples; `station` is its number in the database.
+
+    Examples
+    --------
+    >>> sample_checksum(1, 2, 3, 0, 1, b"data") == sample_checksum(2, 2, 3, 0, 1, b"data")
+    False
+    """
+    return zlib.crc32(data, zlib.crc32(_KEY.pack(station, time_ns, seq, quality, size)))
+
+
+def hour_checksum(station: int, hour_ns: int, data: bytes) -> int:
+    """CRC-32 of the figures of an hour."""
+    return zlib.crc32(data, zlib.crc32(_KEY.pack(station, hour_ns, 0, 0, 0)))
+
+
+def is_sample_intact(
+    station: int, time_ns: int, seq: int, quality: int, size: int, data: bytes, crc: int | None
+) -> bool:
+    """Whether a row of samples is what was written; of one without a checksum only its form is known."""
+    try:
+        if crc is not None:
+            return crc == sample_checksum(station, time_ns, seq, quality, size, data)
+        return size >= 1 and len(data) % (8 * size) == 0
+    except (TypeError, struct.error):  # a bit can turn a number into a text
+        return False
+
+
+def is_hour_intact(station: int, hour_ns: int, data: bytes, crc: int | None) -> bool:
+    """Whether figures of an hour are what was written; those of an earlier version have no checksum."""
+    try:
+        return crc is None or crc == hour_checksum(station, hour_ns, data)
+    except (TypeError, struct.error):
+        return False
+
+
+def is_event_intact(payload: bytes, digest: bytes) -> bool:
+    """Whether a message is what was written."""
+    return isinstance(payload, bytes) and hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest() == digest

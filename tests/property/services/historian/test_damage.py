@@ -1,0 +1,152 @@
+"""A live database in which a disk has changed something: what it still gives is what was written, and it goes on."""
+
+import contextlib
+import logging
+import random
+
+import pytest
+
+from wetwell.protocols.messages.sample import PumpReading, Sample
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.historian.rows import pack, pack_arrays
+from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import Batch, EventRow, StoreError
+from wetwell.services.historian.store.live_salvage import damage_of
+
+PAGE = 4096
+STATIONS = ("alpha", "beta")
+TIMES = 3_000
+
+
+def sample(station: str, number: int) -> Sample:
+    pump = PumpReading(frequency_hz=50.0, flow_m3h=90.0 + number, head_m=12.0, power_kw=5.0, running=True)
+    return Sample(
+        station=station, seq=number, time=number * 10 * NS_PER_S, level_m=1.0 + number / TIMES, pumps=(pump,)
+    )
+
+
+def payload(station: str, number: int) -> bytes:
+    return f"verdict {number} of {station}".encode()
+
+
+def batch(station: str, first: int, last: int) -> Batch:
+    rows = [pack(station, sample(station, number)) for number in range(first, last)]
+    if station == "beta":  # many in a row
+        samples = Samples.of_rows([(row.time_ns, row.seq, row.size, row.quality, row.data) for row in rows])
+        rows = pack_arrays(station, samples.time_ns, samples.seq, samples.quality, samples.values)
+    events = [EventRow("verdicts", station, number, payload(station, number)) for number in range(first, last, 10)]
+    return Batch(samples=rows, events=events)
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory) -> bytes:
+    folder = tmp_path_factory.mktemp("written")
+    with contextlib.closing(FolderStore(folder)) as store:
+        for station in STATIONS:
+            store.write(batch(station, 0, TIMES))
+    with contextlib.closing(FolderStore(folder)) as store:
+        store.live._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    return (folder / "live.sqlite").read_bytes()
+
+
+def flipped(content: bytes, dice: random.Random) -> bytes:
+    changed = bytearray(content)
+    changed[dice.randrange(len(changed))] ^= 1 << dice.randrange(8)
+    return bytes(changed)
+
+
+def misdirected(content: bytes, dice: random.Random) -> bytes:
+    changed = bytearray(content)
+    source, target = dice.sample(range(len(content) // PAGE), 2)
+    changed[target * PAGE : (target + 1) * PAGE] = content[source * PAGE : (source + 1) * PAGE]
+    return bytes(changed)
+
+
+def torn(content: bytes, dice: random.Random) -> bytes:
+    return content[: dice.randrange(1, len(content))]
+
+
+def persistent(act):
+    """What the store says, tried again as the historian does."""
+    for _ in range(3):
+        with contextlib.suppress(StoreError):
+            return act()
+    raise AssertionError("the store does not get over it")
+
+
+@pytest.mark.parametrize("damage", [flipped, misdirected, torn])
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_left_is_what_was_written_and_new_samples_are_kept(content, tmp_path, caplog, damage, seed):
+    caplog.set_level(logging.WARNING)
+    dice = random.Random(f"{damage.__name__} {seed}")
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(damage(content, dice))
+    is_found = damage_of(path) != []
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        for station in STATIONS:
+            persistent(lambda station=station: store.write(batch(station, TIMES, TIMES + 20)))
+        with contextlib.suppress(StoreError):
+            list(store.scrub())
+        for station in STATIONS:  # mends what was found
+            persistent(lambda station=station: store.write(batch(station, TIMES, TIMES + 30)))
+        lost = 0
+        for station in STATIONS:
+            kept = persistent(lambda station=station: store.samples(station, 0, 2**62))
+            wanted = {number: sample(station, number) for number in range(TIMES + 30)}
+            numbers = kept.seq.tolist()
+            assert numbers == sorted(set(numbers))
+            assert set(range(TIMES, TIMES + 30)) <= set(numbers)
+            for number, time_ns, values in zip(numbers, kept.time_ns.tolist(), kept.values, strict=True):
+                one = wanted[number]
+                assert (time_ns, values[0], values[3]) == (one.time, one.level_m, one.pumps[0].flow_m3h)
+            verdicts = persistent(lambda station=station: store.events("verdicts", station, 0, 2**62, 10_000))
+            told = [payload(station, number) for number in range(0, TIMES + 30, 10)]
+            assert set(verdicts) <= set(told)
+            assert len(verdicts) == len(set(verdicts))
+            lost += TIMES + 30 - len(numbers) + len(told) - len(verdicts)
+        if lost:
+            assert is_found
+            assert "live.sqlite" in caplog.text
+
+
+def test_a_page_that_cannot_be_read_costs_its_own_rows_only(content, tmp_path):
+    changed = bytearray(content)
+    middle = changed.index(sample("alpha", 1_500).time.to_bytes(6, "big")) // PAGE * PAGE
+    changed[middle : middle + PAGE] = bytes(PAGE)
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        with pytest.raises(StoreError, match="malformed"):
+            store.samples("alpha", 0, 2**62)
+        store.write(Batch())
+        kept = store.samples("alpha", 0, 2**62)
+        assert TIMES - 360 - 60 < len(kept) < TIMES
+        assert store.damages == 1
+        assert (tmp_path / "live.sqlite.refused-1").exists()
+
+
+@pytest.mark.parametrize("place", [payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data])
+def test_what_comes_again_takes_the_place_of_what_was_damaged(content, tmp_path, place):
+    changed = bytearray(content)
+    changed[changed.index(place) + 3] ^= 1
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(batch("alpha", 0, TIMES))
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(TIMES))
+        told = [payload("alpha", number) for number in range(0, TIMES, 10)]
+        assert store.events("verdicts", "alpha", 0, 2**62, 10_000) == told
+
+
+def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
+    changed = bytearray(content)
+    for place in (payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data):
+        changed[changed.index(place) + 3] ^= 1
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 2
+        refused = store.live._writer.execute("SELECT origin, content FROM refused ORDER BY origin").fetchall()
+        assert [origin for origin, _ in refused] == ["event", "sample"]
+        assert all(content in changed for _, content in refused)
+        assert len(store.samples("alpha", 0, 2**62)) == TIMES - 1
+        assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == TIMES // 10 - 1
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0

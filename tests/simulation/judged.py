@@ -1,0 +1,83 @@
+"""What the detector of a simulated site was given: a branch of samples for each time that it went on from a file."""
+
+import contextlib
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from unittest import mock
+
+from wetwell.detector.detector import Detector
+from wetwell.protocols.messages.sample import Sample
+from wetwell.services.detector.checkpoint import Checkpoint, Told
+from wetwell.services.detector.station_detector import StationDetector
+
+Branch = list[Sample]
+
+
+@dataclass
+class Judged:
+    """Branches of each station, the last one last. A life of the detector adds to its branch.
+
+    Attributes
+    ----------
+    unknown : list of str
+        Stations that have gone on from a state in which no detector has ever been.
+    """
+
+    branches: dict[str, list[Branch]] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+    _saved: dict[tuple[str, bytes], tuple[int, int]] = field(default_factory=dict)
+
+    @contextlib.contextmanager
+    def watched(self) -> Iterator[None]:
+        """Note meanwhile what is judged, saved and taken up."""
+        restore, encode, judge = Checkpoint.restore, Checkpoint.encode, StationDetector._judge
+
+        def restored(checkpoint: Checkpoint, detector: Detector) -> Told | None:
+            told = restore(checkpoint, detector)
+            self._begin(detector, is_anew=told is None)
+            return told
+
+        def encoded(checkpoint: Checkpoint, detector: Detector, told: Told) -> tuple[int, bytes]:
+            branches = self.branches.setdefault(detector._station, [[]])
+            self._saved[_key(detector)] = len(branches) - 1, len(branches[-1])
+            return encode(checkpoint, detector, told)
+
+        def judged(station: StationDetector, sample: Sample) -> None:
+            self.branches[station.station][-1].append(sample)
+            judge(station, sample)
+
+        with contextlib.ExitStack() as patches:
+            for target, replacement in (
+                ("wetwell.services.detector.checkpoint.Checkpoint.restore", restored),
+                ("wetwell.services.detector.checkpoint.Checkpoint.encode", encoded),
+                ("wetwell.services.detector.station_detector.StationDetector._judge", judged),
+            ):
+                patches.enter_context(mock.patch(target, replacement))
+            yield
+
+    def _begin(self, detector: Detector, *, is_anew: bool) -> None:
+        branches = self.branches.setdefault(detector._station, [])
+        if is_anew:
+            branches.append([])
+            return
+        saved = self._saved.get(_key(detector))
+        if saved is None:
+            self.unknown.append(detector._station)
+            branches.append([])
+            return
+        number, length = saved
+        branches.append(branches[number][:length])
+
+
+def once(branch: Sequence[Sample]) -> list[Sample]:
+    """Samples of a branch, each once."""
+    known: dict[Any, Sample] = {}
+    for sample in branch:
+        known.setdefault((sample.time, sample.seq), sample)
+    return list(known.values())
+
+
+def _key(detector: Detector) -> tuple[str, bytes]:
+    return detector._station, hashlib.sha256(detector.snapshot()).digest()

@@ -1,0 +1,60 @@
+"""The historian daemon over a damaged history: it takes anew from the publishers what they still keep."""
+
+import asyncio
+import contextlib
+import logging
+from pathlib import Path
+from unittest import mock
+
+from memory_bus import MemoryBus
+from virtual_loop import run_virtual
+
+from wetwell.protocols.bus.keys import sample_key
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.services.historian import daemon
+from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.runtime.settings import HistorianSettings, Settings
+
+SAMPLES = 400
+PAGE = 4096
+
+
+def damage(path: Path) -> None:
+    """Empty the pages in the middle."""
+    content = bytearray(path.read_bytes())
+    middle = len(content) // 2 // PAGE * PAGE
+    content[middle : middle + 2 * PAGE] = bytes(2 * PAGE)
+    path.write_bytes(content)
+
+
+def test_what_was_lost_comes_again_from_the_publishers(tmp_path, caplog):
+    caplog.set_level(logging.WARNING)
+    settings = Settings(historian=HistorianSettings(folder=tmp_path))
+    path = tmp_path / "live.sqlite"
+
+    async def connected(_settings: Settings) -> contextlib.AbstractContextManager[MemoryBus]:
+        return contextlib.nullcontext(bus)
+
+    async def live() -> None:
+        publisher = bus.publisher(sample_key("alpha"), history=600)
+        running = asyncio.create_task(daemon._run(settings))
+        for number in range(SAMPLES):
+            publisher.put(Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode())
+        await asyncio.sleep(5.0)
+        with contextlib.closing(FolderStore(tmp_path)) as store:
+            store.live._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        damage(path)
+        await asyncio.sleep(60.0)  # looks through what it has kept
+        for number in range(SAMPLES, SAMPLES + 2):
+            publisher.put(Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode())
+            await asyncio.sleep(60.0)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    with MemoryBus() as bus, mock.patch.object(daemon, "connect", connected):
+        run_virtual(live())
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES + 2))
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+    assert "what was lost is taken from the publishers" in caplog.text
