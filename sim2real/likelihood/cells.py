@@ -17,7 +17,8 @@ SPANS = 32
 class Cells:
     """Means over the bins of one group in one cycle, in the order of the groups; all in units of the bins' deviation.
 
-    A group is a signal of a pump in a regime, in a span of the time since that began; a block a signal in a regime.
+    A group is a signal of a pump in a regime and condition, in a span of the time since that began; a block is a
+    signal in a regime.
 
     Attributes
     ----------
@@ -80,7 +81,7 @@ class Cells:
         )
 
 
-def cells_of(bins: Bins, *, has_inflow: bool) -> Cells:
+def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
     r"""Cells of the bins of a recording.
 
     $$\sigma^2 = \overline{f} / n + (1 - \overline{f})$$
@@ -90,10 +91,13 @@ def cells_of(bins: Bins, *, has_inflow: bool) -> Cells:
     Parameters
     ----------
     bins : Bins
+    condition : (bins,) array
+        As `conditions_of` makes it: what is in another condition is in another group.
     has_inflow : bool
         Whether the inflow is measured.
     """
-    groups, group_of_bin = np.unique(group_of(bins) * SPANS + phase(bins), return_inverse=True)
+    key = (condition * (int(group_of(bins).max(initial=0)) + 1) + group_of(bins)) * SPANS + phase(bins)
+    groups, group_of_bin = np.unique(key, return_inverse=True)
     cycles = int(bins.cycle.max(initial=0)) + 1
     keys, of_bin = np.unique(group_of_bin * cycles + bins.cycle, return_inverse=True)
     group = keys // cycles

@@ -43,7 +43,7 @@ def cells(request):
         tolerance=0.1 * ones,
         material=np.where(signal == FLOW, 1.5, 0.7),
     )
-    return cells_of(bins, has_inflow=request.param)
+    return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=request.param)
 
 
 def dense(cells, form, cycle_sd, offset=1.0, changing=1.0):
