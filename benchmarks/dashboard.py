@@ -40,7 +40,7 @@ from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import DAY_NS, Batch, EventRow
+from wetwell.services.historian.store.interface import DAY_NS, Batch, EventRow, StationSpan
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.lifecycle import ticks
 from wetwell.services.stations import find_scenario, find_station
@@ -239,12 +239,13 @@ def keep_days(folder: Path, days: int) -> int:
     start_ns = int(day.time_ns[0])
     hours = Hours.of_samples(day, start_ns, start_ns + DAY_NS)
     verdicts = 0
+    store.live.adopt([StationSpan(STATION, start_ns, start_ns + days * DAY_NS - 1)])
     for number in range(days):
         shift_ns = number * DAY_NS
         store.archive.write_samples(STATION, start_ns + shift_ns, replace(day, time_ns=day.time_ns + shift_ns))
-        store.live.write_hours(STATION, replace(hours, hour_ns=hours.hour_ns + shift_ns))
         events = [verdict_row(start_ns + shift_ns + second * 10**9, number) for second in range(0, 86_400, 450)]
         store.write(Batch(events=events))
+        store.live.write_hours(STATION, replace(hours, hour_ns=hours.hour_ns + shift_ns))
         verdicts += len(events)
     store.close()
     return verdicts

@@ -2,16 +2,14 @@
 
 from dataclasses import dataclass, field
 from html import escape
-from pathlib import Path
 
 import pyarrow as pa
 
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.api.result import Picture, Result, html_table
+from wetwell.services.api.result import Picture, StationResult, html_table
 from wetwell.services.api.sources import RecordingSource, StationSource, rows_of, station_of
-from wetwell.services.batch.field_data import write_station
 from wetwell.services.reports.charts import bar_chart
 from wetwell.sim2real.calibration.calibration import calibrate as estimates_of
 from wetwell.sim2real.calibration.estimates import Estimate
@@ -20,7 +18,7 @@ from wetwell.sim2real.recording.preparation import Preparation, prepare
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration(Result):
+class Calibration(StationResult):
     """A station as a recording says that it is.
 
     Attributes
@@ -36,16 +34,6 @@ class Calibration(Result):
     station: Station
     estimates: tuple[Estimate, ...]
     before: Station = field(repr=False)
-
-    def write(self, path: str | Path) -> None:
-        """Write the station file.
-
-        Raises
-        ------
-        RecordingError
-            If it cannot be written.
-        """
-        write_station(self.station, Path(path))
 
     def to_arrow(self) -> pa.Table:
         """A row a parameter; `low` and `high` are null where the recording cannot tell it, and `reason` says why."""

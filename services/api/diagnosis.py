@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from html import escape
-from pathlib import Path
 from typing import Literal
 
 import pyarrow as pa
@@ -11,9 +10,8 @@ import pyarrow as pa
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.api.result import Picture, Result, html_table
+from wetwell.services.api.result import Picture, StationResult, html_table
 from wetwell.services.api.sources import RecordingSource, StationSource, rows_of, station_of
-from wetwell.services.batch.field_data import write_station
 from wetwell.services.batch.gap import check_effects, diagnose_rows
 from wetwell.services.reports.charts import bar_chart
 from wetwell.services.reports.gap_lead import lead
@@ -23,7 +21,7 @@ from wetwell.sim2real.recording.preparation import Preparation, prepare
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagnosis(Result):
+class Diagnosis(StationResult):
     """Where a recording departs from the simulator, and which effects of the library cause it.
 
     Attributes
@@ -52,16 +50,6 @@ class Diagnosis(Result):
     def effects(self) -> tuple[FoundEffect, ...]:
         """Effects that were found, with their parameters."""
         return self.report.effects
-
-    def write(self, path: str | Path) -> None:
-        """Write the station file with the effects.
-
-        Raises
-        ------
-        RecordingError
-            If it cannot be written.
-        """
-        write_station(self.station, Path(path))
 
     def to_arrow(self) -> pa.Table:
         """A row a single effect that was tried: its score on cycles that it was not fitted to, and its shrinkage."""

@@ -8,6 +8,8 @@ from typing import Any
 import pyarrow as pa
 
 from wetwell.protocols.atomic_file import atomic_file
+from wetwell.protocols.station.station_file import Station
+from wetwell.services.batch.field_data import write_station
 
 
 class Picture:
@@ -61,6 +63,28 @@ class Result(ABC):
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> Any:
         """Let pandas, polars and others take the table: `polars.DataFrame(result)`."""
         return self.to_arrow().__arrow_c_stream__(requested_schema)
+
+
+class StationResult(Result):
+    """A result that has changed a station.
+
+    Attributes
+    ----------
+    station : Station
+        As it is now.
+    """
+
+    station: Station
+
+    def write(self, path: str | Path) -> None:
+        """Write the station file.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written.
+        """
+        write_station(self.station, Path(path))
 
 
 def html_table(table: pa.Table, rows: int = 10) -> str:

@@ -206,10 +206,12 @@ def plant_of(
 ) -> "Simulation":
     """Simulation of a scenario on a station that can run it, and of what an operator does there."""
     from wetwell.services.stations import find_station
+
+    plant = find_station(station)
     from wetwell.simulator.simulation import Simulation
 
     try:
-        return Simulation(find_station(station), scenario, seed, start_ns, steps)
+        return Simulation(plant, scenario, seed, start_ns, steps)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

@@ -1,8 +1,9 @@
 """Changes of state among kept verdicts: what bands and journals draw, without the evidence of every run."""
 
-import json
 from collections.abc import Iterable
 from typing import Any
+
+from pydantic import BaseModel
 
 from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.services.historian.store.interface import Store
@@ -11,7 +12,22 @@ LEAD = 200
 """Verdicts before a span among which the one that stood at its beginning is looked for, for each pump."""
 MOST_VERDICTS = 200_000
 """Verdicts that are looked through at most: three pumps with a run each ten minutes for more than a year."""
-_TOLD = ("time", "pump", "state", "asset", "stage", "severity")
+
+
+class Told(BaseModel):
+    """What is told of a verdict, as it was stored. The rest, above all the evidence, is not made into objects."""
+
+    time: Any
+    pump: int
+    state: str
+    asset: str | None = None
+    stage: str | None = None
+    severity: dict[str, Any] | None = None
+
+    @property
+    def form(self) -> tuple[Any, ...]:
+        """What another verdict must say otherwise to be news."""
+        return self.state, self.asset, self.stage
 
 
 def changes_of(store: Store, station: str, start_ns: int, end_ns: int, points: int) -> tuple[dict[str, Any], ...]:
@@ -23,32 +39,27 @@ def changes_of(store: Store, station: str, start_ns: int, end_ns: int, points: i
         The span; a change before it is told for each pump, with its own time.
     """
     before = store.events("verdicts", station, -LONGEST_NS, start_ns, LEAD)
-    standing = {verdict["pump"]: verdict for verdict in changed(before)}
+    standing = {verdict.pump: verdict for verdict in changed(before)}
     within = store.events("verdicts", station, start_ns, end_ns, MOST_VERDICTS)
-    first = sorted(standing.values(), key=lambda verdict: str(verdict["time"]))
-    found = changed(within, {pump: _form(verdict) for pump, verdict in standing.items()})
-    return tuple([*first, *found][-points:])
+    first = sorted(standing.values(), key=lambda verdict: str(verdict.time))
+    found = changed(within, {pump: verdict.form for pump, verdict in standing.items()})
+    return tuple(verdict.model_dump() for verdict in [*first, *found][-points:])
 
 
-def changed(payloads: Iterable[bytes], standing: dict[int, tuple[Any, ...]] | None = None) -> list[dict[str, Any]]:
+def changed(payloads: Iterable[bytes], standing: dict[int, tuple[Any, ...]] | None = None) -> list[Told]:
     """Verdicts that say something else of their pump than the one before.
 
     Examples
     --------
     >>> told = [b'{"time":1,"pump":1,"state":"normal"}', b'{"time":2,"pump":1,"state":"normal"}']
-    >>> [verdict["time"] for verdict in changed(told)]
+    >>> [verdict.time for verdict in changed(told)]
     [1]
     """
     forms = dict(standing or {})
     found = []
     for payload in payloads:
-        verdict = json.loads(payload)
-        form = _form(verdict)
-        if forms.get(verdict["pump"]) != form:
-            forms[verdict["pump"]] = form
-            found.append({name: verdict.get(name) for name in _TOLD})
+        verdict = Told.model_validate_json(payload)
+        if forms.get(verdict.pump) != verdict.form:
+            forms[verdict.pump] = verdict.form
+            found.append(verdict)
     return found
-
-
-def _form(verdict: dict[str, Any]) -> tuple[Any, ...]:
-    return verdict["state"], verdict.get("asset"), verdict.get("stage")

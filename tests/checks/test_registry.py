@@ -310,7 +310,7 @@ def test_bad_inflows_are_refused_in_one_line(table, rule):
             {"kind": "sensor_stuck", "start_s": 0, "end_s": 1, "channel": "level_m", "pump": 1},
             "pump must be 0 for channel 'level_m' of the station, got 1",
         ),
-        ({"kind": "pipe_clogging", "start_s": 0, "end_s": 1, "friction_rise": -0.1}, "friction_rise: got -0.1"),
+        ({"kind": "pipe_clogging", "start_s": 0, "end_s": 1, "friction_rise": -1.0}, "friction_rise: got -1"),
     ],
 )
 def test_bad_faults_are_refused_in_one_line(table, rule):

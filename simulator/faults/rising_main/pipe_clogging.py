@@ -1,6 +1,8 @@
 """Clogging of the rising main."""
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.table import NonNegative
@@ -20,7 +22,7 @@ class PipeClogging(SystemFault):
     main : int
         0 for all.
     friction_rise : float
-        Δk, relative rise of the friction coefficient at full strength. [1]
+        Δk, relative rise of the friction coefficient at full strength; negative where deposits wash out. [1]
     static_rise_m : float
         ΔH_s, rise of the static head at full strength. [m]
 
@@ -33,7 +35,7 @@ class PipeClogging(SystemFault):
     neutral: ClassVar[dict[str, Any]] = {"friction_rise": 0.0, "static_rise_m": 0.0}
 
     kind: Literal["pipe_clogging"] = "pipe_clogging"
-    friction_rise: NonNegative = 1.0
+    friction_rise: Annotated[float, Field(gt=-1.0, allow_inf_nan=False)] = 1.0
     static_rise_m: NonNegative = 0.0
 
     def apply(self, forcing: Forcing, time_s: Floats) -> None:

@@ -5,11 +5,13 @@ import { figure, signed } from "../base/format.js";
 import { kindOf } from "../base/states.js";
 import { t } from "../base/words.js";
 
+const OF_PUMP = t("At one duty point rags and wear look the same: only who opens the pump can tell.");
+const OF_MAIN = t("At one flow friction and static head look the same: runs at other flows tell.");
 export const QUANTITIES = {
-  speed_loss_percent: { word: t("loss of speed"), unit: "%", digits: 1 },
-  friction_rise_percent: { word: t("more friction"), unit: "%", digits: 1 },
+  speed_loss_percent: { word: t("loss of speed"), unit: "%", digits: 1, doubt: OF_PUMP },
+  friction_rise_percent: { word: t("more friction"), unit: "%", digits: 1, doubt: OF_MAIN },
   static_head_rise_m: { word: t("more static head"), unit: "m", digits: 2 },
-  wear_head_percent: { word: t("loss of head by wear"), unit: "%", digits: 1 },
+  wear_head_percent: { word: t("loss of head"), unit: "%", digits: 1, doubt: OF_PUMP },
 };
 const WIDTH = 420;
 const LABEL = 100; // two words with a figure that are nearer than this would lie on each other
@@ -23,10 +25,10 @@ export function severityWords({ quantity, value, interval, limit }) {
   return `${word} ${figure(value, digits)} ${unit}${range}${bound}`;
 }
 
-/** A bar from nothing to beyond the limit, with the interval as a whisker; half of the limit is where a visit is planned. */
+/** A bar from nothing to beyond the limit, with the interval as a whisker; half of the limit is where a visit is planned. Below it stands what cannot be told apart. */
 export function severityPicture(fault) {
   const { quantity, value, interval, limit } = fault.severity;
-  const { word, unit, digits } = formOf(quantity);
+  const { word, unit, digits, doubt } = formOf(quantity);
   const most = 1.15 * Math.max(limit ?? 0, Math.abs(value), ...(interval ?? []).map(Math.abs), 1e-9);
   const x = (amount) => Math.max(0, (WIDTH * amount) / most);
   const isNarrow = limit != null && x(limit / 2) < LABEL;
@@ -38,5 +40,5 @@ export function severityPicture(fault) {
     interval ? svg("path", { class: "whisker", d: `M${x(interval[0])} 12H${x(interval[1])}M${x(interval[0])} 7v10M${x(interval[1])} 7v10` }) : null,
     ...lines.flatMap(([at, name]) => [svg("line", { class: "bound", x1: x(at), x2: x(at), y1: 0, y2: 24 }), svg("text", { x: x(at), y: -4, "text-anchor": anchor(at) }, name)]),
     svg("text", { x: 0, y: 40 }, `${word}: ${figure(value, digits)} ${unit}`));
-  return html("div", {}, drawing);
+  return html("div", {}, drawing, doubt ? html("p", { class: "note" }, doubt) : null);
 }
