@@ -135,13 +135,16 @@ def gap_diagnose(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", metavar="DIR", help="For report and station file; with several recordings a folder each in it."
+            "--out", metavar="DIR", help="For report and station file; of several diagnoses a folder each in it."
         ),
     ],
     recording: Annotated[
         list[Path] | None,
         typer.Option(
-            "--recording", metavar="FILE", help="CSV, CSV.gz or Parquet; may be given again.", callback=all_there
+            "--recording",
+            metavar="FILE",
+            help="CSV, CSV.gz or Parquet; given again, all are diagnosed as one.",
+            callback=all_there,
         ),
     ] = None,
     table: Annotated[
@@ -158,8 +161,11 @@ def gap_diagnose(
     only: Annotated[
         list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
     ] = None,
+    apart: Annotated[
+        bool, typer.Option("--apart", help="Diagnose each recording for itself, in a folder of its own.")
+    ] = False,
     workers: Annotated[
-        int | None, number(low=1, help="Processes for several recordings; default: as many as cores.")
+        int | None, number(low=1, help="Processes for several diagnoses; default: as many as cores.")
     ] = None,
     scheduler: SchedulerOption = None,
     prior: Annotated[
@@ -177,9 +183,10 @@ def gap_diagnose(
     if not given and table is None:
         raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
     check_scheduler(scheduler)
-    if prior is not None and (len(given) > 1 or table is not None):
-        raise ConfigError("gap diagnose: --prior is for one --recording: several tell each other nothing here")
-    if len(given) > 1 or table is not None or scheduler is not None:
+    is_batch = apart or table is not None or scheduler is not None
+    if prior is not None and is_batch:
+        raise ConfigError("gap diagnose: --prior is for one diagnosis: not with --apart, --recordings or --scheduler")
+    if is_batch:
         from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 
         cases = cases_of(station, given, table, reading)
@@ -198,9 +205,34 @@ def gap_diagnose(
     known = None if prior is None else read_prior(prior)
     with progress_bar("diagnosis") as progress:
         report = diagnose_file(
-            plant, given[0], out, reading, only=only, without=without or (), progress=progress, prior=known
+            plant, given, out, reading, only=only, without=without or (), progress=progress, prior=known
         )
     return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
+
+
+@app.command("experiment", cls=about("--diagnosis"))
+def gap_experiment(
+    diagnosis: Annotated[Path, typer.Option("--diagnosis", metavar="DIR", help="Folder that gap diagnose wrote.")],
+    station: Annotated[
+        str | None, typer.Option("--station", metavar="FILE", help="Whose costs and levels count instead.")
+    ] = None,
+    inflow: Annotated[
+        float | None,
+        number("--inflow", metavar="M3H", low=0.0, help="Inflow at the time of the act; default: the mean."),
+    ] = None,
+    seed: SeedOption = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Say which act at the station tells apart what a diagnosis leaves open, and what it costs."""
+    import json
+
+    from wetwell.services.batch.experiment import experiments_of
+    from wetwell.services.reports.experiment_table import experiment_lines
+    from wetwell.services.stations import find_station
+
+    prices = None if station is None else find_station(station)
+    told = experiments_of(diagnosis, prices=prices, inflow_m3h=inflow, seed=seed)
+    typer.echo(json.dumps(told, indent=2, ensure_ascii=False) if as_json else experiment_lines(told))
 
 
 @app.command("replay", cls=about("--recording"))
