@@ -12,7 +12,7 @@ OFFSET = 0.25
 """Standard deviation of the error of a good model that cycles share, over what is allowed. [1]"""
 CHANGING = 0.5
 """Ratio of the part of an error that changes from cycle to cycle to the part that cycles share. [1]"""
-FORM = 0.07
+GOOD_FORM = 0.07
 """Standard deviation of the error of form of a good effect, as a share of what it explains. [1]"""
 POOR_FORM = 0.35
 """The same of a poor one, as in seconds of starts; an error of the model is then as large as is allowed. [1]"""
@@ -30,7 +30,7 @@ class Allowance:
     changing_form: float
 
 
-GOOD = Allowance(offset=OFFSET, change=CHANGING * OFFSET, form=FORM, changing_form=CHANGING * FORM)
+GOOD = Allowance(offset=OFFSET, change=CHANGING * OFFSET, form=GOOD_FORM, changing_form=CHANGING * GOOD_FORM)
 POOR = Allowance(offset=1.0, change=CHANGING, form=POOR_FORM, changing_form=CHANGING * POOR_FORM)
 
 
