@@ -22,6 +22,8 @@ from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
 from wetwell.sim2real.experiments.left_open import left_open
+from wetwell.sim2real.fleet.fleet_prior import FleetPrior
+from wetwell.sim2real.likelihood.priors import EVEN
 from wetwell.sim2real.recording.preparation import PreparationReport
 from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.sim2real.recording.traces import traces_of
@@ -45,6 +47,7 @@ def diagnose_file(
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     progress: Callable[[float], None] = lambda _: None,
+    prior: FleetPrior | None = None,
 ) -> GapReport:
     """Write `report.json`, `report.html`, `station.toml` and `left_open.json` into a folder.
 
@@ -60,7 +63,7 @@ def diagnose_file(
     check_effects([*(only or ()), *without])
     rows = [prepared(recording, None, station, reading) for recording in recordings]
     try:
-        report, diagnosis = diagnose_rows(station, rows, only=only, without=without, progress=progress)
+        report, diagnosis = diagnose_rows(station, rows, only=only, without=without, progress=progress, prior=prior)
     except ValueError as error:
         raise RecordingError(f"{', '.join(map(str, recordings))}: {error}") from error
     page = gap_page(report, diagnosis)
@@ -100,6 +103,7 @@ def diagnose_rows(
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     progress: Callable[[float], None] = lambda _: None,
+    prior: FleetPrior | None = None,
 ) -> tuple[GapReport, Diagnosis]:
     """Report of a diagnosis, and the diagnosis.
 
@@ -120,11 +124,20 @@ def diagnose_rows(
     """
     with ThreadPoolExecutor(THREADS) as pool:
         recordings = [recording for recording, _ in rows]
-        diagnosis = diagnose(recordings, station, only=only, without=without, progress=progress, each=pool.map)
+        diagnosis = diagnose(
+            recordings,
+            station,
+            only=only,
+            without=without,
+            progress=progress,
+            each=pool.map,
+            priors=EVEN if prior is None else prior.priors,
+        )
     longest = max(recordings, key=len)
     closed_loop = _closed_loop(longest, station, diagnosis.station)
     notes = tuple(note for _, preparation in rows for note in _notes(preparation, diagnosis.traces.rate_s))
-    return diagnosis.report(closed_loop, _detector(longest, station, diagnosis.station), notes), diagnosis
+    heard = 0 if prior is None else prior.stations
+    return diagnosis.report(closed_loop, _detector(longest, station, diagnosis.station), notes, heard), diagnosis
 
 
 def replay_file(

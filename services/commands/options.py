@@ -179,7 +179,7 @@ def with_data(settings: "Settings", data: Path | None, otherwise: Path) -> "Sett
     if data is not None or settings.historian == HistorianSettings():
         settings = with_history(settings, folder)
     changes: dict[str, Table] = {}
-    for section in ("detector", "alarms"):
+    for section in ("detector", "alarms", "watch"):
         table = getattr(settings, section)
         if data is not None or table.state_dir is None:
             changes[section] = table.model_copy(update={"state_dir": folder / section})

@@ -32,6 +32,7 @@ from wetwell.sim2real.experiments.conditions import Conditions, conditions_of
 from wetwell.sim2real.experiments.proposals import Proposals, proposals_of
 from wetwell.sim2real.experiments.reported import proposed_acts, refused_acts
 from wetwell.sim2real.likelihood.posterior import SetProbability, Verdict, verdict_of
+from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.excerpt import MOST_DIAGNOSED_S, MOST_OF_ROWS_S, excerpt
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import Regimes, regimes_of
@@ -49,6 +50,7 @@ from wetwell.simulator.effects.effect import Component
 class Diagnosis:
     """All that is found; `station` has the effects added. `attribution` and what follows are for drawings.
 
+    `own_effects` are the effects with their sizes by this recording alone, without what other stations say.
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
     is in a component, whether an effect of the library or something unknown. `proposals` are the acts that would tell
     apart what is left, under `conditions`.
@@ -57,6 +59,7 @@ class Diagnosis:
     verdict: Verdict
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
+    own_effects: tuple[FoundEffect, ...]
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
     posterior: tuple[SetProbability, ...]
@@ -75,6 +78,7 @@ class Diagnosis:
         closed_loop: ClosedLoopComparison | None = None,
         detector: DetectorVerdicts | None = None,
         notes: tuple[str, ...] = (),
+        prior_stations: int = 0,
     ) -> GapReport:
         """What programs read; `notes` come before those on what is not measured."""
         blamed = self.where[0].component if self.where else None
@@ -106,6 +110,7 @@ class Diagnosis:
             recordings=_recordings(self.traces),
             experiments=proposed_acts(self.proposals),
             refused=refused_acts(self.proposals),
+            prior_stations=prior_stations,
             next_experiment=next_experiment(self.verdict, self.proposals.best, blamed),
         )
 
@@ -119,6 +124,7 @@ def diagnose(
     seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
     each: Each = map,
+    priors: Priors = EVEN,
 ) -> Diagnosis:
     """Diagnose the gap between a station and its recording, or several recordings taken as one.
 
@@ -136,6 +142,8 @@ def diagnose(
         Gets the share of the work that is done.
     each : callable
         As `map`; that of a pool of threads tries effects side by side.
+    priors : Priors
+        What other stations say of this one; even where they say nothing.
 
     Raises
     ------
@@ -153,7 +161,7 @@ def diagnose(
     check_plausible(traces, station, regimes, plain)
     residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
     bins = residuals.bins
-    found = attribute(replay, residuals, regimes, candidates, progress, each)
+    found = attribute(replay, residuals, regimes, candidates, progress, each, priors)
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
     excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
@@ -166,7 +174,8 @@ def diagnose(
     return Diagnosis(
         verdict=verdict,
         where=() if verdict == "none" else where_it_lies(found, bins, excess, blamed, rng),
-        effects=found_effects(found),
+        effects=found_effects(found.accepted, found.ends, found.equivalent),
+        own_effects=found_effects(found.own, found.own_ends, found.equivalent),
         candidates=ranking(found, bins, rng),
         gap=gap_of(found.plain, found.after, bins, found.validation, rng),
         posterior=found.posterior,

@@ -1,10 +1,13 @@
 """What an attribution comes to in a report: accepted effects, the ranking of single ones, the cells of the gap."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.attribution import Attribution
 from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, NoiseCheck, RankedCandidate, Where
 from wetwell.sim2real.diagnosis.shrinkage import cell_gap, gap_of
 from wetwell.sim2real.likelihood.cells import cells_of
@@ -15,12 +18,21 @@ from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.simulator.effects.effect import Component
 
 
-def found_effects(found: Attribution) -> tuple[FoundEffect, ...]:
-    """Accepted effects with their parameters."""
-    if found.accepted is None:
+def found_effects(fit: Fit | None, ends: Floats, equivalents: Sequence[tuple[str, ...]]) -> tuple[FoundEffect, ...]:
+    """Effects of a fit with their parameters.
+
+    Parameters
+    ----------
+    fit : Fit or None
+        None has no effects.
+    ends : (parameters, 2) array
+        Of the intervals of its points.
+    equivalents : sequence of tuple of str
+        What may be in the place of each effect.
+    """
+    if fit is None:
         return ()
-    fit = found.accepted
-    ends = np.split(found.ends, np.cumsum([point.size for point in fit.points])[:-1])
+    parted = np.split(ends, np.cumsum([point.size for point in fit.points])[:-1])
     return tuple(
         FoundEffect(
             name=candidate.name,
@@ -30,7 +42,7 @@ def found_effects(found: Attribution) -> tuple[FoundEffect, ...]:
             parameters=_parameters(candidate, point, interval),
         )
         for candidate, point, interval, equivalent in zip(
-            fit.candidates, fit.points, ends, found.equivalent, strict=True
+            fit.candidates, fit.points, parted, equivalents, strict=True
         )
     )
 

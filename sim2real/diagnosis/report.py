@@ -332,6 +332,8 @@ class GapReport(_Part):
         Acts at the station that would tell apart what is left, the best first.
     refused : list of RefusedAct
         Acts that may not be done at the station.
+    prior_stations : int
+        Stations whose diagnoses were the prior of this one; 0 where effects and sizes were all alike before.
     next_experiment : str
         What to do next to learn more, in a sentence: the best act where there is one.
     """
@@ -357,4 +359,5 @@ class GapReport(_Part):
     recordings: tuple[DiagnosedRecording, ...] = ()
     experiments: tuple[ProposedAct, ...] = ()
     refused: tuple[RefusedAct, ...] = ()
+    prior_stations: int = 0
     next_experiment: str
