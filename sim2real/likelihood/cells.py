@@ -50,7 +50,8 @@ class Block:
 class Cells:
     """Means over the bins of one group in one cycle, in the order of the groups; all in units of the bins' deviation.
 
-    A group is a signal of a pump in a regime, in a span of the time since that began; a block a signal in a regime.
+    A group is a signal of a pump in a regime and condition, in a span of the time since that began; a block is a
+    signal in a regime.
 
     Attributes
     ----------
@@ -91,15 +92,22 @@ class Cells:
         return squares
 
 
-def cells_of(bins: Bins) -> Cells:
+def cells_of(bins: Bins, condition: Integers) -> Cells:
     r"""Cells of the bins of a recording.
 
     $$\sigma^2 = \overline{f} / n, \qquad a^2 = m^2 + 1 - \overline{f}$$
 
     with the share f of a bin's variance that is noise, which the n bins of a cell average away, the material size m,
     and the rest of that variance, which is what a right model may be off.
+
+    Parameters
+    ----------
+    bins : Bins
+    condition : (bins,) array
+        As `conditions_of` makes it: what is in another condition is in another group.
     """
-    groups, group_of_bin = np.unique(group_of(bins) * SPANS + phase(bins), return_inverse=True)
+    key = (condition * (int(group_of(bins).max(initial=0)) + 1) + group_of(bins)) * SPANS + phase(bins)
+    groups, group_of_bin = np.unique(key, return_inverse=True)
     cycles = int(bins.cycle.max(initial=0)) + 1
     keys, of_bin = np.unique(group_of_bin * cycles + bins.cycle, return_inverse=True)
     group, cycle = keys // cycles, keys % cycles

@@ -1,6 +1,6 @@
 """Probabilities of none, unknown and of sets of effects, given a recording."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -52,7 +52,9 @@ class Weight:
     log_flexible: float
 
 
-def posterior_of(weights: Sequence[Weight], library: int) -> tuple[SetProbability, ...]:
+def posterior_of(
+    weights: Sequence[Weight], library: int, log_share: Callable[[tuple[str, ...]], float] | None = None
+) -> tuple[SetProbability, ...]:
     r"""Probabilities of the answers, best first; they sum to 1.
 
     $$P(S) = (1 - \epsilon) \frac{(1 - u)\,\pi_S\,L_S^\eta}{Z}, \qquad
@@ -68,6 +70,8 @@ def posterior_of(weights: Sequence[Weight], library: int) -> tuple[SetProbabilit
         One of them that of no effects.
     library : int
         Number of effects that are tested.
+    log_share : callable, optional
+        Logarithm of the share of a set among those of its size, in the place of 1 / n: `Priors.log_share`.
 
     References
     ----------
@@ -81,7 +85,7 @@ def posterior_of(weights: Sequence[Weight], library: int) -> tuple[SetProbabilit
     >>> best.verdict, round(best.probability, 2)
     ('none', 0.82)
     """
-    priors = np.array([_log_prior(len(weight.effects), library) for weight in weights])
+    priors = np.array([_log_prior(weight.effects, library, log_share) for weight in weights])
     sets = priors + TEMPER * np.array([weight.log for weight in weights])
     unknown = priors + TEMPER * np.array([weight.log + weight.log_flexible for weight in weights])
     logs = np.r_[np.log(1.0 - UNKNOWN_PRIOR) + sets, np.log(UNKNOWN_PRIOR) + logsumexp(unknown)]
@@ -97,10 +101,11 @@ def posterior_of(weights: Sequence[Weight], library: int) -> tuple[SetProbabilit
     return tuple(sorted(found, key=lambda one: -one.probability))
 
 
-def _log_prior(effects: int, library: int) -> float:
-    if effects == 0:
+def _log_prior(effects: tuple[str, ...], library: int, log_share: Callable[[tuple[str, ...]], float] | None) -> float:
+    if not effects:
         return float(np.log(NONE_PRIOR))
-    return float(np.log((1.0 - NONE_PRIOR) / max(library, 1)) + (effects - 1) * np.log(FURTHER_PRIOR))
+    share = -np.log(max(library, 1)) if log_share is None else log_share(effects)
+    return float(np.log(1.0 - NONE_PRIOR) + share + (len(effects) - 1) * np.log(FURTHER_PRIOR))
 
 
 def verdict_of(posterior: Sequence[SetProbability]) -> Verdict:
