@@ -8,7 +8,7 @@ from scipy.linalg import cho_factor, cho_solve
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 
-OFFSET = 0.25
+OFFSET = 0.4
 """Standard deviation of the error of a good model that cycles share, over what is allowed. [1]"""
 CHANGING = 0.5
 """Ratio of the part of an error that changes from cycle to cycle to the part that cycles share. [1]"""

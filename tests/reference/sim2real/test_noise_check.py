@@ -15,9 +15,9 @@ from wetwell.sim2real.trial.cases import StoragePlan, trial_case
 
 SEED = 970_900
 SECONDS = 28_800
-STEADILY = (0.3, 1.4)
+STEADILY = (0.15, 1.4)
 """Mean square of flow, head and power while one pump runs steadily."""
-SEVERAL = (0.3, 2.7)
+SEVERAL = (0.15, 2.7)
 """The same of several pumps."""
 MOST_OF_LEVEL = 1.6
 """Mean square of the level in rows of up to ten seconds: rain fills slower ones faster (docs/likelihood.md)."""
