@@ -54,6 +54,15 @@ PUMP_ANALOGUES: tuple[AnalogueQuantity, ...] = tuple(each.name for each in _PUMP
 PUMP_METERS: tuple[AnalogueQuantity, ...] = tuple(name for name in PUMP_ANALOGUES if name != "frequency_hz")
 """What the instruments of a pump measure."""
 
+HAND_COLUMNS: Mapping[str, str] = MappingProxyType(
+    {
+        "by_hand": "1 while a crew commands the pumps, else 0",
+        "valve_open": "0 while the valves of the mains are shut, else 1",
+        "inlet_open": "0 while the inlet is shut, else 1",
+    }
+)
+"""Columns of a recording that tell what a crew did, and what they say."""
+
 SIGNALS: Mapping[str, SensedQuantity] = MappingProxyType(
     {"level": "level_m", "inflow": "inflow_m3h", "flow": "flow_m3h", "head": "head_m", "power": "power_kw"}
 )

@@ -6,6 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled, inlined
+from wetwell.protocols.orders import Orders, go_on, valves
 from wetwell.protocols.quantities import FIRST_PUMP, INFLOW, LEVEL
 from wetwell.simulator.control.drive import turned_ratio
 from wetwell.simulator.control.supervision import drive, supervise
@@ -39,6 +40,7 @@ def simulate_seconds(
     plant: PlantRecords,
     state: PlantState,
     forcing: Forcing,
+    orders: Orders,
     rng: np.random.Generator,
     measured: Floats,
     truth: Truth,
@@ -53,6 +55,8 @@ def simulate_seconds(
     `measured` and the pumps of `truth` are to come as zeros: a pump that stands leaves them so, and while all pumps
     stand and no water moves nothing is computed for them. Most seconds of most stations are of this kind.
 
+    An operator's orders go before the controller: a step that begins at second t shows as a start command does.
+
     The noise is drawn in a fixed order (level, inflow, then flow, head and power of each active pump), so that
     blocks of any length give the same numbers.
     """
@@ -60,6 +64,9 @@ def simulate_seconds(
     is_plain = not forcing.has_sensor_faults and is_plain_telemetry(plant.sensors)
     is_silent = False
     for second in range(forcing.inflow_m3h.size):
+        truth.step[second] = state.place[2]
+        if state.place[2] >= 0:
+            _set_valves(forcing, orders, state.place[2], second)
         is_moving = move_plant(plant, state, forcing, second, 0.0, truth, second)
 
         is_frozen = forcing.is_plc_frozen[second]
@@ -78,9 +85,18 @@ def simulate_seconds(
         if not is_frozen:
             if station.control_delay_s > 0.0:
                 seen_level_m = delayed(state.level_history, seen_level_m, now.second, station.control_delay_s)
-            supervise(plant, state, forcing, second, seen_level_m)
-        drive(plant, state, forcing, second)
+            supervise(plant, state, forcing, orders, go_on(orders, state.place, seen_level_m), second, seen_level_m)
+        drive(plant, state, forcing, orders, second)
         now.second += 1
+
+
+@inlined
+def _set_valves(forcing: Forcing, orders: Orders, step: int, second: int) -> None:
+    """Work valves that a step shuts into what acts on the plant."""
+    loss, inlet = valves(orders, step)
+    for m in range(forcing.friction_factor.shape[0]):
+        forcing.friction_factor[m, second] *= loss
+    forcing.inflow_m3h[second] *= inlet
 
 
 @inlined

@@ -1,9 +1,12 @@
 """A plant that runs: its parameters and its state, moved on by the kernel."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import SameTypes
+from wetwell.protocols.orders import Step, orders_of
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.kernel import simulate_seconds
 from wetwell.simulator.parameters import PlantParameters
@@ -22,16 +25,21 @@ class Plant:
     parameters : PlantParameters
     level_m : float
         Level at the beginning, with all pumps standing, for so long that all air has gathered. [m]
+    steps : sequence of Step
+        What an operator does from the first second on; then the controller is alone.
 
     Attributes
     ----------
+    orders : Orders
+        The same as the kernel reads it.
     start_levels_m, stop_levels_m : (n_max,) arrays
         May be changed in place. [m]
     is_automatic : (pumps,) array
         Whether the controller may start a pump; may be changed in place.
     """
 
-    def __init__(self, parameters: PlantParameters, level_m: float) -> None:
+    def __init__(self, parameters: PlantParameters, level_m: float, steps: Sequence[Step] = ()) -> None:
+        self.orders = orders_of(steps, len(parameters.pumps))
         self._records = parameters.records()
         self._state = first_state(parameters, level_m)
         self.start_levels_m = self._records.start_levels_m
@@ -61,5 +69,5 @@ class Plant:
         """Advance by as many seconds as the forcing has: (channels, n) as measured, and as it truly was."""
         pumps, seconds = forcing.speed_factor.shape
         measured, truth = np.zeros((channels(pumps), seconds)), still_truth(pumps, seconds)
-        _simulate_seconds(self._records, self._state, forcing, rng, measured, truth)
+        _simulate_seconds(self._records, self._state, forcing, self.orders, rng, measured, truth)
         return measured, truth

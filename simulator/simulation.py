@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.orders import Step
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_ANALOGUES, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.control import check_levels
@@ -36,6 +37,8 @@ class Simulation:
         >= 0.
     start_ns : int
         Time of the first sample, where the scenario names none.
+    steps : sequence of Step
+        What an operator does from the first second on; what was done stands in columns of its own.
 
     Attributes
     ----------
@@ -48,10 +51,18 @@ class Simulation:
     ------
     ValueError
         If a fault names a pump or main that the station lacks, an effect of the station is not known or wrong,
-        or nobody knows when it starts its pumps, or the initial level lies under its floor.
+        or nobody knows when it starts its pumps, the initial level lies under its floor, or a step is not for
+        this station.
     """
 
-    def __init__(self, station: Station, scenario: Scenario, seed: int, start_ns: int = DEFAULT_START_NS) -> None:
+    def __init__(
+        self,
+        station: Station,
+        scenario: Scenario,
+        seed: int,
+        start_ns: int = DEFAULT_START_NS,
+        steps: Sequence[Step] = (),
+    ) -> None:
         check_driven(station)
         self._effects = effects_of(station)
         for number, fault in enumerate(scenario.fault, start=1):
@@ -76,7 +87,7 @@ class Simulation:
         self._inflow = scenario.inflow.stream(inflow_rng)
         parameters = effective_parameters(station)
         self._columns = parameters.columns
-        self._plant = Plant(parameters, scenario.initial_level_m)
+        self._plant = Plant(parameters, scenario.initial_level_m, steps)
         self.start_ns = scenario.start_time if scenario.start_time is not None else start_ns
 
     @property
@@ -151,7 +162,7 @@ class Simulation:
         stamps_ns = self.start_ns + NS_PER_S * np.arange(begin, begin + seconds)
         return Recording(
             time_ns=stamps_ns,
-            columns=_measured(measured, len(self.station.pump)),
+            columns=_measured(measured, len(self.station.pump)) | self._plant.orders.columns(true.step),
             truth=self._truth_columns(true, forcing, time_s) if truth else {},
             station=self.station.name,
         )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.orders import AUTOMATIC, first_place
 from wetwell.simulator.corrections.parts import TERMS
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
@@ -76,7 +77,7 @@ class PlantState(NamedTuple):
     now and before a step, and their means over the second. `correction` (terms, pumps) is what learnt corrections add
     to each term, 0 without any. `past` (channels, m) and `level_history` (m,) are rings of the last seconds.
     `started` holds the commanded pumps in the order of their starts; `recent_starts` (pumps, k) the seconds of the
-    last starts of each, the newest first.
+    last starts of each, the newest first. `place` is that in the orders of an operator.
     """
 
     station: Records[StationState]
@@ -92,16 +93,21 @@ class PlantState(NamedTuple):
     level_history: Floats
     started: Integers
     recent_starts: Integers
+    place: Integers
 
 
 class Truth(NamedTuple):
-    """What truly was in n seconds: level and overflow (n,); flow, head and power of the pumps (pumps, n)."""
+    """What truly was in n seconds: level and overflow (n,); flow, head and power of the pumps (pumps, n).
+
+    `step` (n,) is the step of the orders in force, or `AUTOMATIC`.
+    """
 
     level_m: Floats
     overflow_m3h: Floats
     flow_m3h: Floats
     head_m: Floats
     power_kw: Floats
+    step: Integers
 
 
 def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
@@ -121,9 +127,12 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         level_history=np.full(PAST_S, np.nan),
         started=np.zeros(pumps, dtype=np.int64),
         recent_starts=np.full((pumps, MAX_STARTS_PER_HOUR), -SECONDS_PER_HOUR, dtype=np.int64),
+        place=first_place(),
     )
 
 
 def still_truth(pumps: int, seconds: int) -> Truth:
     """Room for the truth of a block, in which the pumps stand."""
-    return Truth(np.empty(seconds), np.empty(seconds), *np.zeros((3, pumps, seconds)))
+    step = np.full(seconds, AUTOMATIC, dtype=np.int64)
+    flow_m3h, head_m, power_kw = np.zeros((3, pumps, seconds))
+    return Truth(np.empty(seconds), np.empty(seconds), flow_m3h, head_m, power_kw, step)

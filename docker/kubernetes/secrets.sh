@@ -10,7 +10,7 @@ metadata: {name: bus, namespace: wetwell}
 stringData:
 END
 users=
-for name in gateway historian alarms dashboard branch fleet; do
+for name in gateway historian alarms watch dashboard branch fleet; do
   password=$(random)
   echo "  $name: $password"
   if [ "$name" = fleet ]; then

@@ -55,6 +55,11 @@ def model_key(station: str) -> str:
     return f"{ROOT}/{station}/model"
 
 
+def gap_key(station: str) -> str:
+    """Key of the watched gap between a station and its simulator."""
+    return f"{ROOT}/{station}/gap"
+
+
 def alarm_key(station: str, alarm: str = "*") -> str:
     """Key of one alarm, or of all alarms of a station."""
     return f"{ROOT}/{station}/alarm/{alarm}"

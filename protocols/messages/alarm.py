@@ -41,6 +41,7 @@ RuleName = Literal[
     "system_fault",
     "pump_and_system_fault",
     "sensor_fault",
+    "model_gap",
     "level_high",
     "overflow_risk",
     "samples_stale",

@@ -2,6 +2,7 @@
 
 Columns: `time` (ISO 8601 with a Z or an offset), `level_m`, optional `inflow_m3h`, and for each pump i from 1
 `pump{i}_frequency_hz`, `pump{i}_flow_m3h`, `pump{i}_head_m`, optional `pump{i}_power_kw` and `pump{i}_running`.
+What a crew did is in `by_hand` (1 while it commands the pumps), `valve_open` and `inlet_open` (0 while shut).
 Columns that start with `covariate_` are those of a user: rain, tide, temperature.
 Empty or NaN is "no value". Columns that start with `truth_` hold what only a simulator can know.
 """
@@ -31,6 +32,7 @@ from wetwell.protocols.local_time import to_utc
 from wetwell.protocols.messages.readings import PumpRow, Row
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import (
+    HAND_COLUMNS,
     PUMP_ANALOGUES,
     PUMP_QUANTITIES,
     STATION_QUANTITIES,
@@ -208,7 +210,8 @@ def recording_of(
 
 
 def _is_measured(column: str) -> bool:
-    return column in STATION_QUANTITIES or pump_of(column) > 0 or covariate_of(column) is not None
+    is_ours = column in STATION_QUANTITIES or column in HAND_COLUMNS or pump_of(column) > 0
+    return is_ours or covariate_of(column) is not None
 
 
 def _suffix(path: Path) -> str:

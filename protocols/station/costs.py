@@ -20,6 +20,8 @@ class Costs(Table):
         Probability that a fault which is left fails before the next planned visit.
     energy_per_kwh : float
         Price of energy.
+    crew_per_hour : float
+        An hour of one who works at the station or at its screens.
     horizon_days : float
         Until the next planned visit.
     """
@@ -30,4 +32,5 @@ class Costs(Table):
     call_out: NonNegative = 2500.0
     failure_share: Annotated[float, Field(ge=0, le=1)] = 0.5
     energy_per_kwh: NonNegative = 0.25
+    crew_per_hour: NonNegative = 75.0
     horizon_days: NonNegative = 14.0

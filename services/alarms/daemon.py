@@ -11,6 +11,7 @@ from wetwell.protocols.bus.keys import (
     alarm_act_key,
     alarm_report_key,
     alive_key,
+    gap_key,
     sample_block_key,
     sample_key,
     status_key,
@@ -81,13 +82,14 @@ async def keep(bus: Bus, service: AlarmService, health_period_s: float) -> None:
     samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
     sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
     verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY)
+    gaps = bus.subscribe(gap_key("*"), history=1)
     statuses = bus.collect([status_key("*", source) for source in sorted(SOURCES)], history=1)
     presences = bus.watch(alive_key("*", "*"))
     acts, reports = bus.answer(alarm_act_key("*")), bus.answer(alarm_report_key())
     service.publish_all()
 
     def figures() -> dict[str, float]:
-        heard = (samples, sample_blocks, verdicts, statuses)
+        heard = (samples, sample_blocks, verdicts, gaps, statuses)
         dropped, missed = sum(one.dropped for one in heard), sum(one.missed for one in heard)
         return service.figures() | {"dropped": float(dropped), "missed": float(missed)}
 
@@ -101,6 +103,7 @@ async def keep(bus: Bus, service: AlarmService, health_period_s: float) -> None:
         group.create_task(_feed(samples, service.handle_sample, service), name="alarms.samples")
         group.create_task(_feed(sample_blocks, service.handle_sample_block, service), name="alarms.sample_blocks")
         group.create_task(_feed(verdicts, service.handle_verdict, service), name="alarms.verdicts")
+        group.create_task(_feed(gaps, service.handle_gap, service), name="alarms.gaps")
         group.create_task(_feed(statuses, handle_status, service), name="alarms.statuses")
         group.create_task(_feed(presences, service.handle_presence, service), name="alarms.presences")
         group.create_task(_feed(acts, service.handle_act, service), name="alarms.acts")

@@ -29,6 +29,9 @@ RULES: Mapping[RuleName, Rule] = {
     "system_fault": Rule("high", "system fault", "flush the main: look for deposits, air, a valve that is not open"),
     "pump_and_system_fault": Rule("high", "pump and system fault", "pull the pump and flush the main"),
     "sensor_fault": Rule("medium", "sensor fault", "check the meter before a crew goes out"),
+    "model_gap": Rule(
+        "advisory", "the station has left its simulator", "see what it is called; wetwell gap diagnose tells more"
+    ),
     "level_high": Rule(
         "high", "level high", "the pumps do not keep up: look at running pumps and inflow", 60.0, 60.0
     ),
@@ -51,7 +54,7 @@ RANK: Mapping[Priority, int] = {name: rank for rank, name in enumerate(reversed(
 VERDICT_RULES: tuple[RuleName, ...] = ("pump_fault", "system_fault", "pump_and_system_fault", "sensor_fault")
 MAX_PUMPS = 32
 BY_DESIGN: Mapping[Mode, frozenset[RuleName]] = {
-    "maintenance": frozenset(VERDICT_RULES),
+    "maintenance": frozenset({*VERDICT_RULES, "model_gap"}),
     "stopped": frozenset(RULES) - {"overflow_risk"},
 }
 """Alarms that a mode of the station suppresses: what a crew does to pumps is no fault; a stopped one may stand and be

@@ -19,6 +19,7 @@ from wetwell.protocols.messages.alarm import (
     Mode,
 )
 from wetwell.protocols.messages.decoding import M, decoded
+from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.messages.sample import LevelSample
 from wetwell.protocols.messages.sample_block import LevelBlock
@@ -105,6 +106,12 @@ class AlarmService:
             return
         is_new = watch.handle_verdict(verdict, self._now(), self.registry)
         self._counts["verdicts" if is_new else "doubled"] += 1
+
+    def handle_gap(self, payload: bytes) -> None:
+        """Look at the gap between a station and its simulator."""
+        gap = self._decoded(GapWatch, payload)
+        if gap is not None and (watch := self._named(gap.station)) is not None:
+            watch.handle_gap(gap, self._now(), self.registry)
 
     def handle_status(self, payload: bytes) -> None:
         """Look at the health figures of a source of samples."""

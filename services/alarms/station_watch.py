@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import RuleName
+from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.sample import LevelSample
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
@@ -170,6 +171,15 @@ class StationWatch:
                     asset=record.asset,
                 )
         return True
+
+    def handle_gap(self, gap: GapWatch, now: Now, registry: AlarmRegistry) -> None:
+        """Look whether the gap between the station and its simulator has doubled, and is no fault that was told."""
+        names = [one.text for one in gap.called if one.since is not None and one.fault is None]
+        text = (
+            f"the gap that matters was {gap.first_matters:.2g} at first and is {gap.matters:.2g} times what matters "
+            f"({gap.group}): {'; '.join(names) or 'not named yet'}"
+        )
+        registry.observe(self.name, "model_gap", gap.is_doubled, gap.time, now.wall_ns, text=text[:1000])
 
     @property
     def services(self) -> dict[str, RuleName]:

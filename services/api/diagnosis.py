@@ -90,7 +90,7 @@ class Diagnosis(Result):
 
 
 def diagnose(
-    recording: RecordingSource,
+    recording: RecordingSource | list[RecordingSource],
     station: StationSource,
     *,
     only: Iterable[str] | None = None,
@@ -102,8 +102,8 @@ def diagnose(
 
     Parameters
     ----------
-    recording : path or table
-        As `read` takes it; rows are put in order, doubles are dropped.
+    recording : path or table, or list of them
+        As `read` takes it; rows are put in order, doubles are dropped. Several are diagnosed as one.
     station : Station, path or name
     only, without : iterable of str
         Effects to try alone, or to leave out, by the names of `wetwell effects`.
@@ -120,9 +120,11 @@ def diagnose(
     tried, left_out = None if only is None else list(only), list(without)
     check_effects([*(tried or ()), *left_out])
     plant = station_of(station)
-    rows = rows_of(recording, plant, Reading.said(time_zone, as_station=as_station))
+    reading = Reading.said(time_zone, as_station=as_station)
+    sources = recording if isinstance(recording, list) else [recording]
+    rows = [prepare(rows_of(source, plant, reading), Preparation()) for source in sources]
     try:
-        report, found = diagnose_rows(plant, *prepare(rows, Preparation()), only=tried, without=left_out)
+        report, found = diagnose_rows(plant, rows, only=tried, without=left_out)
     except ValueError as error:
         raise RecordingError(f"recording: {error}") from error
     return Diagnosis(report=report, station=found.station, sentence=lead(report, found), page=gap_page(report, found))

@@ -146,7 +146,7 @@ def _has_report(out: Path, name: str) -> bool:
 def _diagnose(out: Path, only: Sequence[str] | None, without: Sequence[str], case: Case) -> dict[str, Any]:
     if isinstance(case.station, Failure):
         raise ConfigError(case.station.error)
-    report = diagnose_file(case.station, case.recording, out / case.name, case.reading, only=only, without=without)
+    report = diagnose_file(case.station, [case.recording], out / case.name, case.reading, only=only, without=without)
     return {
         "name": case.name,
         "station": report.station,

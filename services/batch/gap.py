@@ -1,7 +1,7 @@
 """Diagnose recordings in files: reads and writes, nothing else."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -21,12 +21,17 @@ from wetwell.sim2real.calibration.validation import Validation, validate
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
+from wetwell.sim2real.experiments.left_open import left_open
+from wetwell.sim2real.fleet.fleet_prior import FleetPrior
+from wetwell.sim2real.likelihood.priors import EVEN
 from wetwell.sim2real.recording.preparation import PreparationReport
 from wetwell.sim2real.recording.seconds import trailing_means
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.simulator.effects import LIBRARY, effects_of
 
+LEFT_OPEN = "left_open.json"
+"""What `wetwell gap experiment` reads of a diagnosis."""
 MISSED = 1.5
 """Pause over that from row to row, from which a row is missing."""
 THREADS = min(os.cpu_count() or 1, 4)
@@ -35,15 +40,18 @@ THREADS = min(os.cpu_count() or 1, 4)
 
 def diagnose_file(
     station: Station,
-    recording: Path,
+    recordings: Sequence[Path],
     out: Path,
     reading: Reading = PLAIN,
     *,
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     progress: Callable[[float], None] = lambda _: None,
+    prior: FleetPrior | None = None,
 ) -> GapReport:
-    """Write `report.json`, `report.html` and `station.toml` into a folder, which is made where it is missing.
+    """Write `report.json`, `report.html`, `station.toml` and `left_open.json` into a folder.
+
+    It is made where it is missing. Several recordings are diagnosed as one.
 
     Raises
     ------
@@ -53,18 +61,20 @@ def diagnose_file(
         If the recording cannot be used, or the folder not be written.
     """
     check_effects([*(only or ()), *without])
-    rows, preparation = prepared(recording, None, station, reading)
+    rows = [prepared(recording, None, station, reading) for recording in recordings]
     try:
-        report, diagnosis = diagnose_rows(station, rows, preparation, only=only, without=without, progress=progress)
+        report, diagnosis = diagnose_rows(station, rows, only=only, without=without, progress=progress, prior=prior)
     except ValueError as error:
-        raise RecordingError(f"{recording}: {error}") from error
+        raise RecordingError(f"{', '.join(map(str, recordings))}: {error}") from error
     page = gap_page(report, diagnosis)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{out}: cannot be made: {error.strerror}") from error
     write_station(diagnosis.station, out / "station.toml")
+    left = left_open(station, diagnosis.conditions, diagnosis.attribution.possible)
     for name, text in (
+        (LEFT_OPEN, left.model_dump_json(by_alias=True, indent=2) + "\n"),
         ("report.html", page),
         ("report.json", report.model_dump_json(by_alias=True, indent=2) + "\n"),
     ):
@@ -88,14 +98,24 @@ def check_effects(names: Iterable[str]) -> None:
 
 def diagnose_rows(
     station: Station,
-    rows: Recording,
-    preparation: PreparationReport,
+    rows: Sequence[tuple[Recording, PreparationReport]],
     *,
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     progress: Callable[[float], None] = lambda _: None,
+    prior: FleetPrior | None = None,
 ) -> tuple[GapReport, Diagnosis]:
     """Report of a diagnosis, and the diagnosis.
+
+    Parameters
+    ----------
+    station : Station
+    rows : sequence of Recording and PreparationReport
+        Prepared recordings; several are diagnosed as one. The closed loop and the detector are shown the longest.
+    only, without : names of effects
+        Restrict the library.
+    progress : callable
+        Gets the share of the work that is done.
 
     Raises
     ------
@@ -103,10 +123,21 @@ def diagnose_rows(
         If the recording cannot be diagnosed.
     """
     with ThreadPoolExecutor(THREADS) as pool:
-        diagnosis = diagnose(rows, station, only=only, without=without, progress=progress, each=pool.map)
-    closed_loop = _closed_loop(rows, station, diagnosis.station)
-    notes = _notes(preparation, diagnosis.traces.rate_s)
-    return diagnosis.report(closed_loop, _detector(rows, station, diagnosis.station), notes), diagnosis
+        recordings = [recording for recording, _ in rows]
+        diagnosis = diagnose(
+            recordings,
+            station,
+            only=only,
+            without=without,
+            progress=progress,
+            each=pool.map,
+            priors=EVEN if prior is None else prior.priors,
+        )
+    longest = max(recordings, key=len)
+    closed_loop = _closed_loop(longest, station, diagnosis.station)
+    notes = tuple(note for _, preparation in rows for note in _notes(preparation, diagnosis.traces.rate_s))
+    heard = 0 if prior is None else prior.stations
+    return diagnosis.report(closed_loop, _detector(longest, station, diagnosis.station), notes, heard), diagnosis
 
 
 def replay_file(

@@ -9,12 +9,14 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.services.commands.inputs import about
 from wetwell.services.commands.options import (
     AsStationOption,
+    ConfigOption,
     JsonOption,
     RecordingOption,
     SchedulerOption,
     SeedOption,
     StationOption,
     TimeZoneOption,
+    ZenohOption,
     all_there,
     cores,
     number,
@@ -22,7 +24,10 @@ from wetwell.services.commands.options import (
     print_batch,
     print_result,
     reading_of,
+    run,
+    settings_of,
     signals_named,
+    with_history,
 )
 
 app = typer.Typer(no_args_is_help=True, help="The gap between simulation and reality.")
@@ -130,13 +135,16 @@ def gap_diagnose(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", metavar="DIR", help="For report and station file; with several recordings a folder each in it."
+            "--out", metavar="DIR", help="For report and station file; of several diagnoses a folder each in it."
         ),
     ],
     recording: Annotated[
         list[Path] | None,
         typer.Option(
-            "--recording", metavar="FILE", help="CSV, CSV.gz or Parquet; may be given again.", callback=all_there
+            "--recording",
+            metavar="FILE",
+            help="CSV, CSV.gz or Parquet; given again, all are diagnosed as one.",
+            callback=all_there,
         ),
     ] = None,
     table: Annotated[
@@ -153,10 +161,17 @@ def gap_diagnose(
     only: Annotated[
         list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
     ] = None,
+    apart: Annotated[
+        bool, typer.Option("--apart", help="Diagnose each recording for itself, in a folder of its own.")
+    ] = False,
     workers: Annotated[
-        int | None, number(low=1, help="Processes for several recordings; default: as many as cores.")
+        int | None, number(low=1, help="Processes for several diagnoses; default: as many as cores.")
     ] = None,
     scheduler: SchedulerOption = None,
+    prior: Annotated[
+        Path | None,
+        typer.Option("--prior", metavar="FILE", help="Of wetwell gap fleet: what other stations say of this one."),
+    ] = None,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,
     as_json: JsonOption = False,
@@ -168,7 +183,10 @@ def gap_diagnose(
     if not given and table is None:
         raise ConfigError("gap diagnose: give at least one --recording, or --recordings TABLE")
     check_scheduler(scheduler)
-    if len(given) > 1 or table is not None or scheduler is not None:
+    is_batch = apart or table is not None or scheduler is not None
+    if prior is not None and is_batch:
+        raise ConfigError("gap diagnose: --prior is for one diagnosis: not with --apart, --recordings or --scheduler")
+    if is_batch:
         from wetwell.services.batch.diagnoses import cases_of, diagnose_all
 
         cases = cases_of(station, given, table, reading)
@@ -181,11 +199,40 @@ def gap_diagnose(
         raise ConfigError("gap diagnose: give --station FILE with --recording")
     plant = find_station(station)
     from wetwell.services.batch.gap import diagnose_file
+    from wetwell.services.batch.watch.prior import read_prior
     from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
 
+    known = None if prior is None else read_prior(prior)
     with progress_bar("diagnosis") as progress:
-        report = diagnose_file(plant, given[0], out, reading, only=only, without=without or (), progress=progress)
+        report = diagnose_file(
+            plant, given, out, reading, only=only, without=without or (), progress=progress, prior=known
+        )
     return typer.echo(report.model_dump_json(by_alias=True, indent=2) if as_json else gap_lines(report, out))
+
+
+@app.command("experiment", cls=about("--diagnosis"))
+def gap_experiment(
+    diagnosis: Annotated[Path, typer.Option("--diagnosis", metavar="DIR", help="Folder that gap diagnose wrote.")],
+    station: Annotated[
+        str | None, typer.Option("--station", metavar="FILE", help="Whose costs and levels count instead.")
+    ] = None,
+    inflow: Annotated[
+        float | None,
+        number("--inflow", metavar="M3H", low=0.0, help="Inflow at the time of the act; default: the mean."),
+    ] = None,
+    seed: SeedOption = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Say which act at the station tells apart what a diagnosis leaves open, and what it costs."""
+    import json
+
+    from wetwell.services.batch.experiment import experiments_of
+    from wetwell.services.reports.experiment_table import experiment_lines
+    from wetwell.services.stations import find_station
+
+    prices = None if station is None else find_station(station)
+    told = experiments_of(diagnosis, prices=prices, inflow_m3h=inflow, seed=seed)
+    typer.echo(json.dumps(told, indent=2, ensure_ascii=False) if as_json else experiment_lines(told))
 
 
 @app.command("replay", cls=about("--recording"))
@@ -208,3 +255,71 @@ def gap_replay(
     from wetwell.services.batch.gap import replay_file
 
     print_result(replay_file(plant, recording, out, reading, closed_loop=closed_loop), as_json=as_json)
+
+
+@app.command("watch", cls=about("--station"))
+def gap_watch(
+    station: Annotated[
+        list[str] | None,
+        typer.Option("--station", metavar="FILE", help="Station file or built-in station; may be given again."),
+    ] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option("--history", metavar="DIR", help="Look at what this history holds, print it and end."),
+    ] = None,
+    state: Annotated[
+        Path | None, typer.Option("--state", metavar="DIR", help="Where the watch keeps what it knows.")
+    ] = None,
+    zenoh: ZenohOption = None,
+    config: ConfigOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Keep up to date how far stations are from their simulators, since when, and what that is called."""
+    from wetwell.services.stations import find_stations
+
+    more: dict[str, object] = {} if state is None else {"watch": {"state_dir": state}}
+    settings, stations = settings_of(config, zenoh, more=more), find_stations(station or ["alpha"])
+    if history is None:
+        from wetwell.services.watch.daemon import serve_watch
+
+        return run(settings, serve_watch(settings, stations))
+    import json
+
+    from wetwell.services.batch.watch.history import watch_history
+    from wetwell.services.historian.store.opening import open_store
+    from wetwell.services.reports.gap_terminal import progress_bar
+    from wetwell.services.watch.words import watch_lines
+
+    kept = with_history(settings, history).historian
+    with open_store(kept, alone=False, must_exist=True) as store, progress_bar("watch") as progress:
+        told = [
+            message
+            for each in stations
+            if (message := watch_history(store, each, settings.watch.state_dir, progress=progress)) is not None
+        ]
+    return typer.echo(json.dumps([one.model_dump(mode="json") for one in told]) if as_json else watch_lines(told))
+
+
+@app.command("fleet", cls=about("--diagnoses"))
+def gap_fleet(
+    folders: Annotated[
+        list[Path],
+        typer.Option(
+            "--diagnoses", metavar="DIR", help="With report.json or watched gaps in it; may be given again."
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="For gap diagnose --prior.")] = None,
+    without: Annotated[
+        str | None, typer.Option("--without", metavar="STATION", help="The one that is to be diagnosed.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say which effects are usual in a fleet and how their sizes are spread, from its diagnoses."""
+    from wetwell.services.batch.watch.prior import prior_of_folders, prior_rows, write_prior
+
+    prior = prior_of_folders(folders, without)
+    if out is not None:
+        write_prior(prior, out)
+    if as_json:
+        return typer.echo(prior.model_dump_json(by_alias=True, indent=2))
+    return print_result(prior_rows(prior), as_json=False)

@@ -64,7 +64,7 @@ def up(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print every verdict as a JSON line.")] = False,
 ) -> None:
-    """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, page."""
+    """Run all on this machine: simulated station, Modbus, Zenoh, detector, historian, alarms, watch, page."""
     import tempfile
 
     from wetwell.services.runtime.settings import LogSettings
@@ -92,6 +92,7 @@ def up(
         "dashboard": ["dashboard"],
         "detector": ["detector", "--station", station],
         "alarms": ["alarms", "--station", station],
+        "watch": ["gap", "watch", "--station", station],
         "simulator": ["simulator", *live, *(["--stand-at-end"] if is_shown else [])],
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:

@@ -3,7 +3,7 @@
 import os
 import re
 import sys
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,6 +12,7 @@ import typer
 from wetwell.protocols.errors import ConfigError, RecordingError
 
 if TYPE_CHECKING:
+    from wetwell.protocols.orders import Step
     from wetwell.protocols.quantities import SensedQuantity
     from wetwell.protocols.recordings.reading import Reading
     from wetwell.protocols.station.station_file import Station
@@ -178,7 +179,7 @@ def with_data(settings: "Settings", data: Path | None, otherwise: Path) -> "Sett
     if data is not None or settings.historian == HistorianSettings():
         settings = with_history(settings, folder)
     changes: dict[str, Table] = {}
-    for section in ("detector", "alarms"):
+    for section in ("detector", "alarms", "watch"):
         table = getattr(settings, section)
         if data is not None or table.state_dir is None:
             changes[section] = table.model_copy(update={"state_dir": folder / section})
@@ -200,13 +201,15 @@ def _address(flag: str, text: str, example: str) -> dict[str, Any]:
     return {"host": host.strip("[]"), "port": int(port)}
 
 
-def plant_of(station: str, scenario: "Scenario", seed: int, start_ns: int) -> "Simulation":
-    """Simulation of a scenario on a station that can run it."""
+def plant_of(
+    station: str, scenario: "Scenario", seed: int, start_ns: int, steps: Sequence["Step"] = ()
+) -> "Simulation":
+    """Simulation of a scenario on a station that can run it, and of what an operator does there."""
     from wetwell.services.stations import find_station
     from wetwell.simulator.simulation import Simulation
 
     try:
-        return Simulation(find_station(station), scenario, seed, start_ns)
+        return Simulation(find_station(station), scenario, seed, start_ns, steps)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 
@@ -220,6 +223,16 @@ def live_plant(station: str, scenario: str, seed: int, speed: float | None) -> t
     plan = find_scenario(scenario)
     speed = plan.clock_speed if speed is None else positive(speed, "--speed")
     return plant_of(station, plan, seed, this_second_ns() if speed == 1.0 else DEFAULT_START_NS), speed
+
+
+def stamp_of(text: str, option: str) -> int:
+    """Nanoseconds since 1970 of a stamp that an option gives."""
+    from wetwell.protocols.timestamps import from_iso
+
+    try:
+        return from_iso(text)
+    except ValueError as error:
+        raise ConfigError(f"{option}: got {text!r}, must be ISO 8601 such as 2025-01-31T06:00:00Z") from error
 
 
 def reading_of(time_zone: str | None, *, as_station: bool) -> "Reading":

@@ -27,6 +27,7 @@ from wetwell.services.commands.options import (
     print_batch,
     print_result,
     reading_of,
+    stamp_of,
     station_if,
 )
 
@@ -44,14 +45,24 @@ def simulate(
     scenario: ScenarioOption = "nominal",
     days: Annotated[float | None, typer.Option(help="Length; default: the scenario's.")] = None,
     seed: SeedOption = 1,
+    act: Annotated[
+        Path | None,
+        typer.Option("--act", metavar="FILE", help="Play the first experiment of a diagnosis' report.json."),
+    ] = None,
+    begin: Annotated[
+        str | None, typer.Option("--begin", metavar="TIME", help="First sample, where the scenario names none.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a simulated recording, with truth columns."""
+    from wetwell.services.batch.experiment import steps_of
     from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 
     given_s = None if days is None else positive(days, "--days") * 86_400.0
-    plant = plant_of(station, find_scenario(scenario), seed, DEFAULT_START_NS)
+    start_ns = DEFAULT_START_NS if begin is None else stamp_of(begin, "--begin")
+    steps = () if act is None else steps_of(act)
+    plant = plant_of(station, find_scenario(scenario), seed, start_ns, steps)
     length_s = plant.scenario.duration_s if given_s is None else given_s
     from wetwell.services.batch.recordings import simulate as write
 

@@ -9,6 +9,7 @@ from wetwell.protocols.bus.interface import Bus, Subscription
 from wetwell.protocols.bus.keys import (
     alarm_key,
     alive_key,
+    gap_key,
     model_key,
     sample_block_key,
     sample_key,
@@ -53,6 +54,7 @@ class Feed:
             (bus.subscribe(verdict_key("*"), history=SHOWN_VERDICTS), view.handle_verdict),
             (bus.subscribe(model_key("*"), history=1), view.handle_model),
             (bus.subscribe(alarm_key("*"), history=1), view.handle_alarm),
+            (bus.subscribe(gap_key("*"), history=1), view.handle_gap),
             (bus.subscribe(status_key("*", "*"), history=1), view.handle_status),
         ]
         self._presence = bus.watch(alive_key("*", "*"))

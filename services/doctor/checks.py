@@ -19,6 +19,7 @@ LEAST_FREE_BYTES = 1_000_000_000
 NEEDED_SERVICES = {
     "historian": "nothing is kept; start it: wetwell historian",
     "alarms": "nobody is called; start it: wetwell alarms",
+    "watch": "nobody compares stations with their simulators; start it: wetwell gap watch --station FILE",
     "dashboard": "there is no page; start it: wetwell dashboard",
 }
 

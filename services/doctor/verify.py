@@ -12,6 +12,7 @@ from wetwell.services.doctor.finding import Finding
 from wetwell.services.historian.store.archive import Archive
 from wetwell.services.historian.store.live_salvage import damage_of
 from wetwell.services.runtime.settings import Settings
+from wetwell.services.watch.state_file import WATCH_SUFFIX, is_whole
 
 MOST_TOLD = 5
 """Of damages of one kind; of others their number is told."""
@@ -19,7 +20,12 @@ MOST_TOLD = 5
 
 def verify_kept(settings: Settings) -> list[Finding]:
     """All that is found in the folders that the settings name. Changes nothing; daemons may run meanwhile."""
-    findings = [*_history(settings), *_checkpoints(settings.detector.state_dir), *_alarms(settings.alarms.state_dir)]
+    findings = [
+        *_history(settings),
+        *_checkpoints(settings.detector.state_dir),
+        *_alarms(settings.alarms.state_dir),
+        *_watches(settings.watch.state_dir),
+    ]
     return findings or [Finding("verify", "warning", "nothing is kept here", "name the folders: --config FILE")]
 
 
@@ -57,6 +63,14 @@ def _alarms(folder: Path | None) -> Iterator[Finding]:
     if audit is not None and audit.exists():
         broken = [f"line {number}" for number in broken_lines(audit)]
         yield _finding("audit", str(audit), broken, "compare it with a backup: lines were changed, lost or put in")
+
+
+def _watches(folder: Path | None) -> Iterator[Finding]:
+    files = [] if folder is None else sorted(folder.glob(f"*{WATCH_SUFFIX}"))
+    if files:
+        damaged = [file.name for file in files if not is_whole(file.read_bytes())]
+        advice = "the watch puts it aside at its next start and begins anew; or bring a backup back"
+        yield _finding("watch", f"{len(files)} watched gaps in {folder}", damaged, advice)
 
 
 def _finding(check: str, place: str, damage: list[str], advice: str) -> Finding:

@@ -253,6 +253,27 @@ class AlarmSettings(Table):
     rules: dict[RuleName, RuleSettings] = Field(default_factory=dict)
 
 
+class WatchSettings(Table):
+    """The watch of the gap between stations and their simulators.
+
+    Parameters
+    ----------
+    state_dir : Path, optional
+        Folder of its state; without it the state ends with the process.
+    ask_s : float
+        How often it asks the historian what was kept meanwhile. [s]
+    threads : int
+        Stations that are looked at side by side.
+    fleet_prior : bool
+        Whether a station that is diagnosed takes what the others have shown as its prior.
+    """
+
+    state_dir: Path | None = None
+    ask_s: Positive = 60.0
+    threads: Annotated[int, Field(ge=1)] = 1
+    fleet_prior: bool = False
+
+
 class HistorianSettings(Table):
     """The historian: where it keeps what, and for how long. Days count back from the newest sample of a station.
 
@@ -380,6 +401,7 @@ class Settings(BaseSettings):
     health: HealthSettings = HealthSettings()
     detector: DetectorSettings = DetectorSettings()
     alarms: AlarmSettings = AlarmSettings()
+    watch: WatchSettings = WatchSettings()
     historian: HistorianSettings = HistorianSettings()
     security: SecuritySettings = SecuritySettings()
     gateway: GatewaySettings = GatewaySettings()

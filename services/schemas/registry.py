@@ -10,7 +10,7 @@ from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.modbus.device_map import DeviceFile
-from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES
+from wetwell.protocols.quantities import HAND_COLUMNS, PUMP_QUANTITIES, STATION_QUANTITIES
 from wetwell.protocols.recordings.importers.mapping import TagMapping
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.runtime.settings import Settings
@@ -56,12 +56,13 @@ def _recording() -> dict[str, Any]:
         rf"^pump[1-9]\d*_{name}$": _value(one.unit, one.description.replace("{pump}", "i"))
         for name, one in PUMP_QUANTITIES.items()
     }
+    hands = {name: {"enum": [0, 1, None], "description": said} for name, said in HAND_COLUMNS.items()}
     truth = {r"^truth_": {"description": "What only a simulator can know; no diagnosis reads it"}}
     return {
         "title": "Recording",
         "description": "A row of a recording: CSV, CSV.gz or Parquet. Empty or NaN is no value. Pumps count from 1.",
         "type": "object",
-        "properties": {"time": time, **station},
+        "properties": {"time": time, **station, **hands},
         "patternProperties": pumps | truth,
         "required": ["time"],
     }

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.errors import WetwellError
+from wetwell.protocols.orders import first_place, go_on, orders_of
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.sim2real.truth import kernel
 from wetwell.sim2real.truth.case import TruthCase
@@ -37,6 +38,12 @@ class _Plc:
     turn: int = 0
     over_s: float = 0.0
     under_s: float = 0.0
+
+    def obey(self, speed_ratio: Floats) -> None:
+        """Run those pumps that an operator wants to run."""
+        wanted = [int(i) for i in np.flatnonzero(speed_ratio)]
+        self.running = [i for i in self.running if i in wanted] + [i for i in wanted if i not in self.running]
+        self.over_s = self.under_s = 0.0
 
     def scan(self, level_m: float) -> None:
         count, pumps = len(self.running), self.spec.shutoff_m.size
@@ -79,9 +86,12 @@ def swmm_passage_of(case: TruthCase) -> Passage:
             raise ValueError(f"deviation '{deviation.name}' is not one that SWMM can express")
     if case.faults:
         raise ValueError("a case for SWMM can have no faults")
+    if any(step.is_valve_shut for step in case.steps):
+        raise ValueError("a case for SWMM can have no step with the valves shut")
     made, sensor_rng = truth_of(case)
     station_record = np.empty((2, case.seconds))
     pump_record = np.empty((5, len(case.station.pump), case.seconds))
+    step_record = np.empty(case.seconds, dtype=np.int64)
     with _ONE_AT_A_TIME, tempfile.TemporaryDirectory(prefix="swmm-") as room:
         path = Path(room) / "station.inp"
         path.write_text(swmm_input(made.spec, case.initial_level_m), encoding="ascii")
@@ -91,12 +101,18 @@ def swmm_passage_of(case: TruthCase) -> Passage:
                 pyswmm.Nodes(simulation),
                 pyswmm.Links(simulation),
                 made,
-                case.initial_level_m,
+                case,
                 station_record,
                 pump_record,
+                step_record,
             )
     return Passage(
-        case=case, made=made, sensor_rng=sensor_rng, station_record=station_record, pump_record=pump_record
+        case=case,
+        made=made,
+        sensor_rng=sensor_rng,
+        station_record=station_record,
+        pump_record=pump_record,
+        step_record=step_record,
     )
 
 
@@ -105,9 +121,10 @@ def _drive(
     nodes: Any,
     links: Any,
     made: Truth,
-    initial_level_m: float,
+    case: TruthCase,
     station_record: Floats,
     pump_record: Floats,
+    step_record: Integers,
 ) -> None:
     """Drive SWMM step by step, as PLC, drives and weather, and note each whole second."""
     spec, around = made.spec, made.around
@@ -118,7 +135,9 @@ def _drive(
     outlets = [nodes["OUT"]] if spec.shared_loss > 0 else [nodes[f"OUT{i}"] for i in range(1, pumps + 1)]
     plc = _Plc(spec)
     command, speeds, damped = np.zeros(pumps), np.zeros(pumps), np.zeros(pumps)
-    level_m, seen_m, lift_m = initial_level_m, initial_level_m, spec.lift_m  # SWMM's own is 0 until its first step
+    orders, place = orders_of(case.steps, pumps), first_place()
+    level_m = seen_m = case.initial_level_m
+    lift_m = spec.lift_m  # SWMM's own is 0 until its first step
     level_share, flow_share = (_followed(lag_s) for lag_s in (spec.level_lag_s, spec.flow_lag_s))
     simulation.start()
     for second in range(seconds):
@@ -130,16 +149,24 @@ def _drive(
         station_record[:, second] = level_m, reading_m
         power = spec.rated_power_w * command * around.voltage_factor[second]
         pump_record[:, :, second] = command, flows, np.maximum(heads_m, 0.0), power, damped
-        plc.scan(float(reading_m))
+        step_record[second] = place[2]
+        inlet = 0.0 if place[2] >= 0 and orders.is_inlet_shut[place[2]] else 1.0
+        ordered, wanted = go_on(orders, place, float(reading_m)), np.ones(pumps)
+        if ordered >= 0 and orders.is_by_hand[ordered]:
+            wanted = orders.speed_ratio[ordered]
+            plc.obey(wanted)
+        else:
+            plc.scan(float(reading_m))
         swing = 1.0 + spec.hunting * math.sin(2.0 * math.pi * second / spec.hunting_s)
-        inflow = 0.5 * (around.inflow[second] + around.inflow[second + 1]) + spec.hidden_inflow
+        inflow = 0.5 * inlet * (around.inflow[second] + around.inflow[second + 1]) + spec.hidden_inflow
         standing = sum(flow <= 0.0 and speed <= 0.0 for flow, speed in zip(flows, command, strict=True))
         behind_m = nodes["HEADER"].head - level_m if spec.shared_loss > 0 else lift_m
         well.generated_inflow(inflow + standing * spec.flap_leak * math.sqrt(max(behind_m, 0.0)))
         for _ in range(_STEPS):
             for i, machine in enumerate(machines):
-                moved = command[i] + (ROUTING_STEP_S if i in plc.running else -ROUTING_STEP_S) / spec.ramp_s
-                command[i] = 0.0 if moved < 1e-9 else min(moved, 1.0)
+                aim, reach = wanted[i] if i in plc.running else 0.0, ROUTING_STEP_S / spec.ramp_s
+                moved = min(max(aim, command[i] - reach), command[i] + reach)
+                command[i] = 0.0 if moved < 1e-9 else moved
                 speeds[i] = kernel.shaft_ratio(command[i], spec.ramp_bow) * swing
                 machine.target_setting = speeds[i]
             lift_m = max(spec.lift_m - spec.lift_slope * (level_m - spec.lift_reference_m), 0.0)

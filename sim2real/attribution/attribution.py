@@ -2,27 +2,30 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.changes import MOST_CHANGED, changed
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
+from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.intervals import are_there, intervals_of
+from wetwell.sim2real.attribution.intervals import intervals_of
+from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.likelihood.cells import cells_of
 from wetwell.sim2real.likelihood.posterior import SetProbability, best_set, equivalents, posterior_of, verdict_of
+from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
-
-LEAST_DOUBTED = 0.02
-"""Probability from which the intervals of a set are looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,12 +42,16 @@ class Attribution:
         Effects that may be in the place of each accepted one.
     ends : (parameters, 2) array
         Of the 95 % intervals of the accepted points, in the order of the candidates.
+    own, own_ends : Fit or None, (parameters, 2) array
+        The same by this recording alone, without what was known of its parameters before.
     singles : tuple of Fit
         Single candidates, the one that explains most first.
     training, validation : (bins,) array
         Bins that are fitted, and those on which gaps are measured.
     posterior : tuple of SetProbability
         Best first.
+    possible : tuple of PossibleSet
+        Sets that may be the truth, as they were fitted.
     not_tested : tuple of NotTested
         Candidates that the recording cannot show.
     """
@@ -53,10 +60,13 @@ class Attribution:
     accepted: Fit | None
     equivalent: tuple[tuple[str, ...], ...]
     ends: Floats
+    own: Fit | None
+    own_ends: Floats
     singles: tuple[Fit, ...]
     training: Flags
     validation: Flags
     posterior: tuple[SetProbability, ...]
+    possible: tuple[PossibleSet, ...]
     not_tested: tuple[NotTested, ...] = ()
 
     @property
@@ -72,6 +82,7 @@ def attribute(
     candidates: Sequence[Candidate],
     progress: Callable[[float], None] = lambda _: None,
     each: Each = map,
+    priors: Priors = EVEN,
 ) -> Attribution:
     """Search the library for what explains a recording.
 
@@ -85,57 +96,49 @@ def attribute(
         Gets the share of the work that is done, 0 to 1.
     each : callable
         Tries candidates, perhaps side by side: the replay holds no lock.
+    priors : Priors
+        How usual effects are, and how large.
     """
     training, validation = halves(residuals.bins, replay.traces.pumps)
     fitter = Fitter(replay, residuals, training)
     plain = fitter.plain.residuals
-    tested, not_tested = shown_by(candidates, fitter, (training, validation), replay, regimes, each)
+    tested, not_tested = shown_by(candidates, fitter, replay, regimes, each)
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
-    hypotheses = Hypotheses(fitter, cells_of(residuals.bins, has_inflow=replay.traces.inflow_m3h is not None), each)
+    condition = conditions_of(residuals.bins, replay.traces, replay.station)
+    hypotheses = Hypotheses(fitter, cells_of(residuals.bins, condition), each)
     hypotheses.add(singles)
+    hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
-    posterior = _posterior(fitter, hypotheses, len(singles))
+    hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
+    tested_names = [fit.names[0] for fit in singles]
+    posterior = posterior_of(hypotheses.weights(), len(singles), partial(priors.log_share, tested=tested_names))
     accepted: Fit | None = None
+    own: Fit | None = None
     equal: dict[str, tuple[str, ...]] = {}
     if verdict_of(posterior) == "effect":
-        accepted = in_order(fitter, hypotheses.of(best_set(posterior)).fit)
+        own = in_order(fitter, hypotheses.of(best_set(posterior)).fit)
+        accepted = informed(fitter, own, priors)
         equal = equivalents(posterior, accepted.names)
     progress(1.0)
+    own_ends = ends = np.zeros((0, 2)) if own is None else intervals_of(fitter, own, residuals.bins)
+    if accepted is not None and accepted is not own:
+        ends = intervals_of(fitter, accepted, residuals.bins, priors)
     return Attribution(
         plain=plain,
         accepted=accepted,
         equivalent=() if accepted is None else tuple(equal[name] for name in accepted.names),
-        ends=np.zeros((0, 2)) if accepted is None else intervals_of(fitter, accepted, residuals.bins),
+        ends=ends,
+        own=own,
+        own_ends=own_ends,
         singles=tuple(singles),
         training=training,
         validation=validation,
         posterior=posterior,
+        possible=possible_sets(hypotheses, posterior),
         not_tested=not_tested,
     )
-
-
-def _posterior(fitter: Fitter, hypotheses: Hypotheses, library: int) -> tuple[SetProbability, ...]:
-    """Posterior without sets of which an effect may as well not be there, by its interval."""
-    sure: set[tuple[str, ...]] = set()
-    while True:
-        posterior = posterior_of(hypotheses.weights(), library)
-        doubtful = next(
-            (
-                one.effects
-                for one in posterior
-                if one.verdict == "effect" and one.probability > LEAST_DOUBTED and one.effects not in sure
-            ),
-            None,
-        )
-        if doubtful is None:
-            return posterior
-        fit = hypotheses.of(doubtful).fit
-        if are_there(fit, intervals_of(fitter, fit, fitter.bins)):
-            sure.add(doubtful)
-        else:
-            hypotheses.rule_out(doubtful)
 
 
 def halves(bins: Bins, pumps: int) -> tuple[Flags, Flags]:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.replay.changing import Acting, Changing
 from wetwell.simulator.effects import EFFECTS, LIBRARY, effect_table
 from wetwell.simulator.effects.effect import Component, Effect
 
@@ -50,11 +51,15 @@ class FreeParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """An effect with what is fixed (a pump, a main, a channel) and what is free."""
+    """An effect with what is fixed (a pump, a main, a channel) and what is free.
+
+    Where there are several `periods`, a strength is free in each of them, named `strength@1` and so on.
+    """
 
     name: str
     fixed: tuple[tuple[str, Any], ...]
     free: tuple[FreeParameter, ...]
+    periods: int = 1
 
     @property
     def component(self) -> Component:
@@ -62,9 +67,31 @@ class Candidate:
         return EFFECTS[self.name].component
 
     def effect(self, point: Floats) -> Effect:
-        """Effect with its free parameters at a point, each normalised to its range."""
-        values = {free.name: free.value(float(one)) for free, one in zip(self.free, point, strict=True)}
-        return EFFECTS[self.name].model_validate(dict(self.fixed) | values)
+        """Effect with its free parameters at a point, each normalised to its range; as it is in the last period."""
+        return self._in_period(point, self.periods)
+
+    def acting(self, point: Floats) -> Acting:
+        """What acts at a point: the effect, or one in each period."""
+        if self.periods == 1:
+            return self.effect(point)
+        return Changing(periods=tuple(self._in_period(point, k) for k in range(1, self.periods + 1)))
+
+    def changing(self, periods: int) -> "Candidate":
+        """The same with a strength for each period; what is no strength they share."""
+        free = tuple(
+            replace(one, name=name)
+            for one in self.free
+            for name in ([one.name] if one.neutral is None else [f"{one.name}@{k}" for k in range(1, periods + 1)])
+        )
+        return replace(self, free=free, periods=periods)
+
+    def _in_period(self, point: Floats, period: int) -> Effect:
+        values = dict(self.fixed)
+        for free, one in zip(self.free, point, strict=True):
+            name, _, number = free.name.partition("@")
+            if number in {"", str(period)}:
+                values[name] = free.value(float(one))
+        return EFFECTS[self.name].model_validate(values)
 
     def start_grids(self, guess: Mapping[str, float], strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
         """Points to begin at: the guess, and grids of rising strength, each strength on both sides of neutral.

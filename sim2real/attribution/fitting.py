@@ -34,7 +34,7 @@ class Fit:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """The effects themselves."""
+        """The effects themselves, as they are in the last period."""
         return tuple(c.effect(point) for c, point in zip(self.candidates, self.points, strict=True))
 
     @property
@@ -64,6 +64,8 @@ class Fitter:
         The station as it is.
     plain : Fit
         Without any effect.
+    periods : int
+        Recordings that were left alone.
     """
 
     def __init__(self, replay: Replay, residuals: StationResiduals, rows: Flags) -> None:
@@ -71,6 +73,7 @@ class Fitter:
         self._residuals = residuals
         self.rows = rows
         self.bins = residuals.bins
+        self.periods = int(replay.period[-1]) + 1
         prediction = replay.run()
         self.plant = prediction.plant
         self.plain = Fit(candidates=(), points=(), residuals=asinh_loss(residuals.of(prediction)))
@@ -78,7 +81,7 @@ class Fitter:
     def at(self, candidates: Sequence[Candidate], points: Sequence[Floats]) -> Fit | None:
         """Candidates at their points, None where the effects cannot work together on this station."""
         try:
-            prediction = self._replay.run([c.effect(point) for c, point in zip(candidates, points, strict=True)])
+            prediction = self._replay.run([c.acting(point) for c, point in zip(candidates, points, strict=True)])
         except ValueError:
             return None
         residuals = asinh_loss(self._residuals.of(prediction))

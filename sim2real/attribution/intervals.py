@@ -4,6 +4,8 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.known import agreeing, known_of, narrowed
+from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.simulator.effects import EFFECTS
@@ -21,8 +23,8 @@ STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 
 """Steps to such ends, as shares of the way to neutral, or of as far on the other side."""
 
 
-def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
-    r"""(parameters, 2) ends of 95 % intervals, as points in the ranges, in the order of the candidates.
+def covariance_of(fitter: Fitter, fit: Fit, bins: Bins, slopes: Floats) -> Floats:
+    r"""(parameters, parameters) covariance of fitted points, from the slopes of the rows that were fitted.
 
     $$\operatorname{cov} = H^{-1} \left(\sum_b g_b g_b^T + \sum_c g_c g_c^T + \sum_c t_c t_c^T\right) H^{-1},
     \qquad H = J^T J$$
@@ -35,11 +37,8 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
     ----------
     .. [1] K.-Y. Liang, S. L. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 1986.
     """
-    x = fit.position
-    if x.size == 0:
-        return np.zeros((0, 2))
     rows = fitter.rows
-    slopes, residuals = fitter.slopes(fit)[rows], fit.residuals[rows]
+    residuals = fit.residuals[rows]
     cycles = np.unique(bins.cycle[rows], return_inverse=True)[1]
     count = int(cycles.max(initial=0)) + 1
     block = cycles * min(MOST_BLOCKS, count) // count
@@ -50,8 +49,21 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
         _sums(slopes * bins.tolerance[rows, None], cell),
     ]
     inverse = np.linalg.pinv(slopes.T @ slopes)
-    covariance = inverse @ sum(pull.T @ pull for pull in pulls) @ inverse
-    spread = TWO_SIDED * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return np.asarray(inverse @ sum(pull.T @ pull for pull in pulls) @ inverse, dtype=np.float64)
+
+
+def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) -> Floats:
+    """(parameters, 2) ends of 95 % intervals, as points in the ranges, in the order of the candidates.
+
+    They are those of `covariance_of`, narrowed by what is known of parameters before.
+    """
+    x = fit.position
+    if x.size == 0:
+        return np.zeros((0, 2))
+    slopes = fitter.slopes(fit)[fitter.rows]
+    covariance = covariance_of(fitter, fit, bins, slopes)
+    known = agreeing(known_of(fit, priors), x, covariance)
+    spread = TWO_SIDED * np.sqrt(np.maximum(np.diag(narrowed(covariance, known)), 0.0))
     ends = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
     for flat in np.flatnonzero(~np.any(slopes, axis=0)):
         ends[flat] = _profile(fitter, fit, x, int(flat))
@@ -63,27 +75,6 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins) -> Floats:
         low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
         ends[k] = min(ends[k, 0], free.normalised(low)), max(ends[k, 1], free.normalised(high))
     return np.asarray(ends, dtype=np.float64)
-
-
-def are_there(fit: Fit, ends: Floats) -> bool:
-    """Whether each effect has a strength whose interval is without its neutral value.
-
-    Parameters
-    ----------
-    fit : Fit
-    ends : (parameters, 2) array
-        As of `intervals_of`.
-    """
-    intervals = np.split(ends, np.cumsum([point.size for point in fit.points])[:-1])
-    for candidate, own in zip(fit.candidates, intervals, strict=True):
-        strengths = [
-            (low - free.normalised(free.neutral), high - free.normalised(free.neutral))
-            for free, (low, high) in zip(candidate.free, own, strict=True)
-            if free.neutral is not None
-        ]
-        if strengths and not any(low > 0.0 or high < 0.0 for low, high in strengths):
-            return False
-    return True
 
 
 def _sums(values: Floats, group: Integers) -> Floats:

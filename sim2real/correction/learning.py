@@ -232,11 +232,12 @@ def effect_of(proposal: Proposal) -> LearntCorrection:
     return LearntCorrection(term=proposal.term, offset=float(proposal.sizes[0]), part=tuple(parts))
 
 
-def columns_of_no_use(replay: Replay, bins: Bins, recording: Recording) -> list[tuple[str, str]]:
+def columns_of_no_use(replay: Replay, bins: Bins, recordings: Sequence[Recording]) -> list[tuple[str, str]]:
     """Columns of the user that say nothing, and why."""
-    if not recording.covariates:
+    names = dict.fromkeys(name for recording in recordings for name in recording.covariates)
+    if not names:
         return []
-    absent = [name for name in recording.covariates if name not in replay.traces.columns]
+    absent = [name for name in names if name not in replay.traces.columns]
     left_out = dictionary(_covariates(replay, bins), bins.regime != IDLE)[1]
     return [*((name, "has values in less than half of the rows") for name in absent), *left_out.items()]
 

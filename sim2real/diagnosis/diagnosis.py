@@ -1,6 +1,6 @@
 """The diagnosis: verdict, where the gap lies, which effects cause it, and how far it shrinks with them."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +8,12 @@ import numpy as np
 from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import EffectTable, Station
+from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.sim2real.attribution.attribution import Attribution, attribute
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.correction.learning import columns_of_no_use, learn
 from wetwell.sim2real.diagnosis.correction import Correction, weighed
-from wetwell.sim2real.diagnosis.experiments import next_experiment
 from wetwell.sim2real.diagnosis.findings import found_effects, noise_check, ranking, where_it_lies
 from wetwell.sim2real.diagnosis.limitations import limitations
 from wetwell.sim2real.diagnosis.localisation import localise
@@ -21,6 +21,7 @@ from wetwell.sim2real.diagnosis.report import (
     AnswerProbability,
     ClosedLoopComparison,
     DetectorVerdicts,
+    DiagnosedRecording,
     FoundEffect,
     Gap,
     GapReport,
@@ -29,13 +30,20 @@ from wetwell.sim2real.diagnosis.report import (
     Where,
 )
 from wetwell.sim2real.diagnosis.shrinkage import gap_of
+from wetwell.sim2real.experiments.advice import next_experiment
+from wetwell.sim2real.experiments.conditions import Conditions, conditions_of
+from wetwell.sim2real.experiments.proposals import Proposals, proposals_of
+from wetwell.sim2real.experiments.reported import proposed_acts, refused_acts
 from wetwell.sim2real.likelihood.posterior import SetProbability, Verdict, verdict_of
-from wetwell.sim2real.recording.excerpt import excerpt
+from wetwell.sim2real.likelihood.priors import EVEN, Priors
+from wetwell.sim2real.recording.excerpt import MOST_DIAGNOSED_S, MOST_OF_ROWS_S, excerpt
+from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import Regimes, regimes_of
-from wetwell.sim2real.recording.traces import Traces, traces_of
+from wetwell.sim2real.recording.traces import MIN_STARTS, Traces, check_starts, traces_of
 from wetwell.sim2real.replay.plausibility import check_plausible
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.conditions import conditions_of as conditions_of_bins
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import EFFECTS, effects_of
 from wetwell.simulator.effects.effect import Component
@@ -47,19 +55,24 @@ class Diagnosis:
 
     `attribution` and what follows are for drawings.
 
+    `own_effects` are the effects with their sizes by this recording alone, without what other stations say.
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
-    is in a component, whether an effect of the library or something unknown.
+    is in a component, whether an effect of the library or something unknown. `proposals` are the acts that would tell
+    apart what is left, under `conditions`.
     """
 
     verdict: Verdict
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
+    own_effects: tuple[FoundEffect, ...]
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
     correction: Correction | None
     remarks: tuple[str, ...]
     posterior: tuple[SetProbability, ...]
     component_probability: dict[str, float]
+    proposals: Proposals
+    conditions: Conditions
     station: Station
     attribution: Attribution
     bins: Bins
@@ -72,10 +85,9 @@ class Diagnosis:
         closed_loop: ClosedLoopComparison | None = None,
         detector: DetectorVerdicts | None = None,
         notes: tuple[str, ...] = (),
+        prior_stations: int = 0,
     ) -> GapReport:
         """What programs read; `notes` come before those on what is not measured."""
-        names = [effect.name for effect in self.effects]
-        equivalent = [name for effect in self.effects for name in effect.equivalent]
         blamed = self.where[0].component if self.where else None
         return GapReport(
             station=self.station.name,
@@ -87,7 +99,9 @@ class Diagnosis:
                 for one in self.posterior
             ),
             component_probability=self.component_probability,
-            noise_check=noise_check(self.attribution, self.bins),
+            noise_check=noise_check(
+                self.attribution, self.bins, conditions_of_bins(self.bins, self.traces, self.replay.station)
+            ),
             candidates=self.candidates,
             gap=self.gap,
             correction=None if self.correction is None else self.correction.report,
@@ -101,12 +115,16 @@ class Diagnosis:
                 UntestedEffect(effect=one.effect, reason=one.reason) for one in self.attribution.not_tested
             ),
             notes=(*notes, *self.remarks, *limitations(self.traces)),
-            next_experiment=next_experiment(self.verdict, names, equivalent, blamed),
+            recordings=_recordings(self.traces),
+            experiments=proposed_acts(self.proposals),
+            refused=refused_acts(self.proposals),
+            prior_stations=prior_stations,
+            next_experiment=next_experiment(self.verdict, self.proposals.best, blamed),
         )
 
 
 def diagnose(
-    recording: Recording,
+    recording: Recording | Sequence[Recording],
     station: Station,
     *,
     only: Iterable[str] | None = None,
@@ -114,13 +132,14 @@ def diagnose(
     seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
     each: Each = map,
+    priors: Priors = EVEN,
 ) -> Diagnosis:
-    """Diagnose the gap between a station and its recording.
+    """Diagnose the gap between a station and its recording, or several recordings taken as one.
 
     Parameters
     ----------
-    recording : Recording
-        Prepared: times rise. Columns of truth are not read.
+    recording : Recording, or sequence of Recording
+        Prepared: times rise. Columns of truth are not read. Of several, some may be of acts by hand.
     station : Station
         What the simulator runs with; its own effects stay.
     only, without : names of effects
@@ -131,6 +150,8 @@ def diagnose(
         Gets the share of the work that is done.
     each : callable
         As `map`; that of a pool of threads tries effects side by side.
+    priors : Priors
+        What other stations say of this one; even where they say nothing.
 
     Raises
     ------
@@ -141,25 +162,28 @@ def diagnose(
     library = candidates_of(len(station.pump), len(station.mains), only=only, without=without)
     is_external = station.control.is_external
     candidates = [each for each in library if not (is_external and each.component == "controller")]
-    traces = excerpt(traces_of(recording, station))
+    recordings = [recording] if isinstance(recording, Recording) else recording
+    traces = _taken(recordings, station)
     regimes = regimes_of(traces, station)
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
     check_plausible(traces, station, regimes, plain)
     residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
     bins = residuals.bins
-    found = attribute(replay, residuals, regimes, candidates, progress, each)
+    found = attribute(replay, residuals, regimes, candidates, progress, each, priors)
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
     excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
     unknown = localise(excess, found.plain, bins, plain.plant)
     blamed = unknown if found.accepted is None else found.accepted.candidates[0].component
     effects = () if found.accepted is None else found.accepted.effects
+    conditions = conditions_of(traces, station)
+    possible = found.possible if verdict != "unknown" else ()
     tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
     correction: Correction | None = None
     remarks = [
         f"column '{COVARIATE_PREFIX}{name}' {why}: nothing is told by it"
-        for name, why in columns_of_no_use(replay, bins, recording)
+        for name, why in columns_of_no_use(replay, bins, recordings)
     ]
     if verdict == "unknown":
         correction, why = weighed(learn(replay, residuals), bins, plain.plant, rng)
@@ -168,13 +192,16 @@ def diagnose(
     return Diagnosis(
         verdict=verdict,
         where=() if verdict == "none" else where_it_lies(found, bins, excess, blamed, rng),
-        effects=found_effects(found),
+        effects=found_effects(found.accepted, found.ends, found.equivalent),
+        own_effects=found_effects(found.own, found.own_ends, found.equivalent),
         candidates=ranking(found, bins, rng),
         correction=correction,
         remarks=tuple(remarks),
         gap=gap_of(found.plain, found.after, bins, found.validation, rng),
         posterior=found.posterior,
         component_probability=_by_component(found.posterior, unknown),
+        proposals=proposals_of(station, possible, conditions, seed=seed, each=each),
+        conditions=conditions,
         station=station.model_copy(update={"effect": (*station.effect, *tables)}),
         attribution=found,
         bins=bins,
@@ -182,6 +209,34 @@ def diagnose(
         regimes=regimes,
         replay=replay,
     )
+
+
+def _taken(recordings: Sequence[Recording], station: Station) -> Traces:
+    """What is diagnosed: parts of long recordings, one recording after the other, those of acts whole."""
+    if len(recordings) == 1:
+        return excerpt(traces_of(recordings[0], station))
+    each = [traces_of(recording, station, least_starts=1) for recording in recordings]
+    are_left_alone = sum(not traces.by_hand.is_commanding.any() for traces in each)
+    most_s = (MOST_DIAGNOSED_S if each[0].is_each_second else MOST_OF_ROWS_S) // max(are_left_alone, 1)
+    traces = joined([one if one.by_hand.is_commanding.any() else excerpt(one, most_s) for one in each])
+    check_starts(traces.frequency_hz, MIN_STARTS)
+    return traces
+
+
+def _recordings(traces: Traces) -> tuple[DiagnosedRecording, ...]:
+    """The recordings that were diagnosed as one."""
+    found = []
+    for part in range(int(traces.part.max()) + 1):
+        rows = np.flatnonzero((traces.part == part) & traces.is_row)
+        time_s = traces.time_s[rows]
+        found.append(
+            DiagnosedRecording(
+                begin=to_iso(traces.start_ns + int(time_s[0] * NS_PER_S)),
+                hours=float(time_s[-1] - time_s[0]) / 3600.0,
+                is_by_hand=bool(traces.by_hand.is_commanding[rows].any()),
+            )
+        )
+    return tuple(found)
 
 
 def _by_component(posterior: tuple[SetProbability, ...], unknown: Component) -> dict[str, float]:

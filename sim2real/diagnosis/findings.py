@@ -1,42 +1,58 @@
 """What an attribution comes to in a report: accepted effects, the ranking of single ones, the cells of the gap."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.attribution import Attribution
 from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, NoiseCheck, RankedCandidate, Where
 from wetwell.sim2real.diagnosis.shrinkage import cell_gap, gap_of
+from wetwell.sim2real.likelihood.cells import cells_of
+from wetwell.sim2real.likelihood.covariance import expected_squares
 from wetwell.sim2real.recording.regimes import REGIMES
-from wetwell.sim2real.residuals.asinh_loss import squares_of
+from wetwell.sim2real.residuals.asinh_loss import residuals_of, squares_of
 from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.simulator.effects.effect import Component
 
 
-def found_effects(found: Attribution) -> tuple[FoundEffect, ...]:
-    """Accepted effects with their parameters."""
-    if found.accepted is None:
+def found_effects(fit: Fit | None, ends: Floats, equivalents: Sequence[tuple[str, ...]]) -> tuple[FoundEffect, ...]:
+    """Effects of a fit with their parameters.
+
+    Parameters
+    ----------
+    fit : Fit or None
+        None has no effects.
+    ends : (parameters, 2) array
+        Of the intervals of its points.
+    equivalents : sequence of tuple of str
+        What may be in the place of each effect.
+    """
+    if fit is None:
         return ()
-    fit = found.accepted
-    ends = np.split(found.ends, np.cumsum([point.size for point in fit.points])[:-1])
+    parted = np.split(ends, np.cumsum([point.size for point in fit.points])[:-1])
     return tuple(
         FoundEffect(
             name=candidate.name,
             component=candidate.component,
             equivalent=equivalent,
+            differs=tuple(dict.fromkeys(free.name.partition("@")[0] for free in candidate.free if "@" in free.name)),
             parameters=_parameters(candidate, point, interval),
         )
         for candidate, point, interval, equivalent in zip(
-            fit.candidates, fit.points, ends, found.equivalent, strict=True
+            fit.candidates, fit.points, parted, equivalents, strict=True
         )
     )
 
 
 def _parameters(candidate: Candidate, point: Floats, ends: Floats) -> dict[str, FittedParameter]:
-    """What is fixed first, then what was fitted."""
+    """What is fixed first, then what was fitted; of what differs between periods the last one has the plain name."""
+    last = f"@{candidate.periods}"
     fixed = {name: FittedParameter(value=value, ci=None, unit="") for name, value in candidate.fixed}
     return fixed | {
-        free.name: FittedParameter(
+        free.name.removesuffix(last): FittedParameter(
             value=free.value(float(one)), ci=(free.value(float(low)), free.value(float(high))), unit=free.unit
         )
         for free, one, (low, high) in zip(candidate.free, point, ends, strict=True)
@@ -55,18 +71,22 @@ def ranking(found: Attribution, bins: Bins, rng: np.random.Generator) -> tuple[R
     return tuple(sorted(ranked, key=lambda one: -one.score))
 
 
-def noise_check(found: Attribution, bins: Bins) -> tuple[NoiseCheck, ...]:
+def noise_check(found: Attribution, bins: Bins, condition: Integers) -> tuple[NoiseCheck, ...]:
     """Whether what is left under the answer is as large as noise and a right model make it, by signal and regime."""
-    squares = squares_of(found.after)
-    return tuple(
-        NoiseCheck(
-            signal=SIGNALS[signal],
-            regime=REGIMES[regime],
-            mean_square=float(squares[cell].mean()),
-            noise_share=float(bins.floor[cell].mean()),
+    cells = cells_of(bins, condition)
+    left = cells.means(residuals_of(found.after))
+    checks = []
+    for block in cells.blocks:
+        expected = expected_squares(block)
+        checks.append(
+            NoiseCheck(
+                signal=SIGNALS[block.signal],
+                regime=REGIMES[block.regime],
+                mean_square=float(np.mean(left[block.rows] ** 2 / expected)),
+                noise_share=float(np.mean(block.variance / expected)),
+            )
         )
-        for signal, regime, cell in bins.cells(np.ones(bins.size, dtype=np.bool_))
-    )
+    return tuple(checks)
 
 
 def where_it_lies(

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.sim2real.experiments.reported import ProposedAct, RefusedAct
 from wetwell.sim2real.recording.regimes import Regime
 from wetwell.sim2real.residuals.bins import Signal
 from wetwell.simulator.corrections.parts import Term
@@ -77,12 +78,15 @@ class FoundEffect(_Part):
     equivalent : list of str
         Effects that these data cannot tell from it.
     parameters : dict of FittedParameter
-        By name.
+        By name; of what differs, the value in the last recording, and those before as `name@1` and so on.
+    differs : list of str
+        Parameters that differ between recordings; all others are shared by them.
     """
 
     name: str
     component: Component
     equivalent: tuple[str, ...]
+    differs: tuple[str, ...] = ()
     parameters: dict[str, FittedParameter]
 
 
@@ -225,7 +229,7 @@ class UntestedEffect(_Part):
 
 
 class NoiseCheck(_Part):
-    """How large the residuals of a signal in a regime are under the answer.
+    """How large what is left of a signal in a regime is under the answer.
 
     Parameters
     ----------
@@ -234,7 +238,7 @@ class NoiseCheck(_Part):
     regime : str
         What the station was doing.
     mean_square : float
-        1 is all that a right model may be off. [1]
+        Over what is expected of a good model; more in starts and stops, where a right one may be poor. [1]
     noise_share : float
         What the sensors alone make of that; a right answer lies between it and 1. [1]
     """
@@ -320,6 +324,24 @@ class CorrectionReport(_Part):
     shrinkage_ci: ShortInterval
 
 
+class DiagnosedRecording(_Part):
+    """One of the recordings that were diagnosed as one.
+
+    Parameters
+    ----------
+    begin : str
+        Its first row.
+    hours : float
+        Its length. [h]
+    is_by_hand : bool
+        Whether a crew commanded the pumps in some of it.
+    """
+
+    begin: str
+    hours: Short
+    is_by_hand: bool
+
+
 class GapReport(_Part):
     """What `wetwell gap diagnose` writes.
 
@@ -365,8 +387,16 @@ class GapReport(_Part):
         Effects that this recording cannot show.
     notes : list of str
         What was out of order, and what is not measured.
+    recordings : list of DiagnosedRecording
+        What was diagnosed, in the order of time.
+    experiments : list of ProposedAct
+        Acts at the station that would tell apart what is left, the best first.
+    refused : list of RefusedAct
+        Acts that may not be done at the station.
+    prior_stations : int
+        Stations whose diagnoses were the prior of this one; 0 where effects and sizes were all alike before.
     next_experiment : str
-        What to do next to learn more, in a sentence.
+        What to do next to learn more, in a sentence: the best act where there is one.
     """
 
     schema_: Literal["wetwell.gap-report/2"] = Field(default="wetwell.gap-report/2", alias="schema")
@@ -388,4 +418,8 @@ class GapReport(_Part):
     value: StoredValue = "instant"
     not_tested: tuple[UntestedEffect, ...] = ()
     notes: tuple[str, ...] = ()
+    recordings: tuple[DiagnosedRecording, ...] = ()
+    experiments: tuple[ProposedAct, ...] = ()
+    refused: tuple[RefusedAct, ...] = ()
+    prior_stations: int = 0
     next_experiment: str

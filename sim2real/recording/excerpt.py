@@ -1,12 +1,13 @@
 """Parts of a long recording, spread over all of it, so that a month is diagnosed about as quickly as two days."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.recording.drives import Drives
-from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.recording.traces import BETWEEN, Traces
 
 MOST_DIAGNOSED_S = 172_800
 MOST_OF_ROWS_S = 1_209_600
@@ -50,7 +51,7 @@ def excerpt(traces: Traces, most_s: int | None = None) -> Traces:
         first = max(_near(idle, begin), last)
         last = max(min(_near(idle, begin + part_s) + 1, traces.seconds), first)
         parts.append(np.arange(first, last))
-    return _of_rows(traces, parts)
+    return with_blanks(traces, parts)
 
 
 def _near(idle: Integers, second: int) -> int:
@@ -61,7 +62,15 @@ def _near(idle: Integers, second: int) -> int:
     return second
 
 
-def _of_rows(traces: Traces, parts: list[Integers]) -> Traces:
+def with_blanks(traces: Traces, parts: Sequence[Integers]) -> Traces:
+    """Some parts of traces, one after the other, with `BLANK_S` between them in which nothing is known.
+
+    Parameters
+    ----------
+    traces : Traces
+    parts : sequence of arrays
+        Seconds of each part, in their order.
+    """
     blank = np.full(max(BLANK_S, round(3.0 * traces.rate_s)), -1)
     rows = np.concatenate([row for part in parts for row in (part, blank)][:-1])
     is_blank = rows < 0
@@ -85,6 +94,8 @@ def _of_rows(traces: Traces, parts: list[Integers]) -> Traces:
         ),
         level_m=np.where(is_cut, np.nan, taken(traces.level_m, np.nan)),
         inflow_m3h=None if traces.inflow_m3h is None else taken(traces.inflow_m3h, 0.0),
+        by_hand=traces.by_hand.taken(rows),
+        part=np.where(is_blank, BETWEEN, traces.part[rows]),
         signals={name: np.where(is_cut, np.nan, taken(values, np.nan)) for name, values in traces.signals.items()},
         columns={name: taken(values, np.nan) for name, values in traces.columns.items()},
     )

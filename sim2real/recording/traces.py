@@ -4,19 +4,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.sim2real.recording.by_hand import ByHand, by_hand_of
 from wetwell.sim2real.recording.checks import check_pumps
 from wetwell.sim2real.recording.drives import Drives, drives_between
 from wetwell.sim2real.recording.duty import Intervals, drives_of_means
 from wetwell.sim2real.recording.rows import EACH_SECOND_S, Rows, rows_of
 
 MIN_STARTS = 6
+BETWEEN = -1
+"""Part of seconds that lie between two recordings, or two parts of one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +45,10 @@ class Traces:
         Without NaN.
     signals : dict of (pumps, n) arrays
         Of `PUMP_METERS` those that are measured, and move.
+    by_hand : ByHand
+        What a crew did.
+    part : (n,) array
+        Which of several recordings a second is of, from 0; `BETWEEN` of none.
     columns : dict of (n,) arrays
         Of a user, by name, without NaN: those that have values in most rows.
     """
@@ -55,6 +62,8 @@ class Traces:
     level_m: Floats
     inflow_m3h: Floats | None
     signals: dict[AnalogueQuantity, Floats]
+    by_hand: ByHand
+    part: Integers
     columns: dict[str, Floats] = field(default_factory=dict)
 
     @property
@@ -73,6 +82,14 @@ class Traces:
         return self.drives.frequency_hz
 
     @property
+    def period(self) -> Integers:
+        """(n,) number of the recording that was left alone, from 0: acts by hand belong to what was before them."""
+        parts = range(int(self.part.max(initial=0)) + 1)
+        is_alone = [not self.by_hand.is_commanding[self.part == part].any() for part in parts]
+        number = np.maximum(np.cumsum(is_alone) - 1, 0)
+        return np.asarray(number[np.maximum.accumulate(np.maximum(self.part, 0))])
+
+    @property
     def is_each_second(self) -> bool:
         """Whether there is a row each second, but for some that were lost."""
         return self.rate_s <= EACH_SECOND_S
@@ -88,7 +105,7 @@ class Traces:
         return int(self.frequency_hz.shape[0])
 
 
-def traces_of(recording: Recording, station: Station) -> Traces:
+def traces_of(recording: Recording, station: Station, least_starts: int = MIN_STARTS) -> Traces:
     """Recording on whole seconds; rows between are dropped, seconds between rows have no value.
 
     Parameters
@@ -96,12 +113,14 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     recording : Recording
         Prepared: times rise.
     station : Station
+    least_starts : int
+        Of pumps; an experiment needs fewer than what stands alone.
 
     Raises
     ------
     ValueError
         If the numbers of pumps differ, the recording is shorter than half an hour or too slow, has no frequency,
-        nothing to be held against, or fewer than six starts.
+        nothing to be held against, or too few starts.
     """
     pumps = len(station.pump)
     check_pumps(recording, station)
@@ -109,10 +128,7 @@ def traces_of(recording: Recording, station: Station) -> Traces:
     signals: dict[AnalogueQuantity, Floats] = {name: rows.of_pumps(name, pumps) for name in PUMP_METERS}
     signals = {name: rows.news(values) for name, values in signals.items() if _moves(values)}
     drives = _drives_of(rows, station)
-    running = drives.frequency_hz > 0.0
-    starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
-    if starts < MIN_STARTS:
-        raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {MIN_STARTS}")
+    check_starts(drives.frequency_hz, least_starts)
     level_m = rows.news(rows.column("level_m"))
     courses = {name: rows.course(COVARIATE_PREFIX + name) for name in recording.covariates}
     if not signals and not _moves(level_m):
@@ -129,8 +145,24 @@ def traces_of(recording: Recording, station: Station) -> Traces:
         level_m=level_m if _moves(level_m) else np.full(rows.seconds, np.nan),
         inflow_m3h=rows.course("inflow_m3h"),
         signals=signals,
+        by_hand=by_hand_of(recording, rows.second, rows.seconds),
+        part=np.zeros(rows.seconds, dtype=np.int64),
         columns={name: course for name, course in courses.items() if course is not None},
     )
+
+
+def check_starts(frequency_hz: Floats, least: int) -> None:
+    """Refuse what has too few starts of pumps to tell anything.
+
+    Raises
+    ------
+    ValueError
+        Says how many, and how many it takes.
+    """
+    running = frequency_hz > 0.0
+    starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
+    if starts < least:
+        raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {least}")
 
 
 def _drives_of(rows: Rows, station: Station) -> Drives:

@@ -2,7 +2,7 @@
 
 import math
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.quantities import FLOW, HEAD, LEVEL, POWER
 from wetwell.simulator.corrections.parts import FLOW_READING, HEAD_READING, LEVEL_READING
@@ -25,6 +25,7 @@ def replay_seconds(
     measured_level_m: Floats,
     level_gain: Floats,
     inflow_gain: Floats,
+    is_inlet_shut: Flags,
     span_s: int,
     truth: Truth,
     level_m: Floats,
@@ -50,6 +51,8 @@ def replay_seconds(
         NaN is "no value".
     level_gain, inflow_gain : (n,) arrays
         Shares of the error that a value of the level takes away; 1 begins anew. [1, 1/s]
+    is_inlet_shut : (n,) array
+        Whether nothing comes in that nobody measures.
     span_s : int
         Seconds that a value of the level is the mean of. [s]
     truth : Truth
@@ -69,7 +72,8 @@ def replay_seconds(
         for i in range(state.pumps.size):
             state.pumps[i].frequency_hz = frequency_hz[i, second]
             truth.flow_m3h[i, 0] = truth.head_m[i, 0] = truth.power_kw[i, 0] = 0.0
-        move_plant(plant, state, forcing, second, extra_m3h, truth, 0)
+        coming = 0.0 if is_inlet_shut[second] else 1.0
+        move_plant(plant, state, forcing, second, coming * extra_m3h, truth, 0)
         true_m = truth.level_m[0]
         misread_m = state.correction[LEVEL_READING, 0]
         _read(plant, state, damped, second, truth, reading)
@@ -99,7 +103,7 @@ def replay_seconds(
             corrected_m3 = now.volume_m3 + followed * error_m * area_m2
             now.volume_m3 = max(corrected_m3, 0.0)
             sensed_m += followed * error_m
-            extra_m3h += inflow_gain[second] * error_m * area_m2 * 3600.0
+            extra_m3h += coming * inflow_gain[second] * error_m * area_m2 * 3600.0
 
 
 @inlined

@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.orders import SHUT_LOSS
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.replay.changing import Acting, Changing, in_period
 from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.sim2real.replay.observer import Observer, constant_observer, forced_observer, hides_cycles, row_observer
 from wetwell.simulator.effects.effect import Effect
@@ -80,8 +82,9 @@ class Replay:
         self.traces = traces
         self.station = station
         self.own = tuple(own)
+        self.period = traces.period
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
-        self._forcing = healthy_forcing(inflow_m3h, traces.pumps, len(station.mains), clock_s=traces.clock_s)
+        self._forcing = self._healthy(inflow_m3h, None)
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
@@ -90,14 +93,28 @@ class Replay:
         self._first_level_m = float(np.median(first)) if known.size else station.middle_level_m
         self.observer = self._observer()
 
-    def run(self, effects: Sequence[Effect] = ()) -> Prediction:
-        """Predict under effects.
+    def run(self, effects: Sequence[Acting] = ()) -> Prediction:
+        """Predict under effects; of those that change from period to period, the plant is that of the last.
 
         Raises
         ------
         ValueError
             If an effect does not fit the station.
         """
+        if not any(isinstance(effect, Changing) for effect in effects):
+            return self._predict([in_period(effect, 0) for effect in effects])
+        periods = [
+            self._predict([in_period(effect, k) for effect in effects]) for k in range(int(self.period[-1]) + 1)
+        ]
+        place = np.arange(self.period.size)
+        level_m = np.array([one.level_m for one in periods])[self.period, place]
+        signals = {
+            name: np.moveaxis(np.array([one.signals[name] for one in periods])[self.period, :, place], 0, 1)
+            for name in periods[-1].signals
+        }
+        return Prediction(level_m=level_m, signals=signals, plant=periods[-1].plant)
+
+    def _predict(self, effects: Sequence[Effect]) -> Prediction:
         acting = (*self.own, *effects)
         plant = self._plant(acting)
         run = self._run(acting, plant)
@@ -202,6 +219,7 @@ class Replay:
             observer.level_m,
             observer.level_gain,
             observer.inflow_gain,
+            traces.by_hand.is_inlet_shut,
             1 if observer.level_m is not traces.level_m and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
             level_m,
@@ -219,7 +237,8 @@ class Replay:
         plant = self._plant(self.own)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         regime, is_known = regimes_of(traces, station).of_station, np.isfinite(traces.level_m)
-        rows, calm = (is_known & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
+        settled = is_known & _settled(regime)
+        rows, calm = (settled & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
         observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
         tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
         best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
@@ -237,18 +256,21 @@ class Replay:
         squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
         return np.minimum(squares, MOST_SQUARE), np.log(variance_m2)
 
+    def _healthy(self, inflow_m3h: Floats, columns: Floats | None) -> Forcing:
+        """Forcing without faults, the valves of the mains as the crew had them."""
+        traces = self.traces
+        forcing = healthy_forcing(
+            inflow_m3h, traces.pumps, len(self.station.mains), clock_s=traces.clock_s, columns=columns
+        )
+        forcing.friction_factor[:, traces.by_hand.is_valve_shut] *= SHUT_LOSS
+        return forcing
+
     def _forced(self, writing: Sequence[Effect], plant: PlantParameters) -> Forcing:
         """Forcing of the recording; a copy where effects are `writing` into it."""
         delay_s = plant.sensors[INFLOW].delay_s
         if not writing and delay_s == 0.0 and not plant.columns:
             return self._forcing
-        forcing = healthy_forcing(
-            later(self._forcing.inflow_m3h, -delay_s),
-            self.traces.pumps,
-            len(self.station.mains),
-            clock_s=self._forcing.clock_s,
-            columns=self._columns(plant.columns),
-        )
+        forcing = self._healthy(later(self._forcing.inflow_m3h, -delay_s), self._columns(plant.columns))
         for effect in writing:
             effect.force(forcing, self.traces.time_s)
         return forcing
@@ -262,6 +284,14 @@ class Replay:
                 "the station file goes by it"
             )
         return np.array([self.traces.columns[name] for name in names]).reshape(len(names), self.traces.seconds)
+
+
+def _settled(regime: Integers) -> Flags:
+    """(n,) the later half of each time in a regime: what a switch sets off is over, the inflow moves the level."""
+    place = np.arange(regime.size)
+    edges = np.flatnonzero(np.diff(regime)) + 1
+    begin, end = np.r_[0, edges], np.r_[edges, regime.size]
+    return np.asarray(place >= np.repeat(0.5 * (begin + end), end - begin))
 
 
 def later(values: Floats, delay_s: float) -> Floats:

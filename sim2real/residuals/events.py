@@ -10,7 +10,7 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
-from wetwell.sim2real.recording.traces import Traces
+from wetwell.sim2real.recording.traces import BETWEEN, Traces
 from wetwell.sim2real.replay.observer import level_noise_m
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
@@ -129,7 +129,11 @@ def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern:
         is_calm = (window > last) & (regimes.of_station[window] != START_RAMP)
         since_s = event.second - last
         last = event.second
-        if window[0] >= 0 and 1 <= event.number <= len(station.control.start_levels_m):
+        if (
+            window[0] >= 0
+            and _is_of_controller(traces, window[0], event.second + 2)
+            and 1 <= event.number <= len(station.control.start_levels_m)
+        ):
             events.append(event)
             waited_s.append(since_s)
             calm.append(is_calm)
@@ -161,6 +165,11 @@ def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern:
         noise_m=noise_m,
         pattern=pattern,
     )
+
+
+def _is_of_controller(traces: Traces, begin: int, end: int) -> bool:
+    """Whether nobody else commanded the pumps meanwhile, and no recording ended."""
+    return not (traces.by_hand.is_commanding[begin:end].any() or np.any(traces.part[begin:end] == BETWEEN))
 
 
 def _earliness(slope_ratio: Floats) -> Floats:

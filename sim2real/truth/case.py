@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from wetwell.protocols.orders import Step
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.truth.storage import EVERY_SECOND, Storage
@@ -90,6 +91,8 @@ class TruthCase:
         Time of the first second. [ns]
     storage : Storage
         What the historian keeps of it.
+    steps : tuple of Step
+        What an operator does from the first second on.
     """
 
     station: Station
@@ -103,3 +106,4 @@ class TruthCase:
     slow_s: float = 30.0
     start_ns: int = START_NS
     storage: Storage = EVERY_SECOND
+    steps: tuple[Step, ...] = ()

@@ -21,6 +21,7 @@ import numba
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.orders import Orders, go_on, valves
 from wetwell.sim2real.truth.spec import CONE, PRISM, Spec
 
 P = ParamSpec("P")
@@ -30,8 +31,8 @@ STEPS = 20
 STEP_S = 1.0 / STEPS
 LEVEL, LEVEL_READING = range(2)
 COMMAND, FLOW, HEAD, POWER, DAMPED_FLOW = range(5)
-_TORQUE, _PUMPED, _SPEED, _PUSH, _STIFFNESS, _OPEN, _ON = range(5, 12)
-_PUMP_ROWS = 12
+_TORQUE, _PUMPED, _SPEED, _PUSH, _STIFFNESS, _OPEN, _ON, _SET = range(5, 13)
+_PUMP_ROWS = 13
 _LEVEL, _SEEN, _AIR, _PRIMED = range(4)
 _READING, _RUNNING, _TURN, _OVER, _UNDER = range(5)
 _PLC_ROWS = 5
@@ -108,12 +109,16 @@ def integrate(
     speed_factor: Floats,
     level_error_m: Floats,
     is_level_stuck: Floats,
+    orders: Orders,
+    place: Integers,
     station_record: Floats,
     pump_record: Floats,
+    step_record: Integers,
 ) -> None:
-    """Fill the records, (2, n) and (5, pumps, n), with the state at the beginning of each second.
+    """Fill the records, (2, n), (5, pumps, n) and (n,), with the state at the beginning of each second.
 
-    The PLC reads, decides and commands once a second; all else moves in steps of `STEP_S`.
+    The PLC reads, decides and commands once a second, or an operator by his orders; all else moves in steps of
+    `STEP_S`.
     """
     pumps = spec.shutoff_m.size
     pump = np.zeros((_PUMP_ROWS, pumps))
@@ -126,13 +131,20 @@ def integrate(
         station_record[LEVEL, second] = well[_LEVEL]
         station_record[LEVEL_READING, second] = plc[_READING]
         pump_record[:, :, second] = pump[: DAMPED_FLOW + 1]
-        _decide(spec, plc, order, pump)
+        step_record[second] = place[2]
+        shut, inlet = valves(orders, place[2])
+        ordered = go_on(orders, place, plc[_READING])
+        if ordered >= 0 and orders.is_by_hand[ordered]:
+            _obey(orders.speed_ratio[ordered], plc, order, pump)
+        else:
+            pump[_SET] = 1.0
+            _decide(spec, plc, order, pump)
         swing = 1.0 + spec.hunting * math.sin(2.0 * math.pi * second / spec.hunting_s)
         for step in range(STEPS):
             _turn(spec, pump, swing, speed_factor[:, second])
-            out, back = _move(spec, pump, well, loss_factor[second], extra_lift_m[second])
+            out, back = _move(spec, pump, well, shut * loss_factor[second], extra_lift_m[second])
             now = inflow[second] + (inflow[second + 1] - inflow[second]) * (step + 0.5) * STEP_S
-            _fill(spec, well, now + spec.hidden_inflow + back - out, out)
+            _fill(spec, well, inlet * now + spec.hidden_inflow + back - out, out)
         _load(spec, pump, well[_LEVEL], voltage_factor[second])
 
 
@@ -161,11 +173,30 @@ def _decide(spec: Spec, plc: Floats, order: Integers, pump: Floats) -> None:
 
 
 @_compiled
+def _obey(speed_ratio: Floats, plc: Floats, order: Integers, pump: Floats) -> None:
+    """Pumps run as an operator wants it; who still runs keeps its place in the order of the starts."""
+    running, before = 0, int(plc[_RUNNING])
+    for k in range(before):
+        if speed_ratio[order[k]] > 0.0:
+            order[running] = order[k]
+            running += 1
+    for i in range(speed_ratio.size):
+        if speed_ratio[i] > 0.0:
+            pump[_SET, i] = speed_ratio[i]
+            if pump[_ON, i] <= 0.0:
+                order[running] = i
+                running += 1
+        pump[_ON, i] = 1.0 if speed_ratio[i] > 0.0 else 0.0
+    plc[_RUNNING], plc[_OVER], plc[_UNDER] = running, 0.0, 0.0
+
+
+@_compiled
 def _turn(spec: Spec, pump: Floats, swing: float, speed_factor: Floats) -> None:
     """Move the commands by a step, and with them the speeds that the water sees."""
     for i in range(pump.shape[1]):
-        moved = pump[COMMAND, i] + (STEP_S if pump[_ON, i] > 0.0 else -STEP_S) / spec.ramp_s
-        command = min(max(moved, 0.0), 1.0)
+        wanted = pump[_SET, i] if pump[_ON, i] > 0.0 else 0.0
+        reach = STEP_S / spec.ramp_s
+        command = min(max(wanted, pump[COMMAND, i] - reach), pump[COMMAND, i] + reach)
         if command < _STOPPED:
             command = 0.0
             pump[_PUMPED, i] = 0.0

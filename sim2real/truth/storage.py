@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.protocols.quantities import AnalogueQuantity, quantity_of
+from wetwell.protocols.quantities import HAND_COLUMNS, AnalogueQuantity, quantity_of
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
@@ -87,6 +87,9 @@ def stored(recording: Recording, storage: Storage) -> Recording:
     kept: dict[str, Floats] = {}
     for name, values in recording.columns.items():
         quantity = quantity_of(name)
+        if name in HAND_COLUMNS:
+            kept[name] = _rows(values, storage)
+            continue
         if quantity is None or quantity in storage.absent:
             continue
         if quantity == "running":

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.orders import first_place, orders_of
 from wetwell.protocols.quantities import AnalogueQuantity, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors
@@ -26,13 +27,14 @@ _QUIET = Sensors(flow_noise=0.0, head_noise=0.0, power_noise=0.0, inflow_noise=0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Passage:
-    """What a plant has noted of a case: (2, n) and (5, pumps, n) in rows as in `kernel`, SI units."""
+    """What a plant has noted of a case: (2, n), (5, pumps, n) and (n,) as in `kernel`, SI units."""
 
     case: TruthCase
     made: Truth
     sensor_rng: np.random.Generator
     station_record: Floats
     pump_record: Floats
+    step_record: Integers
 
     def recording(self, *, truth: bool) -> Recording:
         """The recording, to be taken once; a blind one has no truth columns."""
@@ -60,8 +62,9 @@ class Passage:
         return self.case.start_ns + NS_PER_S * np.arange(self.case.seconds)
 
     def _columns(self, case: TruthCase, station_record: Floats, rng: np.random.Generator) -> dict[str, Floats]:
-        inflow_m3h = self.made.around.metered_inflow[:-1] * HOUR_S
-        return recorded(case, self.made.telemetry, inflow_m3h, station_record, self.pump_record, rng)
+        by_hand = orders_of(case.steps, len(case.station.pump)).columns(self.step_record)
+        inflow_m3h = self.made.around.metered_inflow[:-1] * HOUR_S * by_hand.get("inlet_open", 1.0)
+        return recorded(case, self.made.telemetry, inflow_m3h, station_record, self.pump_record, rng) | by_hand
 
 
 def run(case: TruthCase, *, truth: bool = True) -> Recording:
@@ -86,6 +89,7 @@ def passage_of(case: TruthCase) -> Passage:
     made, sensor_rng = truth_of(case)
     station_record = np.empty((2, case.seconds))
     pump_record = np.empty((5, len(case.station.pump), case.seconds))
+    step_record = np.empty(case.seconds, dtype=np.int64)
     around = made.around
     kernel.integrate(
         made.spec,
@@ -97,11 +101,19 @@ def passage_of(case: TruthCase) -> Passage:
         around.speed_factor,
         around.level_error_m,
         around.is_level_stuck,
+        orders_of(case.steps, len(case.station.pump)),
+        first_place(),
         station_record,
         pump_record,
+        step_record,
     )
     return Passage(
-        case=case, made=made, sensor_rng=sensor_rng, station_record=station_record, pump_record=pump_record
+        case=case,
+        made=made,
+        sensor_rng=sensor_rng,
+        station_record=station_record,
+        pump_record=pump_record,
+        step_record=step_record,
     )
 
 

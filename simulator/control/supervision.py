@@ -4,6 +4,7 @@ The rules are those of `rules` and `drive`; here they act on the state of the pl
 """
 
 from wetwell.protocols.jit import inlined
+from wetwell.protocols.orders import Orders
 from wetwell.simulator.control.drive import next_frequency_hz
 from wetwell.simulator.control.rules import NOTHING, controlled_frequency_hz, next_in_rotation, wanted_change
 from wetwell.simulator.forcing import Forcing
@@ -13,8 +14,16 @@ from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 
 @inlined
-def supervise(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, level_m: float) -> None:
-    """Let the controller command at most one start or stop; pumps that are off or tripped are released first."""
+def supervise(
+    plant: PlantRecords, state: PlantState, forcing: Forcing, orders: Orders, step: int, second: int, level_m: float
+) -> None:
+    """Let the controller command at most one start or stop; pumps that are off or tripped are released first.
+
+    While a step of the orders is by hand, the operator commands instead.
+    """
+    if step >= 0 and orders.is_by_hand[step]:
+        _obey(plant, state, forcing, orders, step, second)
+        return
     station, now, pumps, started = plant.station[0], state.station[0], state.pumps, state.started
     running = 0
     for k in range(now.running):
@@ -43,6 +52,36 @@ def supervise(plant: PlantRecords, state: PlantState, forcing: Forcing, second: 
 
 
 @inlined
+def _obey(plant: PlantRecords, state: PlantState, forcing: Forcing, orders: Orders, step: int, second: int) -> None:
+    """Command those pumps that a step wants to run, and release all others."""
+    now, pumps, started = state.station[0], state.pumps, state.started
+    running = 0
+    for k in range(now.running):
+        i = started[k]
+        if orders.speed_ratio[step, i] > 0.0 and not forcing.is_tripped[i, second]:
+            started[running] = i
+            running += 1
+        else:
+            pumps[i].is_commanded = False
+            pumps[i].dwell_left_s = plant.station[0].dwell_s
+    for i in range(pumps.size):
+        if orders.speed_ratio[step, i] > 0.0 and not pumps[i].is_commanded and not forcing.is_tripped[i, second]:
+            pumps[i].is_commanded = True
+            started[running] = i
+            running += 1
+            _note_start(state, i)
+    now.running = running
+
+
+@inlined
+def _note_start(state: PlantState, i: int) -> None:
+    """Note that a pump starts now."""
+    for k in range(state.recent_starts.shape[1] - 1, 0, -1):
+        state.recent_starts[i, k] = state.recent_starts[i, k - 1]
+    state.recent_starts[i, 0] = state.station[0].second
+
+
+@inlined
 def _next_pump(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int) -> int:
     """Pump that starts next, its start noted; -1 if none may."""
     limit, now_s, starts = plant.station[0].starts_per_hour, state.station[0].second, state.recent_starts
@@ -55,9 +94,7 @@ def _next_pump(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         )
     chosen = next_in_rotation(plant.station[0].rotation, state.station[0].turn, state.pumps)
     if chosen != NOTHING:
-        for k in range(starts.shape[1] - 1, 0, -1):
-            starts[chosen, k] = starts[chosen, k - 1]
-        starts[chosen, 0] = now_s
+        _note_start(state, chosen)
     return chosen
 
 
@@ -82,9 +119,10 @@ def _control_level(plant: PlantRecords, state: PlantState, level_m: float) -> No
 
 
 @inlined
-def drive(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int) -> None:
+def drive(plant: PlantRecords, state: PlantState, forcing: Forcing, orders: Orders, second: int) -> None:
     """Move each drive on by a second; a tripped drive loses its pump at once."""
-    station = plant.station[0]
+    station, step = plant.station[0], state.place[2]
+    is_by_hand = step >= 0 and orders.is_by_hand[step]
     for i in range(state.pumps.size):
         pump = state.pumps[i]
         if pump.frequency_hz <= 0.0 and not pump.is_commanded:
@@ -95,12 +133,15 @@ def drive(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int)
             pump.frequency_hz = 0.0
             continue
         nominal_hz = plant.pumps[i].nominal_frequency_hz
+        wanted_hz = state.station[0].wanted_frequency_hz
+        if is_by_hand and orders.speed_ratio[step, i] > 0.0:
+            wanted_hz = orders.speed_ratio[step, i] * nominal_hz
         pump.frequency_hz = next_frequency_hz(
             pump.frequency_hz,
             pump.is_commanded,
             nominal_hz / station.ramp_s,
             station.min_frequency_hz,
-            min(state.station[0].wanted_frequency_hz, nominal_hz),
+            min(wanted_hz, nominal_hz),
             pump.dwell_left_s,
         )
         if not pump.is_commanded and pump.frequency_hz <= station.min_frequency_hz:

@@ -107,7 +107,17 @@ def secrets(schemas: ModuleType) -> tuple[dict[str, dict[str, str]], str]:
 def test_all_files_belong_to_it_and_nothing_is_there_twice():
     assert {path.name for path in FOLDER.glob("*.yaml")} == {*KUSTOMIZATION["resources"], "kustomization.yaml"}
     assert len(set(IDS)) == len(IDS)
-    assert list(WORKLOADS) == ["router", "branch", "scheduler", "worker", "fleet", "historian", "alarms", "dashboard"]
+    assert list(WORKLOADS) == [
+        "router",
+        "branch",
+        "scheduler",
+        "worker",
+        "fleet",
+        "historian",
+        "alarms",
+        "watch",
+        "dashboard",
+    ]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -311,7 +321,7 @@ def test_addresses_are_those_of_services_and_the_network_lets_them_through():
     wanted = {(name, *address) for name in PODS for address in called(name)}
     wanted |= {("worker", "branch", 7447)}  # by the settings of the controller
     wanted |= {(source, "worker", port) for source in ("scheduler", "worker", "fleet") for port in (8788, 8789)}
-    assert len(wanted) == 4 + 1 + 2 + 1 + 6
+    assert len(wanted) == 5 + 1 + 2 + 1 + 6
     for source, target, port in wanted:
         assert port in ports(target).values()
         assert target == "worker" or port in {each["port"] for each in SERVICES[target]["spec"]["ports"]}
@@ -332,7 +342,8 @@ def test_passwords_users_and_roles_fit(secrets, tmp_path):
     assert len(set((users | behind).values())) == len(users | behind)
     assert set(behind) == {environment("fleet")["WETWELL_ZENOH__USER"]}
     at_root = {
-        environment(name).get("WETWELL_ZENOH__USER") for name in ("branch", "historian", "alarms", "dashboard")
+        environment(name).get("WETWELL_ZENOH__USER")
+        for name in ("branch", "historian", "alarms", "watch", "dashboard")
     }
     assert set(users) == at_root | {"gateway"}
     (tmp_path / "tokens").write_text(data["tokens"]["tokens"])

@@ -25,11 +25,11 @@ ROOT = Path(__file__).parents[2]
 DOCKER = ROOT / "docker"
 COMPOSE = yaml.safe_load((DOCKER / "compose.yaml").read_text())
 OURS = {name: service for name, service in COMPOSE["services"].items() if service["image"].startswith("${WETWELL")}
-HAS_ALL_DAEMONS = {"gateway", "historian", "alarms", "dashboard"} <= set(Settings.model_fields)
+HAS_ALL_DAEMONS = {"gateway", "historian", "alarms", "watch", "dashboard"} <= set(Settings.model_fields)
 
 
 def test_a_site_is_complete():
-    assert set(OURS) == {"router", "simulator", "gateway", "detector", "historian", "alarms", "dashboard"}
+    assert set(OURS) == {"router", "simulator", "gateway", "detector", "historian", "alarms", "watch", "dashboard"}
     profiles = {profile for service in COMPOSE["services"].values() for profile in service.get("profiles", [])}
     assert profiles == {"demo", "plant", "postgres", "monitoring"}
 

@@ -62,6 +62,7 @@ def test_what_is_killed_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             assert said(findings, "warning") == [
                 "station 'alpha': the historian does not answer",
                 "historian is not running",
+                "watch is not running",
                 "dashboard is not running",
             ]
             assert "station 'alpha' pump 3: learning, 0.0 h ago" in said(findings, "ok")

@@ -134,7 +134,7 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
         services = set()
         for sample in statuses:
             services.add(json.loads(sample.payload.to_string())["service"])
-            if services >= {"simulator", "detector", "alarms", "historian", "dashboard"}:
+            if services >= {"simulator", "detector", "alarms", "historian", "watch", "dashboard"}:
                 break
         with socket.create_connection(("127.0.0.1", modbus_port), timeout=10) as plc:
             plc.sendall(bytes.fromhex("000100000006010400000002"))  # read level_m by function code 04

@@ -11,6 +11,7 @@ from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.decoding import M, decoded
+from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
@@ -102,6 +103,12 @@ class SiteView:
         alarm = self._decoded(Alarm, payload)
         if alarm is not None:
             self._change(alarm.station).handle_alarm(alarm)
+
+    def handle_gap(self, payload: bytes) -> None:
+        """Take the gap between a station and its simulator."""
+        gap = self._decoded(GapWatch, payload)
+        if gap is not None:
+            self._change(gap.station).handle_gap(gap)
 
     def handle_status(self, payload: bytes) -> None:
         """Take the health figures of a service."""

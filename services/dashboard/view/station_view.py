@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from wetwell.protocols.messages.alarm import Alarm, AlarmState
+from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
@@ -69,6 +70,7 @@ class StationView:
         self._fresh_samples: list[Sample] = []
         self._fresh: dict[str, Any] = {}
         self._model: str | None = None
+        self._gap: GapWatch | None = None
         self._levels: tuple[float, ...] = ()
         self._floor_m = 0.0
         self._names: list[str | None] = []
@@ -167,6 +169,11 @@ class StationView:
         self._alarms[alarm.id] = alarm
         self._fresh.setdefault("alarms", {})[alarm.id] = alarm.encode().decode()
 
+    def handle_gap(self, gap: GapWatch) -> None:
+        """Take the gap to the simulator."""
+        self._gap = gap
+        self._fresh["gap"] = gap.encode().decode()
+
     def handle_status(self, status: Status) -> None:
         """Take the health figures of a service; those of a simulator say whether its plant is held."""
         if status.service == "simulator":
@@ -189,7 +196,7 @@ class StationView:
     @property
     def is_known(self) -> bool:
         """Whether anything but its name was ever heard of it."""
-        known = (self._last_verdicts, self._model, self._alarms, self._statuses, self._alive)
+        known = (self._last_verdicts, self._model, self._gap, self._alarms, self._statuses, self._alive)
         return self.sample is not None or any(known)
 
     def settle(self, now_s: float, stale_s: float) -> bool:
@@ -226,8 +233,9 @@ class StationView:
             parts.append('"begins":true')
         if "verdicts" in fresh:
             parts.append(f'"verdicts":[{",".join(fresh["verdicts"])}]')
-        if "model" in fresh:
-            parts.append(f'"model":{fresh["model"]}')
+        for name in ("model", "gap"):
+            if name in fresh:
+                parts.append(f'"{name}":{fresh[name]}')
         for name in ("alarms", "statuses"):
             if name in fresh:
                 parts.append(f'"{name}":[{",".join(fresh[name].values())}]')
@@ -253,6 +261,8 @@ class StationView:
         ]
         if self._model is not None:
             parts.append(f'"model":{self._model}')
+        if self._gap is not None:
+            parts.append(f'"gap":{self._gap.encode().decode()}')
         return ",".join(parts)
 
     def summary(self) -> dict[str, Any]:
@@ -270,6 +280,7 @@ class StationView:
             "levels": self._levels[-1:],
             "floor": self._floor_m,
             "alarms": len(active),
+            "gap": None if self._gap is None else {"matters": self._gap.matters, "doubled": self._gap.is_doubled},
             "unacknowledged": sum(alarm.state in WAITING for alarm in active),
         }
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import compiled, inlined
+from wetwell.protocols.orders import Orders, first_place, go_on, valves
 from wetwell.sim2real.truth.elastic.machine import flow_against, given_frequency, head_terms, input_w, turned
 from wetwell.sim2real.truth.elastic.pipe import TICK_S, advance, carried, reach_loss
 from wetwell.sim2real.truth.elastic.spec import FILLET, PRISMATIC, ElasticSpec
@@ -23,8 +24,8 @@ TICKS = round(1.0 / TICK_S)
 DAY_S = 86_400.0
 LEVEL, READING = range(2)
 COMMAND, FLOW, HEAD, POWER, METER = range(5)
-_SPEED, _FREQUENCY, _RATIO, _RAGS, _OPEN, _BACK_S, _FIRST_FILTER, _ON, _TOLD_FLOW = range(5, 14)
-_MACHINE_ROWS = 14
+_SPEED, _FREQUENCY, _RATIO, _RAGS, _OPEN, _BACK_S, _FIRST_FILTER, _ON, _TOLD_FLOW, _SET = range(5, 15)
+_MACHINE_ROWS = 15
 _SEEN_FIRST, _SEEN, _AIR, _REGISTER, _RUNNING, _TURN = range(6)
 _HEADER_TRIES = 30
 _OLDEST_S = 120
@@ -55,8 +56,16 @@ def area_m2(spec: ElasticSpec, level_m: float) -> float:
     return spec.area_m2 * (spec.floor_share + (1.0 - spec.floor_share) * share)
 
 
-def integrate(spec: ElasticSpec, level_m: float, weather: Weather, station: Floats, pumps: Floats) -> None:
-    """Fill the records, (2, n) and (5, pumps, n), with the state at each whole second.
+def integrate(
+    spec: ElasticSpec,
+    level_m: float,
+    weather: Weather,
+    orders: Orders,
+    station: Floats,
+    pumps: Floats,
+    steps: Integers,
+) -> None:
+    """Fill the records, (2, n), (5, pumps, n) and (n,), with the state at each whole second.
 
     Parameters
     ----------
@@ -64,8 +73,10 @@ def integrate(spec: ElasticSpec, level_m: float, weather: Weather, station: Floa
     level_m : float
         At the beginning. [m]
     weather : Weather
-    station, pumps : arrays
-        Rows `LEVEL`, `READING`, and `COMMAND` to `METER`; SI units.
+    orders : Orders
+        Of an operator.
+    station, pumps, steps : arrays
+        Rows `LEVEL`, `READING`, and `COMMAND` to `METER`, SI units; step of the orders in force.
     """
     count, nodes = spec.main_of.size, (spec.reaches.size, int(spec.reaches.max()) + 1)
     state = State(
@@ -80,7 +91,7 @@ def integrate(spec: ElasticSpec, level_m: float, weather: Weather, station: Floa
     rows: dict[str, Any] = {
         name: np.ascontiguousarray(value) for name, value in spec._asdict().items() if isinstance(value, np.ndarray)
     }
-    _integrate(spec._replace(**rows), level_m, weather, state, station, pumps)
+    _integrate(spec._replace(**rows), level_m, weather, orders, first_place(), state, station, pumps, steps)
 
 
 class State(NamedTuple):
@@ -101,7 +112,15 @@ class State(NamedTuple):
 
 @compiled
 def _integrate(
-    spec: ElasticSpec, level_m: float, weather: Weather, state: State, station: Floats, pumps: Floats
+    spec: ElasticSpec,
+    level_m: float,
+    weather: Weather,
+    orders: Orders,
+    place: Integers,
+    state: State,
+    station: Floats,
+    pumps: Floats,
+    steps: Integers,
 ) -> None:
     pump, well, readings, seconds = state.pump, state.well, state.readings, weather.loss.size
     polled_s = -spec.poll_s
@@ -113,9 +132,17 @@ def _integrate(
         for row in range(METER + 1):
             for i in range(pump.shape[1]):
                 pumps[row, i, second] = pump[row, i]
+        steps[second] = place[2]
+        shut, inlet = valves(orders, place[2])
+        ordered = go_on(orders, place, reading_m)
+        is_by_hand = ordered >= 0 and orders.is_by_hand[ordered]
+        if is_by_hand:
+            _obey(orders, ordered, well, state.order, pump)
+        else:
+            pump[_SET] = 1.0
         for part in range(TICKS):
             now_s = step * TICK_S
-            if (step - spec.scan_first) % spec.scan_steps == 0:
+            if not is_by_hand and (step - spec.scan_first) % spec.scan_steps == 0:
                 if now_s - polled_s >= spec.poll_s:
                     polled_s = now_s
                     old = int(min(spec.old_s, second, _OLDEST_S - 1))
@@ -124,9 +151,9 @@ def _integrate(
             _drive(spec, pump, weather.speed, second, now_s)
             lift_m = spec.lift_m - spec.lift_slope * (level_m - spec.lift_reference_m) + weather.lift_m[second]
             lift_m = max(lift_m + well[_AIR], 0.0)
-            out = _pump(spec, state, lift_m, weather.loss[second], level_m)
+            out = _pump(spec, state, lift_m, shut * weather.loss[second], level_m)
             share = (part + 0.5) * TICK_S
-            arriving = (1.0 - share) * weather.inflow[second] + share * weather.inflow[second + 1]
+            arriving = inlet * ((1.0 - share) * weather.inflow[second] + share * weather.inflow[second + 1])
             arriving += spec.seepage * (1.0 + spec.seepage_swing * math.sin(2.0 * math.pi * now_s / DAY_S))
             level_m = _filled(spec, level_m, arriving - out)
             _sense(spec, pump, well, level_m, out)
@@ -151,12 +178,31 @@ def _scan(spec: ElasticSpec, well: Floats, order: Integers, pump: Floats) -> Non
 
 
 @inlined
+def _obey(orders: Orders, ordered: int, well: Floats, order: Integers, pump: Floats) -> None:
+    """Switch pumps as an operator wants it, and set their speeds."""
+    count = 0
+    for k in range(int(well[_RUNNING])):
+        if orders.speed_ratio[ordered, order[k]] > 0.0:
+            order[count] = order[k]
+            count += 1
+    for i in range(order.size):
+        ratio = orders.speed_ratio[ordered, i]
+        if ratio > 0.0 and pump[_ON, i] <= 0.0:
+            order[count] = i
+            count += 1
+        pump[_ON, i] = 1.0 if ratio > 0.0 else 0.0
+        pump[_SET, i] = ratio if ratio > 0.0 else 1.0
+    well[_RUNNING] = count
+
+
+@inlined
 def _drive(spec: ElasticSpec, pump: Floats, speed_factor: Floats, second: int, now_s: float) -> None:
     """Ramps of the drives, and the shafts that follow them."""
     swing = 1.0 + spec.hunting * math.sin(2.0 * math.pi * now_s / spec.hunting_s)
     for i in range(pump.shape[1]):
-        told = pump[COMMAND, i] + (TICK_S if pump[_ON, i] > 0.0 else -TICK_S) / spec.ramp_s
-        told = 0.0 if told < 1e-9 else min(told, 1.0)
+        wanted, reach = pump[_SET, i] if pump[_ON, i] > 0.0 else 0.0, TICK_S / spec.ramp_s
+        told = min(max(wanted, pump[COMMAND, i] - reach), pump[COMMAND, i] + reach)
+        told = 0.0 if told < 1e-9 else told
         pump[COMMAND, i] = told
         pump[_FREQUENCY, i] = given_frequency(spec, told) * swing
         pump[_SPEED, i] = turned(spec, pump[_FREQUENCY, i], pump[_SPEED, i], pump[FLOW, i], spec.rated_flow[i])

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.orders import orders_of
 from wetwell.protocols.quantities import AnalogueQuantity, pump_column
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Sensors, Station
@@ -26,7 +27,7 @@ _STILL_M3H = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElasticPassage:
-    """What the plant has noted of a case: (2, n) and (5, pumps, n) in rows as in `kernel`, SI units."""
+    """What the plant has noted of a case: (2, n), (5, pumps, n) and (n,) as in `kernel`, SI units."""
 
     case: TruthCase
     truth: ElasticTruth
@@ -34,6 +35,7 @@ class ElasticPassage:
     meter_seed: int
     station_record: Floats
     pump_record: Floats
+    step_record: Integers
 
     def recording(self, *, truth: bool = False) -> Recording:
         """The recording; the level and flows that are true beside it, if asked for."""
@@ -64,9 +66,11 @@ class ElasticPassage:
             return arrived(read(values, is_alive > 0.0, noise, instrument), instrument)
 
         always = np.ones(seconds)
+        by_hand = orders_of(self.case.steps, len(self.case.station.pump)).columns(self.step_record)
+        metered_m3h = self.truth.metered_inflow[:-1] * HOUR_S * by_hand.get("inlet_open", 1.0)
         columns = {
             "level_m": arrived(reading_m, instruments.of_all.get("level_m", Instrument())),
-            "inflow_m3h": seen("inflow_m3h", self.truth.metered_inflow[:-1] * HOUR_S, always, sensors.inflow_noise),
+            "inflow_m3h": seen("inflow_m3h", metered_m3h, always, sensors.inflow_noise),
         }
         for i, pump in enumerate(self.case.station.pump):
             told, _, head_m, power_w, flow = self.pump_record[:, i]
@@ -82,7 +86,7 @@ class ElasticPassage:
                 pump_column(i + 1, "power_kw"): seen("power_kw", power_w / 1000.0, told, sensors.power_noise),
                 pump_column(i + 1, "running"): (frequency_hz > 0.0).astype(np.float64),
             }
-        return columns
+        return columns | by_hand
 
 
 def run_elastic(case: TruthCase, *, truth: bool = True) -> Recording:
@@ -128,7 +132,16 @@ def passage_of(case: TruthCase) -> ElasticPassage:
             raise ValueError(f"deviation '{deviation.name}' is not one of {', '.join(ELASTIC_DEVIATIONS)}")
         ELASTIC_DEVIATIONS[deviation.name].act(truth, deviation.parameters)
     station_record, pump_record = np.empty((2, seconds)), np.empty((5, pumps, seconds))
-    kernel.integrate(truth.spec, case.initial_level_m, truth.weather, station_record, pump_record)
+    step_record = np.empty(seconds, dtype=np.int64)
+    kernel.integrate(
+        truth.spec,
+        case.initial_level_m,
+        truth.weather,
+        orders_of(case.steps, pumps),
+        station_record,
+        pump_record,
+        step_record,
+    )
     return ElasticPassage(
         case=case,
         truth=truth,
@@ -136,6 +149,7 @@ def passage_of(case: TruthCase) -> ElasticPassage:
         meter_seed=int(meter_rng.integers(2**31)),
         station_record=station_record,
         pump_record=pump_record,
+        step_record=step_record,
     )
 
 

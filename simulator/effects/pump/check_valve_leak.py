@@ -27,6 +27,7 @@ class CheckValveLeak(Effect):
 
     component: ClassVar[Component] = "pump"
     neutral: ClassVar[dict[str, float]] = {"leak_m3h": 0.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["check_valve_leak"] = "check_valve_leak"
     leak_m3h: Annotated[float, limits(0.0, 50.0, "m³/h")]

@@ -28,6 +28,7 @@ class PumpWear(Effect):
 
     component: ClassVar[Component] = "pump"
     neutral: ClassVar[dict[str, float]] = {"head_loss": 0.0, "leak_m3h": 0.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["pump_wear"] = "pump_wear"
     head_loss: Annotated[float, limits(0.0, 0.6, "1")] = 0.0

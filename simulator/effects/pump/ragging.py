@@ -30,6 +30,7 @@ class Ragging(Effect):
 
     component: ClassVar[Component] = "pump"
     neutral: ClassVar[dict[str, float]] = {"speed_loss": 0.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["ragging"] = "ragging"
     speed_loss: Annotated[float, limits(0.0, 0.5, "1")]

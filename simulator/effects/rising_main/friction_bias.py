@@ -26,6 +26,7 @@ class FrictionBias(Effect):
 
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"factor": 1.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["friction_bias"] = "friction_bias"
     factor: Annotated[float, limits(0.2, 5.0, "1")]

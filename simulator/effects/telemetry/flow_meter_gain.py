@@ -25,6 +25,7 @@ class FlowMeterGain(Effect):
     component: ClassVar[Component] = "flow_meter"
     has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"factor": 1.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["flow_meter_gain"] = "flow_meter_gain"
     factor: Annotated[float, limits(0.3, 3.0, "1")]

@@ -25,6 +25,7 @@ class HeadSensorOffset(Effect):
     component: ClassVar[Component] = "head_sensor"
     has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"offset_m": 0.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["head_sensor_offset"] = "head_sensor_offset"
     offset_m: Annotated[float, limits(-20.0, 20.0, "m")]

@@ -25,6 +25,7 @@ class UnmeteredInflow(Effect):
     component: ClassVar[Component] = "sump"
     has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"flow_m3h": 0.0}
+    may_change: ClassVar[bool] = True
 
     name: Literal["unmetered_inflow"] = "unmetered_inflow"
     flow_m3h: Annotated[float, limits(0.0, 500.0, "m³/h")]

@@ -206,7 +206,7 @@ def test_a_name_that_is_not_in_the_library_is_refused(alpha, plain):
 def test_the_command_writes_report_page_and_station(alpha, tmp_path):
     recording = tmp_path / "field.parquet"
     write_recording(record(alpha, [{"name": "head_sensor_offset", "offset_m": 0.8}]), recording)
-    report = diagnose_file(alpha, recording, tmp_path / "out", only=["head_sensor_offset", "friction_bias"])
+    report = diagnose_file(alpha, [recording], tmp_path / "out", only=["head_sensor_offset", "friction_bias"])
     assert [effect.name for effect in report.effects] == ["head_sensor_offset"]
     assert GapReport.model_validate_json((tmp_path / "out" / "report.json").read_text(encoding="utf-8")) == report
     assert load_station(tmp_path / "out" / "station.toml").effect[0].name == "head_sensor_offset"
@@ -220,7 +220,7 @@ def test_nothing_is_written_where_nothing_can_be_diagnosed(alpha, plain, tmp_pat
     recording = tmp_path / "short.parquet"
     write_recording(_rows(plain, slice(0, 900)), recording)
     with pytest.raises(RecordingError, match=r"short\.parquet: the recording is 900 s long"):
-        diagnose_file(alpha, recording, tmp_path / "out")
+        diagnose_file(alpha, [recording], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

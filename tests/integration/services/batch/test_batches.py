@@ -140,7 +140,7 @@ def test_diagnoses_are_those_of_single_recordings_and_a_bad_one_is_told(
     ]
     assert run_wetwell("gap", "diagnose", *arguments) == 1
     result = json.loads(capsys.readouterr().out)
-    diagnose_file(alpha, recordings / "good.parquet", tmp_path / "here", only=["friction_bias"])
+    diagnose_file(alpha, [recordings / "good.parquet"], tmp_path / "here", only=["friction_bias"])
     assert files(tmp_path / "there" / "good") == files(tmp_path / "here")
     assert [row["name"] for row in result["diagnoses"]] == ["good"]
     errors = {row["name"]: row["error"] for row in result["failed"]}

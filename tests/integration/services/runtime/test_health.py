@@ -244,7 +244,7 @@ def test_daemons_tell_systemd_http_and_the_log(tmp_path):
 def test_units_are_alike_and_systemd_finds_no_fault_in_them(tmp_path):
     units = sorted(UNITS.glob("*.service"))
     assert [unit.stem for unit in units] == [
-        f"wetwell-{name}" for name in ("alarms", "dashboard", "detector@", "gateway", "historian", "router")
+        f"wetwell-{name}" for name in ("alarms", "dashboard", "detector@", "gateway", "historian", "router", "watch")
     ]
     hardening = {unit.read_text().split("\n\n")[2] for unit in units}
     assert len(hardening) == 1
@@ -258,14 +258,14 @@ def test_units_are_alike_and_systemd_finds_no_fault_in_them(tmp_path):
     target = (UNITS / "wetwell.target").read_text()
     for unit in units:
         text = unit.read_text()
-        command = unit.stem.removeprefix("wetwell-").rstrip("@")
+        name = unit.stem.removeprefix("wetwell-").rstrip("@")
+        command = {"watch": "gap watch"}.get(name, name)
         assert f"ExecStart=wetwell {command}" in text
         for wanted in ("Type=notify", "WatchdogSec=60", "Restart=always", "DynamicUser=yes", "LoadCredential="):
             assert wanted in text
         assert unit.name in target or unit.stem.endswith("@")
         # systemd looks the command up in its own path, in which it need not be here.
-        name = unit.name.replace("@", "@alpha")
-        (tmp_path / name).write_text(text.replace("ExecStart=wetwell", "ExecStart=true"))
+        (tmp_path / unit.name.replace("@", "@alpha")).write_text(text.replace("ExecStart=wetwell", "ExecStart=true"))
     (tmp_path / "wetwell.target").write_text(target)
     if shutil.which("systemd-analyze") is None:
         pytest.skip("systemd-analyze is not here")

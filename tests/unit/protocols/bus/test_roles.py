@@ -13,6 +13,7 @@ from wetwell.protocols.bus.keys import (
     alarm_act_key,
     alarm_key,
     alive_key,
+    gap_key,
     history_key,
     model_key,
     order_key,
@@ -65,6 +66,10 @@ def test_the_default_table_lets_only_the_gateway_and_the_simulator_put_samples()
         ("historian", "read", alarm_key("*")),
         ("historian", "answer", history_key("*")),
         ("alarms", "read", verdict_key("*")),
+        ("alarms", "read", gap_key("*")),
+        ("watch", "publish", gap_key("alpha")),
+        ("watch", "ask", history_key("alpha")),
+        ("dashboard", "read", gap_key("*")),
         ("alarms", "read", status_key("*", "gateway")),
         ("alarms", "read", alive_key("*", "*")),
         ("alarms", "publish", alarm_key("alpha", "a")),
@@ -83,7 +88,7 @@ def test_the_default_table_lets_each_daemon_do_its_duty(role, act, key):
     assert any(zenoh.KeyExpr(allowed).includes(zenoh.KeyExpr(key)) for allowed in getattr(found, act))
 
 
-@pytest.mark.parametrize("role", ["gateway", "detector", "historian", "alarms", "dashboard", "simulator"])
+@pytest.mark.parametrize("role", ["gateway", "detector", "historian", "alarms", "watch", "dashboard", "simulator"])
 def test_each_daemon_may_show_that_it_lives(role):
     table = access_of(load_settings(flags={"zenoh": {"access_control": "default"}}).zenoh).table
     assert table is not None

@@ -108,6 +108,8 @@ def test_an_input_has_one_name_everywhere():
         "--stations",
         "--name",
         "--trial",
+        "--diagnosis",
+        "--diagnoses",
     }
     arguments = [(name, p.name) for name, c in commands() for p in c.params if p.param_type_name == "argument"]
     assert arguments == []

@@ -37,7 +37,7 @@ def site() -> Survey:
         samples={"alpha": [sample(number) for number in range(5)]},
         verdicts={("alpha", 1): verdict},
         statuses={("alpha", "detector"): status(sample_age_s=1.0, dropped=0.0)},
-        alive={("alpha", "detector"), *(("_site", name) for name in ("historian", "alarms", "dashboard"))},
+        alive={("alpha", "detector"), *(("_site", name) for name in ("historian", "alarms", "watch", "dashboard"))},
         histories={"alpha": History(station="alpha", kind="samples")},
         report=AlarmReport(time=NOW_NS, rates={"is_flood": 0.0}, standing={"unacknowledged": 1}),
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wetwell.sim2real.recording.by_hand import left_alone
 from wetwell.sim2real.recording.drives import Drives
 from wetwell.sim2real.recording.excerpt import BLANK_S, PART_S, excerpt
 from wetwell.sim2real.recording.traces import Traces
@@ -20,6 +21,8 @@ def traces(seconds):
         level_m=second.astype(float),
         inflow_m3h=None,
         signals={"flow_m3h": 2.0 * hz},
+        by_hand=left_alone(seconds),
+        part=np.zeros(seconds, dtype=int),
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wetwell.sim2real.recording.by_hand import left_alone
 from wetwell.sim2real.recording.drives import Drives
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.observer import constant_observer, forced_observer, hides_cycles, row_observer
@@ -30,6 +31,8 @@ def traces(alpha):
         level_m=level_m,
         inflow_m3h=np.full(SECONDS, 100.0),
         signals={},
+        by_hand=left_alone(SECONDS),
+        part=np.zeros(SECONDS, dtype=int),
     )
 
 

@@ -7,6 +7,7 @@ const SAYS = {
   detector: t("The detector is not running: nobody judges this station now. What stands here is what it said last."),
   historian: t("The historian is not running: nothing of the past can be shown, and nothing is kept."),
   alarms: t("The alarm service is not running: no alarm is raised, and an empty list means nothing."),
+  watch: t("The watch of the gap is not running: nobody compares this station with its simulator now."),
   source: t("No samples come: what stands here is old. See the alarms, and check PLC, gateway and network."),
 };
 

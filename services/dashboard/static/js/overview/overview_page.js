@@ -29,6 +29,7 @@ const RANKS = {
   level: (a, b) => (b.level ?? -1) - (a.level ?? -1),
   flow: (a, b) => (b.flow ?? -1) - (a.flow ?? -1),
   power: (a, b) => (b.power ?? -1) - (a.power ?? -1),
+  gap: (a, b) => (b.gap?.matters ?? -1) - (a.gap?.matters ?? -1),
   alarms: (a, b) => b.unacknowledged - a.unacknowledged || b.alarms - a.alarms,
 };
 

@@ -23,6 +23,7 @@ const COLUMNS = [
   ["level", t("Level"), "middle"],
   ["flow", t("Flow, {unit}", { unit: "m³/h" }), "number wide"],
   ["power", t("Power, {unit}", { unit: "kW" }), "number wide"],
+  ["gap", t("Gap"), "number wide"],
   ["alarms", t("Alarms"), "number middle"],
   [null, t("Last sample"), "wide"],
 ];
@@ -106,12 +107,12 @@ function stationLine() {
   const pumps = pumpIcons();
   const fill = html("span", { class: "fill" });
   const level = html("span", { class: "value" });
-  const cells = Object.fromEntries(["flow", "power", "alarms", "time", "cause", "stage", "since", "severity", "trend", "cost"].map((each) => [each, html("span")]));
+  const cells = Object.fromEntries(["flow", "power", "gap", "alarms", "time", "cause", "stage", "since", "severity", "trend", "cost"].map((each) => [each, html("span")]));
   const cell = (kind, ...children) => html("div", { role: "cell", class: `cell ${kind}` }, ...children);
   const element = html("div", { class: "line", role: "row" },
     cell("", chip), cell("", name), cell("cause", cells.cause), cell("cause", cells.stage), cell("cause", cells.since), cell("cause middle", cells.severity), cell("cause middle", cells.trend), cell("cause number", cells.cost),
     cell("middle", pumps.element), cell("gauge middle", html("span", { class: "track", "aria-hidden": "true" }, fill), level),
-    cell("number wide", cells.flow), cell("number wide", cells.power), cell("number middle", cells.alarms), cell("wide", cells.time));
+    cell("number wide", cells.flow), cell("number wide", cells.power), cell("number wide", cells.gap), cell("number middle", cells.alarms), cell("wide", cells.time));
   let shown = "";
 
   function show(station, place, height, isLinked) {
@@ -145,6 +146,9 @@ function stationLine() {
       say(node, text);
       grade(node, value == null ? "never" : grade_, reason);
     }
+    const gap = station.gap ? figure(station.gap.matters, 1) : "";
+    say(cells.gap, station.gap?.doubled ? t("{size}, doubled", { size: gap }) : gap);
+    cells.gap.className = station.gap?.doubled ? "is-urgent" : "";
     say(cells.alarms, station.alarms ? `${station.alarms}${station.unacknowledged ? ` (${t("{count} new", { count: station.unacknowledged })})` : ""}` : "");
     cells.alarms.className = station.unacknowledged ? "is-urgent" : "";
     say(cells.time, `${clock(station.time)}${reason ? `, ${reason}` : ""}`);

@@ -10,6 +10,7 @@ import { t } from "../base/words.js";
 import { alarmPanel } from "./alarm_panel.js";
 import { causePanel } from "./cause_panel.js";
 import { episodePanel } from "./episode_panel.js";
+import { gapPanel } from "./gap_panel.js";
 import { kpiPanel } from "./kpi_panel.js";
 import { maintenancePanel } from "./maintenance_panel.js";
 import { pastStore } from "./past_store.js";
@@ -21,7 +22,7 @@ import { StationState } from "./station_state.js";
 import { trendPanel } from "./trend_panel.js";
 import { wellPanel } from "./well_panel.js";
 
-const PANELS = [wellPanel, planePanel, causePanel, trendPanel, episodePanel, alarmPanel, maintenancePanel, kpiPanel, qualityPanel];
+const PANELS = [wellPanel, planePanel, causePanel, trendPanel, episodePanel, alarmPanel, maintenancePanel, kpiPanel, gapPanel, qualityPanel];
 const AGES_MS = 1000;
 
 export function stationPage(name, main, showLink) {

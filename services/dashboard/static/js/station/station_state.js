@@ -31,6 +31,7 @@ export class StationState {
     this.alive = [];
     this.site = [];
     this.model = null;
+    this.gap = null;
   }
 
   /** Looks at a moment of the past: {verdicts, row}, verdicts by pump; null for now. */
@@ -88,6 +89,10 @@ export class StationState {
       this.alive = frame.alive;
       this.site = frame.site ?? [];
       changed.add("services");
+    }
+    if (frame.gap) {
+      this.gap = frame.gap;
+      changed.add("gap");
     }
     if (frame.model) {
       this.model = frame.model;

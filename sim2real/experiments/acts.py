@@ -1,0 +1,150 @@
+"""The acts that are tried: a row each in `ACTS`."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from wetwell.protocols.orders import Step
+from wetwell.sim2real.experiments.act import Act, Site
+
+REPEATS = 2
+"""How often what is quickly over is done: once could be chance."""
+RUN_S = 600.0
+"""Longest run that is asked for. [s]"""
+IDLE_S = 3600.0
+SHUT_S = 60.0
+"""How long a station is left standing, and a pump held against a shut valve. [s]"""
+BEFORE_SHUT_S = 60.0
+"""Run before the valve is shut. [s]"""
+STANDING_S = 300.0
+"""How long the wet well is watched with nothing coming in and nothing running. [s]"""
+RATIOS = (0.9, 0.8, 0.7)
+"""Speeds that are tried, as shares of nominal. [1]"""
+PEOPLE_ON_SITE = 2
+TRAVEL_H = 1.0
+"""Who turns a valve by hand goes there, and not alone; way there and back. [h]"""
+
+
+def at_speeds(site: Site) -> Iterator[Act]:
+    """One pump at a lower speed."""
+    for i in site.apart:
+        for ratio in RATIOS:
+            if ratio > site.least_ratio:
+                run = _run(site, ratio, i)
+                yield Act(
+                    name=f"pump_{i + 1}_at_{round(100 * ratio)}",
+                    sentence=f"Let the wet well fill, then run pump {i + 1} alone at {100 * ratio:g} % of its speed, "
+                    f"{REPEATS} times.",
+                    steps=(site.fill(site.brim_m), run) * REPEATS,
+                )
+
+
+def tour(site: Site) -> Iterator[Act]:
+    """One session of many duties: ever lower speeds, two pumps where there are two, and a low stop."""
+    for i in site.apart:
+        together = tuple(dict.fromkeys((i, *site.ready)))[:2]
+        low = replace(_run(site, 1.0, i), low_m=site.low_m)
+        others = [_run(site, 1.0, *together), low] if len(together) > 1 else [low]
+        for lowest in RATIOS[1:]:
+            ratios = [ratio for ratio in RATIOS if ratio >= lowest]
+            if lowest <= site.least_ratio:
+                continue
+            runs = [*(_run(site, ratio, i) for ratio in ratios), *others]
+            said = f"at {', '.join(f'{100 * ratio:g}' for ratio in ratios)} % of its speed"
+            pair = f", with pump {together[1] + 1}" if len(together) > 1 else ""
+            yield Act(
+                name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}",
+                sentence=f"Let the wet well fill before each run, and run pump {i + 1} {said}{pair}, and at last "
+                f"down to {site.low_m:.2f} m, under the stop level.",
+                steps=tuple(step for run in runs for step in (site.fill(site.brim_m), run)),
+            )
+
+
+def two_together(site: Site) -> Iterator[Act]:
+    """Two pumps at once."""
+    if len(site.ready) > 1:
+        first, second = site.ready[:2]
+        yield Act(
+            name=f"pumps_{first + 1}_and_{second + 1}",
+            sentence=f"Let the wet well fill, then run pumps {first + 1} and {second + 1} together, {REPEATS} times.",
+            steps=(site.fill(site.brim_m), _run(site, 1.0, first, second)) * REPEATS,
+        )
+
+
+def idle(site: Site) -> Iterator[Act]:
+    """An hour in which nothing runs, and a long run after it."""
+    i = site.ready[0]
+    stand = Step(longest_s=IDLE_S, speed_ratio=site.speeds(0.0), high_m=site.brim_m)
+    yield Act(
+        name="idle_hour",
+        sentence="Empty the wet well, let all pumps stand for an hour or until it is full, then pump it down with "
+        f"pump {i + 1}.",
+        steps=(_run(site, 1.0, i), stand, _run(site, 1.0, i)),
+    )
+
+
+def pumped_low(site: Site) -> Iterator[Act]:
+    """From the highest to the lowest level in one run."""
+    for i in site.apart:
+        run = replace(_run(site, 1.0, i), low_m=site.low_m)
+        yield Act(
+            name=f"pump_{i + 1}_low",
+            sentence=f"Let the wet well fill, then run pump {i + 1} down to {site.low_m:.2f} m, "
+            f"under the stop level, {REPEATS} times.",
+            steps=(site.fill(site.brim_m), run) * REPEATS,
+        )
+
+
+def against_valve(site: Site) -> Iterator[Act]:
+    """A pump against a shut valve."""
+    for i in site.apart:
+        run = _run(site, 1.0, i)
+        yield Act(
+            name=f"pump_{i + 1}_valve_shut",
+            sentence=f"Run pump {i + 1}, shut its valve for {SHUT_S:g} s while it runs, and open it again.",
+            steps=(
+                site.fill(site.brim_m),
+                replace(run, longest_s=BEFORE_SHUT_S),
+                replace(run, longest_s=SHUT_S, is_valve_shut=True),
+                replace(run, longest_s=BEFORE_SHUT_S),
+            ),
+            people=PEOPLE_ON_SITE,
+            travel_h=TRAVEL_H,
+        )
+
+
+def bucket(site: Site) -> Iterator[Act]:
+    """The wet well as a bucket: nothing comes in, and one pump empties it."""
+    for i in site.apart:
+        yield Act(
+            name=f"bucket_pump_{i + 1}",
+            sentence=f"Let the wet well fill, shut the inlet, watch the level for {STANDING_S / 60:g} minutes, then "
+            f"empty it with pump {i + 1}: its fall is what the flow meter must show.",
+            steps=(
+                site.fill(site.brim_m),
+                Step(longest_s=STANDING_S, speed_ratio=site.speeds(0.0), is_inlet_shut=True),
+                replace(_run(site, 1.0, i), is_inlet_shut=True),
+            ),
+            people=PEOPLE_ON_SITE,
+            travel_h=TRAVEL_H,
+        )
+
+
+def _run(site: Site, ratio: float, *pumps: int) -> Step:
+    """Some pumps run until the wet well is as empty as usual, or as full as can be."""
+    return Step(longest_s=RUN_S, speed_ratio=site.speeds(ratio, *pumps), low_m=site.stop_m, high_m=site.high_m)
+
+
+ACTS: tuple[Callable[[Site], Iterator[Act]], ...] = (
+    at_speeds,
+    tour,
+    two_together,
+    idle,
+    pumped_low,
+    against_valve,
+    bucket,
+)
+
+
+def acts_of(site: Site) -> tuple[Act, ...]:
+    """All acts that can be done at a site."""
+    return tuple(act for row in ACTS for act in row(site))

@@ -1,0 +1,112 @@
+"""What an act is expected to tell: how far it reduces the entropy of the posterior, by the diagnosis' likelihood."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import solve
+from scipy.special import entr, logsumexp
+
+from wetwell.protocols.arrays import Floats
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.attribution.possible import PossibleSet
+from wetwell.sim2real.likelihood.cells import Cells, cells_of
+from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Form, projected
+from wetwell.sim2real.likelihood.evidence import POORLY
+from wetwell.sim2real.likelihood.posterior import TEMPER
+from wetwell.sim2real.recording.joining import joined
+from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.conditions import conditions_of
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.effects import effects_of
+
+
+def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet]) -> Floats:
+    r"""(sets,) logarithm of how probable recordings are together under each set, as far as it is known by now.
+
+    $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
+
+    with the residuals r at the fit, the covariance C of the cells, in each block the likelier of that of a good and
+    of a poor model, and changes d of the residuals along the directions of the set's spread.
+
+    Raises
+    ------
+    ValueError
+        If the recordings show nothing.
+    """
+    traces = joined([traces_of(recording, station, least_starts=1) for recording in recordings])
+    regimes = regimes_of(traces, station)
+    replay = Replay(traces, station, effects_of(station))
+    plain = replay.run()
+    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
+    if residuals.bins.size == 0:
+        raise ValueError("what is recorded shows nothing")
+    condition = conditions_of(residuals.bins, traces, station)
+    cells = cells_of(residuals.bins, condition)
+
+    def means(effects: Sequence[object]) -> Floats:
+        return cells.means(residuals.of(replay.run(effects)))  # type: ignore[arg-type]
+
+    without = means(())
+    found = []
+    for one in sets:
+        best = means(one.effects)
+        moved = [means(effects) - best for effects in one.spread]
+        signature = np.abs(without - best)
+        form = Form(signature=signature, swinging=np.zeros(signature.size))
+        found.append(_log_probability(cells, best, np.array([*moved]).reshape(len(moved), best.size).T, form))
+    return np.array(found)
+
+
+def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form) -> float:
+    columns = np.column_stack([residuals, moved])
+    inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
+    for block in cells.blocks:
+        own = form.chosen(block.rows)
+        each = [
+            (chance - 0.5 * log_det, products)
+            for chance, allowance in ((float(np.log(1.0 - POORLY)), GOOD), (float(np.log(POORLY)), POOR))
+            for products, log_det in (projected(block, columns[block.rows], own, allowance),)
+        ]
+        likelier, products = max(each, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
+        inner += products
+        log += likelier
+    precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]
+    taken = float(crossed @ solve(precision, crossed, assume_a="pos")) if crossed.size else 0.0
+    return log - 0.5 * (float(inner[0, 0]) - taken + float(np.linalg.slogdet(precision)[1]))
+
+
+def told(probability: Floats, logs: Floats) -> Floats:
+    r"""(truths, sets) posterior after an act, by what the truth is.
+
+    $$P'(S \mid T) \propto P(S)\, p(z_T \mid S)^\eta$$
+
+    Parameters
+    ----------
+    probability : (sets,) array
+        Before; sums to 1.
+    logs : (truths, sets) array
+        Logarithm of how probable what the act shows under each truth is, beside what was known.
+    """
+    weights = np.log(np.maximum(probability, 1e-300)) + TEMPER * logs
+    return np.asarray(np.exp(weights - logsumexp(weights, axis=1, keepdims=True)), dtype=np.float64)
+
+
+def information_bits(probability: Floats, after: Floats) -> float:
+    """Expected reduction of the entropy of the posterior. [bit].
+
+    Parameters
+    ----------
+    probability : (sets,) array
+    after : (truths, sets) array
+        As `told` makes it.
+
+    Examples
+    --------
+    >>> even = np.array([0.5, 0.5])
+    >>> information_bits(even, np.eye(2)), information_bits(even, np.full((2, 2), 0.5))
+    (1.0, 0.0)
+    """
+    return float((entr(probability).sum() - probability @ entr(after).sum(axis=1)) / np.log(2.0))

@@ -1,0 +1,1 @@
+"""What diagnosed stations say of one that is not diagnosed yet."""
