@@ -25,7 +25,7 @@ curve = [36.0, -0.02333, -1.3333e-4]
 [[pump]]
 curve = [36.0, -0.02333, -1.3333e-4]
 """
-SLIP = '[[effect]]\nname = "motor_slip"\nslip = 0.03\n'
+SLIP = '[[effect]]\nname = "motor_slip"\nslip = 0.015\n'
 
 
 def wetwell(*arguments):
@@ -54,7 +54,7 @@ def answers(tmp_path_factory):
     begin = ("--begin", "2025-02-01T06:00:00Z")
     act = ("--act", first / "report.json")
     for call in (
-        ("simulate", "--station", real, "--days", "0.25", "--seed", "5", "--out", before),
+        ("simulate", "--station", real, "--days", "0.0834", "--seed", "5", "--out", before),
         ("gap", "diagnose", "--station", north, "--recording", before, "--out", first, *only),
         ("simulate", "--station", real, "--days", "0.1", "--seed", "6", *act, *begin, "--out", during),
         ("gap", "diagnose", "--station", north, "--recording", before, "--recording", during, "--out", both, *only),
@@ -76,7 +76,7 @@ def test_the_first_act_tells_what_the_first_recording_could_not(answers):
         next(one["probability"] for one in told["posterior"] if one["effects"] == ["motor_slip"])
         for told in (first, both)
     ]
-    assert chances[1] > max(chances[0], 0.9)
+    assert chances[1] > max(chances[0], 0.8)
     assert [one["is_by_hand"] for one in both["recordings"]] == [False, True]
 
 
