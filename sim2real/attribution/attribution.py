@@ -13,7 +13,7 @@ from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.intervals import are_there, intervals_of
+from wetwell.sim2real.attribution.intervals import intervals_of
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
@@ -26,9 +26,6 @@ from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
-
-LEAST_DOUBTED = 0.02
-"""Probability from which the intervals of a set are looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,20 +102,18 @@ def attribute(
     training, validation = halves(residuals.bins, replay.traces.pumps)
     fitter = Fitter(replay, residuals, training)
     plain = fitter.plain.residuals
-    tested, not_tested = shown_by(candidates, fitter, (training, validation), replay, regimes, each)
+    tested, not_tested = shown_by(candidates, fitter, replay, regimes, each)
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
     condition = conditions_of(residuals.bins, replay.traces, replay.station)
-    cells = cells_of(residuals.bins, condition, has_inflow=replay.traces.inflow_m3h is not None)
-    hypotheses = Hypotheses(fitter, cells, each)
+    hypotheses = Hypotheses(fitter, cells_of(residuals.bins, condition), each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
     hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     tested_names = [fit.names[0] for fit in singles]
-    log_share = partial(priors.log_share, tested=tested_names)
-    posterior = _posterior(fitter, hypotheses, len(singles), log_share)
+    posterior = posterior_of(hypotheses.weights(), len(singles), partial(priors.log_share, tested=tested_names))
     accepted: Fit | None = None
     own: Fit | None = None
     equal: dict[str, tuple[str, ...]] = {}
@@ -141,33 +136,9 @@ def attribute(
         training=training,
         validation=validation,
         posterior=posterior,
-        possible=possible_sets(fitter, cells, hypotheses, posterior),
+        possible=possible_sets(hypotheses, posterior),
         not_tested=not_tested,
     )
-
-
-def _posterior(
-    fitter: Fitter, hypotheses: Hypotheses, library: int, log_share: Callable[[tuple[str, ...]], float]
-) -> tuple[SetProbability, ...]:
-    """Posterior without sets of which an effect may as well not be there, by its interval."""
-    sure: set[tuple[str, ...]] = set()
-    while True:
-        posterior = posterior_of(hypotheses.weights(), library, log_share)
-        doubtful = next(
-            (
-                one.effects
-                for one in posterior
-                if one.verdict == "effect" and one.probability > LEAST_DOUBTED and one.effects not in sure
-            ),
-            None,
-        )
-        if doubtful is None:
-            return posterior
-        fit = hypotheses.of(doubtful).fit
-        if are_there(fit, intervals_of(fitter, fit, fitter.bins)):
-            sure.add(doubtful)
-        else:
-            hypotheses.rule_out(doubtful)
 
 
 def halves(bins: Bins, pumps: int) -> tuple[Flags, Flags]:

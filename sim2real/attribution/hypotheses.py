@@ -1,12 +1,13 @@
 """Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.presence import are_there
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import Form, no_form
@@ -24,7 +25,7 @@ FLEXED = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hypothesis:
-    """A fit with its evidence; `is_possible` tells whether each of its effects matters."""
+    """A fit with its evidence; `is_possible` tells whether each of its effects matters, and is not neutral."""
 
     fit: Fit
     evidence: Evidence
@@ -78,11 +79,6 @@ class Hypotheses:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
 
-    def rule_out(self, effects: Sequence[str]) -> None:
-        """Take a set for impossible: one of its effects may as well not be there."""
-        names = tuple(sorted(effects))
-        self._best[names] = replace(self._best[names], is_possible=False)
-
     def weights(self) -> list[Weight]:
         """What the posterior is made of."""
         possible = self.possible
@@ -95,7 +91,7 @@ class Hypotheses:
         ]
 
     def _flexible(self, one: Hypothesis) -> float:
-        return flexible_factor(self._cells, one.evidence.residuals, one.form)
+        return flexible_factor(self._cells, one.evidence, one.form)
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))
@@ -106,7 +102,7 @@ class Hypotheses:
         slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
         form = self._form(fit, signatures)
         found = evidence(cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form)
-        is_possible = all(self._matters(one) for one in signatures)
+        is_possible = all(self._matters(one) for one in signatures) and are_there(fit, found)
         return Hypothesis(fit=fit, evidence=found, form=form, is_possible=is_possible)
 
     def _signature(self, fit: Fit, member: int, residuals: Floats) -> Floats:
@@ -117,19 +113,16 @@ class Hypotheses:
         return np.zeros(residuals.size) if fewer is None else self._means(fewer) - residuals
 
     def _form(self, fit: Fit, signatures: Sequence[Floats]) -> Form:
-        cells = self._cells
-        swings = np.zeros(cells.group.size)
-        counts = np.bincount(cells.block)
+        swings = np.zeros(self._cells.group.size)
         for effect, signature in zip(fit.effects, signatures, strict=True):
             if type(effect).force is not Effect.force:
-                swings += (np.bincount(cells.block, signature**2) / counts)[cells.block]
+                swings += self._cells.block_squares(signature)
         return Form(
             signature=np.sqrt(np.sum(np.square(signatures), axis=0)),
             swinging=np.sqrt(swings),
         )
 
     def _matters(self, signature: Floats) -> bool:
-        """Whether an effect does more than what is material, in some group."""
+        """Whether an effect does more than what is allowed, in some group."""
         cells = self._cells
-        squares = cells.group_sums(signature**2) / np.bincount(cells.group)
-        return bool(np.any(squares > cells.group_material**2))
+        return bool(np.any(cells.group_squares(signature) > cells.group_squares(cells.allowed)))

@@ -77,27 +77,6 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
     return np.asarray(ends, dtype=np.float64)
 
 
-def are_there(fit: Fit, ends: Floats) -> bool:
-    """Whether each effect has a strength whose interval is without its neutral value.
-
-    Parameters
-    ----------
-    fit : Fit
-    ends : (parameters, 2) array
-        As of `intervals_of`.
-    """
-    intervals = np.split(ends, np.cumsum([point.size for point in fit.points])[:-1])
-    for candidate, own in zip(fit.candidates, intervals, strict=True):
-        strengths = [
-            (low - free.normalised(free.neutral), high - free.normalised(free.neutral))
-            for free, (low, high) in zip(candidate.free, own, strict=True)
-            if free.neutral is not None
-        ]
-        if strengths and not any(low > 0.0 or high < 0.0 for low, high in strengths):
-            return False
-    return True
-
-
 def _sums(values: Floats, group: Integers) -> Floats:
     """(groups, parameters) sums of rows."""
     return np.array([np.bincount(group, column) for column in values.T]).T

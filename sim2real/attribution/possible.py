@@ -5,12 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
-from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import projected
 from wetwell.sim2real.likelihood.posterior import CREDIBLE, TEMPER, SetProbability
-from wetwell.sim2real.residuals.asinh_loss import slopes_of
 from wetwell.simulator.effects.effect import Effect
 
 MOST_SETS = 6
@@ -42,15 +39,11 @@ class PossibleSet:
         return tuple(sorted(effect.name for effect in self.effects))
 
 
-def possible_sets(
-    fitter: Fitter, cells: Cells, hypotheses: Hypotheses, posterior: Sequence[SetProbability]
-) -> tuple[PossibleSet, ...]:
+def possible_sets(hypotheses: Hypotheses, posterior: Sequence[SetProbability]) -> tuple[PossibleSet, ...]:
     """Sets within `CREDIBLE` of the probability of all that can be simulated, the most probable first.
 
     Parameters
     ----------
-    fitter : Fitter
-    cells : Cells
     hypotheses : Hypotheses
     posterior : sequence of SetProbability
         Best first; that something unknown acts cannot be simulated and is left out.
@@ -59,7 +52,7 @@ def possible_sets(
         PossibleSet(
             effects=hypothesis.fit.effects,
             probability=one.probability,
-            spread=tuple(moved.effects for moved in _spread(fitter, cells, hypothesis)),
+            spread=tuple(moved.effects for moved in _spread(hypothesis)),
         )
         for one in _credible(one for one in posterior if one.verdict != "unknown")
         for hypothesis in (hypotheses.of(one.effects),)
@@ -74,20 +67,17 @@ def _credible(sets: Iterable[SetProbability]) -> list[SetProbability]:
     return sets[: min(needed, MOST_SETS)]
 
 
-def _spread(fitter: Fitter, cells: Cells, hypothesis: Hypothesis) -> list[Fit]:
+def _spread(hypothesis: Hypothesis) -> list[Fit]:
     r"""The fit moved along the axes of its covariance, by a standard deviation each.
 
     $$\Sigma = \left(\eta J^T C^{-1} J + 12 I\right)^{-1}$$
 
-    in units of the ranges of the parameters, with the power η of the likelihood.
+    in units of the ranges of the parameters, with the power η of the likelihood and its precision at the fit.
     """
     fit = hypothesis.fit
     if fit.position.size == 0:
         return []
-    slopes = slopes_of(fitter.slopes(fit), fit.residuals)
-    columns = np.array([cells.means(column) for column in slopes.T]).T
-    curvature = next(products for products, _ in projected(cells, columns, hypothesis.form))
-    values, axes = np.linalg.eigh(TEMPER * curvature + np.eye(fit.position.size) / EVEN_VARIANCE)
+    values, axes = np.linalg.eigh(TEMPER * hypothesis.evidence.precision + np.eye(fit.position.size) / EVEN_VARIANCE)
     moved = []
     for value, axis in zip(values, axes.T, strict=True):
         step = axis / np.sqrt(value)

@@ -39,7 +39,6 @@ class NotTested:
 def shown_by(
     candidates: Sequence[Candidate],
     fitter: Fitter,
-    halves: tuple[Flags, Flags],
     replay: Replay,
     regimes: Regimes,
     each: Each,
@@ -50,14 +49,13 @@ def shown_by(
     ----------
     candidates : sequence of Candidate
     fitter : Fitter
-    halves : two (bins,) arrays
-        Bins that are fitted, and those on which gains are measured: an effect has to move both.
+        An effect has to move the bins that it fits.
     replay : Replay
     regimes : Regimes
     each : callable
         Tries candidates, perhaps side by side.
     """
-    least = tuple((half, _least_gain(fitter.bins, half)) for half in halves)
+    least = _least_gain(fitter.bins, fitter.rows)
     are_moving = list(each(lambda candidate: _moves(candidate, fitter, least, replay), candidates))
     tested = tuple(candidate for candidate, moves in zip(candidates, are_moving, strict=True) if moves)
     names = {candidate.name for candidate in tested}
@@ -72,7 +70,7 @@ def _least_gain(bins: Bins, rows: Flags) -> float:
     return min(LEAST_GAIN, max(LEAST_BY_CHANCE, float(np.sum(bins.tolerance[rows] ** 2))))
 
 
-def _moves(candidate: Candidate, fitter: Fitter, least: tuple[tuple[Flags, float], ...], replay: Replay) -> bool:
+def _moves(candidate: Candidate, fitter: Fitter, least: float, replay: Replay) -> bool:
     if candidate.name in OF_TELEMETRY:
         is_level = candidate.name == "level_quantisation" and np.isfinite(replay.traces.level_m).any()
         return replay.traces.is_each_second or (bool(is_level) and replay.traces.span_s == 1)
@@ -81,8 +79,8 @@ def _moves(candidate: Candidate, fitter: Fitter, least: tuple[tuple[Flags, float
         for point in grid:
             tried = fitter.at((candidate,), (point,))
             if tried is not None:
-                squares = (tried.residuals - plain) ** 2
-                if all(float(squares[half].sum()) > gain for half, gain in least):
+                moved = (tried.residuals - plain)[fitter.rows]
+                if float(moved @ moved) > least:
                     return True
     return False
 

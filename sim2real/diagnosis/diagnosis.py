@@ -40,6 +40,7 @@ from wetwell.sim2real.recording.traces import MIN_STARTS, Traces, check_starts, 
 from wetwell.sim2real.replay.plausibility import check_plausible
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.conditions import conditions_of as conditions_of_bins
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import EFFECTS, effects_of
 from wetwell.simulator.effects.effect import Component
@@ -91,7 +92,9 @@ class Diagnosis:
                 for one in self.posterior
             ),
             component_probability=self.component_probability,
-            noise_check=noise_check(self.attribution, self.bins),
+            noise_check=noise_check(
+                self.attribution, self.bins, conditions_of_bins(self.bins, self.traces, self.replay.station)
+            ),
             candidates=self.candidates,
             gap=self.gap,
             closed_loop=closed_loop,

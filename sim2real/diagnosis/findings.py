@@ -4,14 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.attribution import Attribution
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, NoiseCheck, RankedCandidate, Where
 from wetwell.sim2real.diagnosis.shrinkage import cell_gap, gap_of
+from wetwell.sim2real.likelihood.cells import cells_of
+from wetwell.sim2real.likelihood.covariance import expected_squares
 from wetwell.sim2real.recording.regimes import REGIMES
-from wetwell.sim2real.residuals.asinh_loss import squares_of
+from wetwell.sim2real.residuals.asinh_loss import residuals_of, squares_of
 from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.simulator.effects.effect import Component
 
@@ -69,18 +71,22 @@ def ranking(found: Attribution, bins: Bins, rng: np.random.Generator) -> tuple[R
     return tuple(sorted(ranked, key=lambda one: -one.score))
 
 
-def noise_check(found: Attribution, bins: Bins) -> tuple[NoiseCheck, ...]:
+def noise_check(found: Attribution, bins: Bins, condition: Integers) -> tuple[NoiseCheck, ...]:
     """Whether what is left under the answer is as large as noise and a right model make it, by signal and regime."""
-    squares = squares_of(found.after)
-    return tuple(
-        NoiseCheck(
-            signal=SIGNALS[signal],
-            regime=REGIMES[regime],
-            mean_square=float(squares[cell].mean()),
-            noise_share=float(bins.floor[cell].mean()),
+    cells = cells_of(bins, condition)
+    left = cells.means(residuals_of(found.after))
+    checks = []
+    for block in cells.blocks:
+        expected = expected_squares(block)
+        checks.append(
+            NoiseCheck(
+                signal=SIGNALS[block.signal],
+                regime=REGIMES[block.regime],
+                mean_square=float(np.mean(left[block.rows] ** 2 / expected)),
+                noise_share=float(np.mean(block.variance / expected)),
+            )
         )
-        for signal, regime, cell in bins.cells(np.ones(bins.size, dtype=np.bool_))
-    )
+    return tuple(checks)
 
 
 def where_it_lies(

@@ -228,7 +228,7 @@ class UntestedEffect(_Part):
 
 
 class NoiseCheck(_Part):
-    """How large the residuals of a signal in a regime are under the answer.
+    """How large what is left of a signal in a regime is under the answer.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class NoiseCheck(_Part):
     regime : str
         What the station was doing.
     mean_square : float
-        1 is all that a right model may be off. [1]
+        Over what is expected of a good model; more in starts and stops, where a right one may be poor. [1]
     noise_share : float
         What the sensors alone make of that; a right answer lies between it and 1. [1]
     """

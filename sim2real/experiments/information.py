@@ -11,7 +11,8 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
-from wetwell.sim2real.likelihood.covariance import SHARED_FORM, Form, projected
+from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Form, projected
+from wetwell.sim2real.likelihood.evidence import POORLY
 from wetwell.sim2real.likelihood.posterior import TEMPER
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of
@@ -25,11 +26,10 @@ from wetwell.simulator.effects import effects_of
 def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet]) -> Floats:
     r"""(sets,) logarithm of how probable recordings are together under each set, as far as it is known by now.
 
-    $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad
-    K = C + \sum_k d_k d_k^T + s^2 \sum_b f_b f_b^T$$
+    $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
 
-    with the residuals r at the fit, the covariance C of the cells, changes d of the residuals along the directions of
-    the set's spread, and errors of form by block.
+    with the residuals r at the fit, the covariance C of the cells, in each block the likelier of that of a good and
+    of a poor model, and changes d of the residuals along the directions of the set's spread.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
     if residuals.bins.size == 0:
         raise ValueError("what is recorded shows nothing")
     condition = conditions_of(residuals.bins, traces, station)
-    cells = cells_of(residuals.bins, condition, has_inflow=traces.inflow_m3h is not None)
+    cells = cells_of(residuals.bins, condition)
 
     def means(effects: Sequence[object]) -> Floats:
         return cells.means(residuals.of(replay.run(effects)))  # type: ignore[arg-type]
@@ -61,15 +61,21 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
 
 
 def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form) -> float:
-    blocks = np.zeros((residuals.size, len(cells.block_names)))
-    blocks[np.arange(residuals.size), cells.block] = SHARED_FORM * form.signature
-    columns = np.column_stack([residuals, moved, blocks[:, np.any(blocks != 0.0, axis=0)]])
-    logs = []
-    for products, log_det in projected(cells, columns, form):
-        inner, crossed = products[1:, 1:] + np.eye(products.shape[0] - 1), products[1:, 0]
-        taken = float(crossed @ solve(inner, crossed, assume_a="pos")) if crossed.size else 0.0
-        logs.append(-0.5 * (products[0, 0] - taken + log_det + float(np.linalg.slogdet(inner)[1])))
-    return float(logsumexp(logs) - np.log(len(logs)))
+    columns = np.column_stack([residuals, moved])
+    inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
+    for block in cells.blocks:
+        own = form.chosen(block.rows)
+        each = [
+            (chance - 0.5 * log_det, products)
+            for chance, allowance in ((float(np.log(1.0 - POORLY)), GOOD), (float(np.log(POORLY)), POOR))
+            for products, log_det in (projected(block, columns[block.rows], own, allowance),)
+        ]
+        likelier, products = max(each, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
+        inner += products
+        log += likelier
+    precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]
+    taken = float(crossed @ solve(precision, crossed, assume_a="pos")) if crossed.size else 0.0
+    return log - 0.5 * (float(inner[0, 0]) - taken + float(np.linalg.slogdet(precision)[1]))
 
 
 def told(probability: Floats, logs: Floats) -> Floats:

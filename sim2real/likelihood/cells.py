@@ -1,16 +1,49 @@
 """What the likelihood is of: the mean of the residuals of a group in a cycle."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.recording.regimes import REGIMES
-from wetwell.sim2real.residuals.bins import LEVEL, Bins
+from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
 SPANS = 32
 """More than there are spans since a regime began."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """Cells of one signal in one regime: errors of one block say nothing of those of another.
+
+    Attributes
+    ----------
+    signal, regime : int
+        Indices into `SIGNALS` and `REGIMES`.
+    rows : (k,) array
+        Which of all cells.
+    group, cycle : (k,) arrays
+        Numbers from 0 within the block.
+    variance, allowed : (k,) arrays
+        As of `Cells`.
+    """
+
+    signal: int
+    regime: int
+    rows: Integers
+    group: Integers
+    cycle: Integers
+    variance: Floats
+    allowed: Floats
+
+    def group_sums(self, values: Floats) -> Floats:
+        """(groups, ...) sums of (k, ...) values."""
+        return _sums(self.group, values)
+
+    def cycle_sums(self, values: Floats) -> Floats:
+        """(cycles, ...) sums of (k, ...) values."""
+        return _sums(self.cycle, values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,102 +59,90 @@ class Cells:
         Cell of each bin.
     counts : (cells,) array
         Bins of each cell.
-    group, cycle, block : (cells,) arrays
+    group : (cells,) array
         Numbers from 0.
-    first : (groups,) array
-        First cell of each group.
     variance : (cells,) array
-        Of noise and of what a right model may be off in one cycle.
-    material : (cells,) array
-        Size under which a difference is none.
-    shares_cycle : (cells,) array
-        Whether an error of a cycle is common to the cell and others: a level whose inflow nobody measures.
-    block_names : tuple of (int, int)
-        Signal and regime of each block.
+        Of the noise of the sensors, and of nothing else.
+    allowed : (cells,) array
+        Size under which a difference is none: what is material, and what a right model may be off.
+    blocks : tuple of Block
+        All cells, each in one of them.
     """
 
     of_bin: Integers
     counts: Floats
     group: Integers
-    cycle: Integers
-    block: Integers
-    first: Integers
     variance: Floats
-    material: Floats
-    shares_cycle: Flags
-    block_names: tuple[tuple[int, int], ...]
+    allowed: Floats
+    blocks: tuple[Block, ...]
 
     def means(self, values: Floats) -> Floats:
         """(cells,) means of (bins,) values."""
         return np.asarray(np.bincount(self.of_bin, values, self.counts.size) / self.counts, dtype=np.float64)
 
-    def group_sums(self, values: Floats) -> Floats:
-        """(groups, ...) sums of (cells, ...) values."""
-        return np.asarray(np.add.reduceat(values, self.first, axis=0), dtype=np.float64)
+    def group_squares(self, values: Floats) -> Floats:
+        """(groups,) mean squares of (cells,) values."""
+        return np.asarray(np.bincount(self.group, values**2) / np.bincount(self.group), dtype=np.float64)
 
-    @property
-    def group_material(self) -> Floats:
-        """(groups,) size under which an offset that all cycles share is none."""
-        return np.asarray(self.group_sums(self.material) / np.diff(np.r_[self.first, self.group.size]))
-
-    def chosen(self, rows: Integers) -> "Cells":
-        """Some of the cells in their order, whole groups; what the bins are is lost."""
-        group = np.unique(self.group[rows], return_inverse=True)[1]
-        return replace(
-            self,
-            of_bin=np.zeros(0, dtype=np.int64),
-            counts=self.counts[rows],
-            group=group,
-            cycle=self.cycle[rows],
-            block=self.block[rows],
-            first=np.flatnonzero(np.diff(group, prepend=-1)),
-            variance=self.variance[rows],
-            material=self.material[rows],
-            shares_cycle=self.shares_cycle[rows],
-        )
+    def block_squares(self, values: Floats) -> Floats:
+        """(cells,) mean squares of (cells,) values in the block of each."""
+        squares = np.zeros(values.size)
+        for block in self.blocks:
+            squares[block.rows] = np.mean(values[block.rows] ** 2)
+        return squares
 
 
-def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
+def cells_of(bins: Bins, condition: Integers) -> Cells:
     r"""Cells of the bins of a recording.
 
-    $$\sigma^2 = \overline{f} / n + (1 - \overline{f})$$
+    $$\sigma^2 = \overline{f} / n, \qquad a^2 = m^2 + 1 - \overline{f}$$
 
-    with the share f of a bin's variance that is noise, which its n bins average away, and the rest, which they share.
+    with the share f of a bin's variance that is noise, which the n bins of a cell average away, the material size m,
+    and the rest of that variance, which is what a right model may be off.
 
     Parameters
     ----------
     bins : Bins
     condition : (bins,) array
         As `conditions_of` makes it: what is in another condition is in another group.
-    has_inflow : bool
-        Whether the inflow is measured.
     """
     key = (condition * (int(group_of(bins).max(initial=0)) + 1) + group_of(bins)) * SPANS + phase(bins)
     groups, group_of_bin = np.unique(key, return_inverse=True)
     cycles = int(bins.cycle.max(initial=0)) + 1
     keys, of_bin = np.unique(group_of_bin * cycles + bins.cycle, return_inverse=True)
-    group = keys // cycles
+    group, cycle = keys // cycles, keys % cycles
     signal, regime = (
         np.zeros(groups.size, dtype=np.int64) + of_groups
         for of_groups in (_first(group_of_bin, bins.signal), _first(group_of_bin, bins.regime))
     )
-    blocks, block = np.unique(signal[group] * len(REGIMES) + regime[group], return_inverse=True)
     counts = np.bincount(of_bin).astype(np.float64)
     noise = np.bincount(of_bin, bins.floor) / counts
-    return Cells(
-        of_bin=of_bin,
-        counts=counts,
-        group=group,
-        cycle=np.unique(keys % cycles, return_inverse=True)[1],
-        block=block,
-        first=np.flatnonzero(np.diff(group, prepend=-1)),
-        variance=noise / counts + 1.0 - noise,
-        material=np.bincount(of_bin, bins.material) / counts,
-        shares_cycle=(signal[group] == LEVEL) & (not has_inflow),
-        block_names=tuple((int(key) // len(REGIMES), int(key) % len(REGIMES)) for key in blocks),
-    )
+    variance, allowed = noise / counts, np.hypot(np.bincount(of_bin, bins.material) / counts, np.sqrt(1.0 - noise))
+    block_of = (signal * len(REGIMES) + regime)[group]
+    blocks = []
+    for key in np.unique(block_of):
+        rows = np.flatnonzero(block_of == key)
+        blocks.append(
+            Block(
+                signal=int(key) // len(REGIMES),
+                regime=int(key) % len(REGIMES),
+                rows=rows,
+                group=np.unique(group[rows], return_inverse=True)[1],
+                cycle=np.unique(cycle[rows], return_inverse=True)[1],
+                variance=variance[rows],
+                allowed=allowed[rows],
+            )
+        )
+    return Cells(of_bin=of_bin, counts=counts, group=group, variance=variance, allowed=allowed, blocks=tuple(blocks))
 
 
 def _first(group: Integers, values: Integers) -> Integers:
     """(groups,) value of the first member of each group."""
     return values[np.unique(group, return_index=True)[1]]
+
+
+def _sums(number: Integers, values: Floats) -> Floats:
+    count = int(number.max(initial=-1)) + 1
+    if values.ndim == 1:
+        return np.asarray(np.bincount(number, values, count), dtype=np.float64)
+    return np.array([np.bincount(number, column, count) for column in values.T]).T

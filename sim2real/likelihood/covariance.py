@@ -1,24 +1,37 @@
-"""Covariance of the cells: noise, what is material, errors of form, and an inflow that nobody measures."""
+"""Covariance of the cells of a block: noise, what a right model may be off, and errors of form of the effects."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import cho_factor, cho_solve
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.likelihood.cells import Cells
+from wetwell.sim2real.likelihood.cells import Block, Cells
 
+OFFSET = 0.25
+"""Standard deviation of the error of a good model that cycles share, over what is allowed. [1]"""
 CHANGING = 0.5
-"""Share of the material size by which a difference may change from cycle to cycle and is still none. [1]"""
-SHARED_FORM = 0.05
-"""Standard deviation of the error of form of a right effect, as a share of what it explains. [1]"""
-CHANGING_FORM = 0.01
-"""The same of the part that changes from cycle to cycle. [1]"""
+"""Ratio of the part of an error that changes from cycle to cycle to the part that cycles share. [1]"""
+GOOD_FORM = 0.07
+"""Standard deviation of the error of form of a good effect, as a share of what it explains. [1]"""
+POOR_FORM = 0.35
+"""The same of a poor one, as in seconds of starts; an error of the model is then as large as is allowed. [1]"""
 SWING = 0.5
 """The same where an effect is known by how much it swings in time, and not by its course. [1]"""
-CYCLE_SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Standard deviations of an error that a cycle has in common, each as likely as another; in units of `deviation`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allowance:
+    """Standard deviations of errors: in units of what is allowed, and as shares of what the effects explain."""
+
+    offset: float
+    change: float
+    form: float
+    changing_form: float
+
+
+GOOD = Allowance(offset=OFFSET, change=CHANGING * OFFSET, form=GOOD_FORM, changing_form=CHANGING * GOOD_FORM)
+POOR = Allowance(offset=1.0, change=CHANGING, form=POOR_FORM, changing_form=CHANGING * POOR_FORM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,74 +59,63 @@ def no_form(cells: Cells) -> Form:
     return Form(signature=np.zeros(cells.group.size), swinging=np.zeros(cells.group.size))
 
 
-def projected(
-    cells: Cells, columns: Floats, form: Form, offset_scale: float = 1.0, cycle_scale: float = 1.0
-) -> Iterator[tuple[Floats, float]]:
+def expected_squares(block: Block) -> Floats:
+    """(k,) mean squares of the residuals of a good model: noise, and what it may be off."""
+    return np.asarray(block.variance + (GOOD.offset**2 + GOOD.change**2) * block.allowed**2, dtype=np.float64)
+
+
+def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -> tuple[Floats, float]:
     r"""Products of columns under the inverse of the covariance, and the logarithm of its determinant.
 
-    $$C = D + \sum_g (m_g^2\, 1_g 1_g^T + s^2\, f_g f_g^T) + \sigma_c^2 \sum_c 1_c 1_c^T, \qquad
-    D = \operatorname{diag}(\sigma^2 + (k m)^2 + (s_c f)^2)$$
+    $$C = \operatorname{diag}\left(\sigma^2 + \tfrac12 (c a)^2 + (s_c f)^2\right) + \sum_c v_c v_c^T
+    + \tfrac{o^2}{2} \left(a a^T + \sum_g a_g a_g^T\right)
+    + \tfrac{s^2}{2} \left(f f^T + \sum_g f_g f_g^T\right), \quad v^2 = \tfrac12 (c a)^2 + (s_w w)^2$$
 
-    with the material size m, the signature f, `CHANGING` k, `SHARED_FORM` s and
-    `CHANGING_FORM` $s_c$; groups g are common to all cycles, and
-    cycles c to all levels whose inflow nobody measures. One after the other for each of `CYCLE_SCALES` $\sigma_c$, or
-    once where no cells share an error.
+    with what is allowed a, the signature f, what swings w, and the `Allowance` of offset o, change c, form s and
+    changing form $s_c$; `SWING` $s_w$; groups g are common to all cycles, and cycles c to all groups.
 
     Parameters
     ----------
-    cells : Cells
-    columns : (cells, k) array
+    block : Block
+    columns : (k, n) array
     form : Form
-    offset_scale, cycle_scale : float
-        Times which what is material is allowed: offsets that all cycles share, and what changes between them.
+        Of the block's cells.
+    allowance : Allowance
 
     Returns
     -------
-    products, log_determinant : (k, k) array, float
+    products, log_determinant : (n, n) array, float
 
     References
     ----------
     .. [1] W. W. Hager, Updating the inverse of a matrix, SIAM Review 31, 1989 (Woodbury's identity).
     """
-    f = form.signature
-    variance = (
-        cells.variance
-        + (cycle_scale * CHANGING * cells.material) ** 2
-        + (CHANGING_FORM * f) ** 2
-        + (SWING * form.swinging) ** 2
-    )
+    changing = 0.5 * (allowance.change * block.allowed) ** 2
+    variance = block.variance + changing + (allowance.changing_form * form.signature) ** 2
+    in_cycle = np.sqrt(changing + (SWING * form.swinging) ** 2)
+    parts = [(block.allowed, allowance.offset)]
+    if np.any(form.signature):
+        parts.append((form.signature, allowance.form))
     weight = 1.0 / variance
-    offset_variance = (offset_scale * cells.group_material) ** 2
-    weighted = columns * weight[:, None]
-    sums = cells.group_sums(np.column_stack([weight, weight * f, weight * f**2]))
-    ones, both, forms = sums[:, 0] + 1.0 / offset_variance, sums[:, 1], sums[:, 2] + SHARED_FORM**-2
-    determinant = ones * forms - both**2
-    inverse = np.array([[forms, -both], [-both, ones]]) / determinant
-    log_det = float(np.sum(np.log(variance)) + np.sum(np.log(determinant * offset_variance * SHARED_FORM**2)))
-    by_group = np.array([cells.group_sums(weighted), cells.group_sums(weighted * f[:, None])])
-    products = columns.T @ weighted - _squared(by_group, inverse, by_group)
-    rows = np.flatnonzero(cells.shares_cycle)
-    if rows.size == 0:
-        yield products, log_det
-        return
-    groups, group = np.unique(cells.group[rows], return_inverse=True)
-    cycles, cycle = np.unique(cells.cycle[rows], return_inverse=True)
-    of_cycle = np.zeros((2, groups.size, cycles.size))
-    of_cycle[0, group, cycle] = weight[rows]
-    of_cycle[1, group, cycle] = weight[rows] * f[rows]
-    inverse = inverse[:, :, groups]
-    inner = np.diag(np.bincount(cycle, weight[rows])) - _squared(of_cycle, inverse, of_cycle)
-    crossed = np.zeros((cycles.size, columns.shape[1]))
-    np.add.at(crossed, cycle, weighted[rows])
-    crossed -= _squared(of_cycle, inverse, by_group[:, groups])
-    values, vectors = eigh(inner)
-    values, turned = np.maximum(values, 0.0), vectors.T @ crossed
-    for scale in CYCLE_SCALES:
-        taken = turned / np.sqrt(values + scale**-2)[:, None]
-        yield products - taken.T @ taken, log_det + float(np.sum(np.log1p(scale**2 * values)))
-
-
-def _squared(left: Floats, inverse: Floats, right: Floats) -> Floats:
-    """Sum over groups of the products of (2, groups, ...) values under (2, 2, groups) inverses."""
-    turned = np.einsum("ijg,jgk->igk", inverse, right)
-    return np.asarray(np.tensordot(left, turned, axes=([0, 1], [0, 1])), dtype=np.float64)
+    groups, cycles = int(block.group.max()) + 1, int(block.cycle.max()) + 1
+    size = groups * len(parts)
+    cycle_weight = 1.0 / (1.0 + block.cycle_sums(weight * in_cycle**2))
+    by_cycle = block.cycle_sums(columns * (weight * in_cycle)[:, None])
+    products = columns.T @ (columns * weight[:, None]) - by_cycle.T @ (by_cycle * cycle_weight[:, None])
+    loaded = np.zeros((cycles, size))
+    inner, crossed = np.zeros((size, size)), np.zeros((size, columns.shape[1]))
+    log_det = float(np.sum(np.log(variance)) - np.sum(np.log(cycle_weight)))
+    for i, (load, deviation) in enumerate(parts):
+        own = slice(i * groups, (i + 1) * groups)
+        loaded[block.cycle, i * groups + block.group] = weight * in_cycle * load
+        crossed[own] = block.group_sums(columns * (weight * load)[:, None])
+        for j, (other, _) in enumerate(parts):
+            inner[own, j * groups : (j + 1) * groups] += np.diag(block.group_sums(weight * load * other))
+        # the inverse of d²/2 (1 + 11ᵀ), of an offset that all groups share and of their own
+        inner[own, own] += 2.0 / deviation**2 * (np.eye(groups) - 1.0 / (1.0 + groups))
+        log_det += groups * np.log(0.5 * deviation**2) + np.log1p(groups)
+    inner -= loaded.T @ (loaded * cycle_weight[:, None])
+    crossed -= loaded.T @ (by_cycle * cycle_weight[:, None])
+    factor = cho_factor(inner, lower=True)
+    log_det += 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
+    return np.asarray(products - crossed.T @ cho_solve(factor, crossed), dtype=np.float64), log_det

@@ -1,15 +1,16 @@
 """How probable the cells are under a set of effects, its parameters and errors of form integrated out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve
-from scipy.special import logsumexp
 
-from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import SHARED_FORM, Form, no_form, projected
+from wetwell.protocols.arrays import Flags, Floats
+from wetwell.sim2real.likelihood.cells import Block, Cells
+from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Allowance, Form, no_form, projected
 
+POORLY = 0.1
+"""Probability that a right model is poor in a group. [1]"""
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
 
@@ -22,22 +23,31 @@ class Evidence:
     ----------
     log : float
         Logarithm of the probability of the cells, but for a constant that all sets share.
+    by_block : (blocks,) array
+        The part of each block, at the most probable parameters.
     residuals : (cells,) array
         At the most probable parameters near the fit.
+    step : (parameters,) array
+        To these parameters from the fit, over their ranges.
+    precision : (parameters, parameters) array
+        Inverse of the covariance of the parameters, over their ranges.
     """
 
     log: float
+    by_block: Floats
     residuals: Floats
+    step: Floats
+    precision: Floats
 
 
 def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evidence:
     r"""Laplace's approximation around a fit.
 
-    $$\ln p(z \mid S) = -\tfrac12 \left(r^T C^{-1} r + \ln\det C + \ln\det(1 + H / 2\pi)\right), \qquad
-    H = J^T C^{-1} J$$
+    $$\ln p(z \mid S) = \sum_b \ln p(r_b \mid \text{poor}_b) + \ln \pi(\text{poor}) - \tfrac12 \ln\det(1 + H / 2\pi),
+    \qquad H = \sum_b J_b^T C_b^{-1} J_b$$
 
-    with the residuals r at the best parameters, their slopes J, and a prior that is even over the range of each
-    parameter. C here holds errors of form by block too, $s^2 f_b f_b^T$.
+    with the residuals r at the best parameters, their slopes J, a prior that is even over the range of each
+    parameter, and in each block b the groups that are poor by what the fit leaves; π has `POORLY` for each of them.
 
     Parameters
     ----------
@@ -53,21 +63,28 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
     count = slopes.shape[1]
-    columns = np.column_stack([residuals, slopes, _by_block(cells, form.signature)])
-    best, logs = -np.inf, []
-    steps: Floats = np.zeros(count)
-    for products, log_volume in projected(cells, columns, form):
-        inner, log_det = _integrated(products, log_volume, count + 1, SHARED_FORM**2)
-        curvature, slope = inner[1:, 1:], inner[1:, 0]
-        step = -solve(curvature + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
-        square = float(inner[0, 0] + 2.0 * step @ slope + step @ curvature @ step)
-        occam = float(np.linalg.slogdet(np.eye(count) + curvature / (2.0 * np.pi))[1])
-        logs.append(-0.5 * (square + log_det + occam))
-        if logs[-1] > best:
-            best, steps = logs[-1], step
+    columns = np.column_stack([residuals, slopes])
+    likely: list[tuple[float, Floats]] = []
+    inner = np.zeros((count + 1, count + 1))
+    for block in cells.blocks:
+        own = form.chosen(block.rows)
+        is_poor = _poor(block, residuals[block.rows], own)
+        loose, loose_form = _loosened(block, own, is_poor)
+        products, log_det = projected(loose, columns[block.rows], loose_form, GOOD)
+        prior = is_poor.sum() * np.log(POORLY) + (~is_poor).sum() * np.log(1.0 - POORLY)
+        likely.append((float(prior) - 0.5 * log_det, products))
+        inner += products
+    precision, slope = inner[1:, 1:], inner[1:, 0]
+    step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
+    along = np.r_[1.0, step]
+    by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products in likely])
+    occam = float(np.linalg.slogdet(np.eye(count) + precision / (2.0 * np.pi))[1])
     return Evidence(
-        log=float(logsumexp(logs) - np.log(len(logs))),
-        residuals=residuals + slopes @ steps,
+        log=float(by_block.sum()) - 0.5 * occam,
+        by_block=by_block,
+        residuals=residuals + slopes @ step,
+        step=step,
+        precision=precision,
     )
 
 
@@ -76,18 +93,27 @@ def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
 
 
-def _by_block(cells: Cells, signature: Floats) -> Floats:
-    """(cells, blocks) the signature, each block in a column of its own."""
-    columns = np.zeros((signature.size, len(cells.block_names)))
-    columns[np.arange(signature.size), cells.block] = signature
-    return columns[:, np.any(columns != 0.0, axis=0)]
+def _poor(block: Block, residuals: Floats, form: Form) -> Flags:
+    """(groups,) whether a group is more probable as a poor one, by its mean and its scatter over the cycles."""
+    counts = block.group_sums(np.ones(residuals.size))
+    mean, noise, allowed, signature = (
+        block.group_sums(values) / counts
+        for values in (residuals, block.variance, block.allowed**2, form.signature**2)
+    )
+    scatter = block.group_sums((residuals - mean[block.group]) ** 2)
+
+    def log(allowance: Allowance) -> Floats:
+        changing = noise + allowance.change**2 * allowed + allowance.changing_form**2 * signature
+        shared = changing / counts + allowance.offset**2 * allowed + allowance.form**2 * signature
+        log_volume = np.log(shared) + (counts - 1.0) * np.log(changing)
+        return np.asarray(-0.5 * (log_volume + mean**2 / shared + scatter / changing), dtype=np.float64)
+
+    return np.asarray(log(POOR) + np.log(POORLY) > log(GOOD) + np.log(1.0 - POORLY))
 
 
-def _integrated(products: Floats, log_det: float, kept: int, variance: float) -> tuple[Floats, float]:
-    """Products of the kept columns, and the determinant, with factors of all further columns integrated out."""
-    rest = products[kept:, kept:] * variance + np.eye(products.shape[0] - kept)
-    if rest.size == 0:
-        return products, log_det
-    turned = solve(rest, products[kept:, :kept], assume_a="pos") * variance
-    inner = products[:kept, :kept] - products[:kept, kept:] @ turned
-    return np.asarray(inner, dtype=np.float64), log_det + float(np.linalg.slogdet(rest)[1])
+def _loosened(block: Block, form: Form, is_poor: Flags) -> tuple[Block, Form]:
+    """A block and its form, as if all were good: what is allowed, and what is explained, is larger in poor groups."""
+    own = is_poor[block.group]
+    allowed = np.where(own, POOR.offset / GOOD.offset, 1.0) * block.allowed
+    signature = np.where(own, POOR.form / GOOD.form, 1.0) * form.signature
+    return replace(block, allowed=allowed), replace(form, signature=signature)

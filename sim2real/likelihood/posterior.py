@@ -9,14 +9,16 @@ from scipy.special import logsumexp
 
 Verdict = Literal["effect", "none", "unknown"]
 
-NONE_PRIOR = 0.3
-"""Probability that nothing of the library acts, before anything is seen. [1]"""
-UNKNOWN_PRIOR = 0.3
-"""Probability that something acts that the library does not hold, alone or beside effects of it. [1]"""
+UNKNOWN_PRIOR = 1.0 / 3.0
+"""Probability that something acts that the library does not hold: as likely as none, and as effects. [1]"""
+NONE_PRIOR = 0.5
+"""Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
 TEMPER = 0.3
-"""Power of the likelihood: bins are not as independent as it takes them to be. [1]"""
+"""Power of the likelihood: its blocks are not as independent as it takes them to be. [1]"""
+MISSED = 0.15
+"""Probability that the truth is not among what was weighed: too small to be seen, or of another form. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""
 
@@ -55,11 +57,12 @@ def posterior_of(
 ) -> tuple[SetProbability, ...]:
     r"""Probabilities of the answers, best first; they sum to 1.
 
-    $$P(S) \propto (1 - u)\,\pi_S\,L_S^\eta, \qquad P(\text{unknown}) \propto u \sum_S \pi_S\,(L_S F_S)^\eta, \qquad
+    $$P(S) = (1 - \epsilon) \frac{(1 - u)\,\pi_S\,L_S^\eta}{Z}, \qquad
+    P(\text{unknown}) = \epsilon + (1 - \epsilon) \frac{u \sum_S \pi_S\,(L_S F_S)^\eta}{Z}, \qquad
     \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
 
-    with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q, `TEMPER` η and
-    n effects in the library.
+    with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q, `TEMPER` η,
+    n effects in the library, the sum Z of the numerators, and `MISSED` ε.
 
     Parameters
     ----------
@@ -80,13 +83,14 @@ def posterior_of(
     >>> far = Weight(effects=("ragging",), log=-90.0, log_flexible=0.0)
     >>> best = posterior_of([Weight(effects=(), log=0.0, log_flexible=-9.0), far], 25)[0]
     >>> best.verdict, round(best.probability, 2)
-    ('none', 0.97)
+    ('none', 0.82)
     """
     priors = np.array([_log_prior(weight.effects, library, log_share) for weight in weights])
     sets = priors + TEMPER * np.array([weight.log for weight in weights])
     unknown = priors + TEMPER * np.array([weight.log + weight.log_flexible for weight in weights])
     logs = np.r_[np.log(1.0 - UNKNOWN_PRIOR) + sets, np.log(UNKNOWN_PRIOR) + logsumexp(unknown)]
-    shares = np.exp(logs - logsumexp(logs))
+    shares = (1.0 - MISSED) * np.exp(logs - logsumexp(logs))
+    shares[-1] += MISSED
     found = [
         SetProbability(
             effects=weight.effects, verdict="effect" if weight.effects else "none", probability=float(share)

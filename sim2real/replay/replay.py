@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.orders import SHUT_LOSS
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
@@ -237,7 +237,8 @@ class Replay:
         plant = self._plant(self.own)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         regime, is_known = regimes_of(traces, station).of_station, np.isfinite(traces.level_m)
-        rows, calm = (is_known & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
+        settled = is_known & _settled(regime)
+        rows, calm = (settled & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
         observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
         tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
         best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
@@ -283,6 +284,14 @@ class Replay:
                 "the station file goes by it"
             )
         return np.array([self.traces.columns[name] for name in names]).reshape(len(names), self.traces.seconds)
+
+
+def _settled(regime: Integers) -> Flags:
+    """(n,) the later half of each time in a regime: what a switch sets off is over, the inflow moves the level."""
+    place = np.arange(regime.size)
+    edges = np.flatnonzero(np.diff(regime)) + 1
+    begin, end = np.r_[0, edges], np.r_[edges, regime.size]
+    return np.asarray(place >= np.repeat(0.5 * (begin + end), end - begin))
 
 
 def later(values: Floats, delay_s: float) -> Floats:

@@ -38,6 +38,10 @@ BY_TIME = (0.6, np.inf)
 """Shares of the largest move of a value whose time was up between which its deadband may be."""
 LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
+STORED_STEPS = (0.01, 0.005, 0.001)
+"""Steps in which a historian stores what came in coarser ones. [m]"""
+COARSE = 2.5
+"""Steps of storage that a coarser one has at least, to be told from it."""
 USUAL_STEP_M = 0.0101
 """Historians store a level to the millimetre or the centimetre: nobody's fault. [m]"""
 STRENGTH = 12.0
@@ -198,12 +202,26 @@ def _has_edge(jumps: Floats) -> bool:
 
 
 def _lattice(values: Floats) -> float:
-    """Step of the lattice that values lie on, 0 without one."""
+    """Step of the lattice that values lie on, 0 without one; a coarse one may have been stored in finer steps."""
     levels = np.unique(np.round(values[np.isfinite(values)], 9))
     steps = np.diff(levels)
-    steps = steps[steps > 1e-7]
+    levels, steps = levels[np.r_[True, steps > 1e-7]], steps[steps > 1e-7]
     if steps.size == 0 or levels.size > 0.2 * np.isfinite(values).sum():
         return 0.0
     step = float(np.median(steps[steps < 1.5 * steps.min()]))
     off = np.abs(steps / step - np.round(steps / step))
-    return step if float(np.mean(off < 0.02)) > LATTICE_SHARE else 0.0
+    if float(np.mean(off < 0.02)) > LATTICE_SHARE:
+        return step
+    stored = _stored_step(levels)
+    place = np.r_[0.0, np.cumsum(np.round(steps / step))]
+    step, first = (float(one) for one in np.polyfit(place, levels, 1))
+    is_coarse = step > COARSE * stored and float(np.max(np.abs(levels - first - step * place))) < 0.75 * stored
+    return step if is_coarse else 0.0
+
+
+def _stored_step(levels: Floats) -> float:
+    """Largest power of ten, or half of one, of which all levels are multiples; 0 if there is none."""
+    for step in STORED_STEPS:
+        if float(np.max(np.abs(levels / step - np.round(levels / step)))) < 1e-3:
+            return step
+    return 0.0

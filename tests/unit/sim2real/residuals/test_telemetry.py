@@ -70,3 +70,18 @@ def test_a_level_that_is_stored_to_a_centimetre_is_no_gap(recorded, step_m, is_t
     assert pattern.quantum == pytest.approx(step_m, rel=0.05)
     assert pattern.rounding(0.0) == (0.0 if is_told else pattern.quantum), "a usual step is excused in any case"
     assert bool(telemetry.bins.size) == is_told
+
+
+@pytest.mark.parametrize(("quantum", "stored"), [(0.0408, 0.01), (0.0337, 0.001), (0.027, 0.0)])
+def test_a_coarse_level_is_told_from_a_held_one_whatever_it_was_stored_in(recorded, quantum, stored):
+    station, recording = recorded
+    coarse = quantum * np.floor(recording.columns["level_m"] / quantum)
+    (found,) = patterns(station, recording, level_m=stored * np.round(coarse / stored) if stored else coarse)
+    assert found.deadband == 0.0
+    assert found.quantum == pytest.approx(quantum, rel=0.02)
+
+
+def test_a_held_level_is_no_coarse_one_in_whatever_it_was_stored(recorded):
+    station, recording = recorded
+    level_m = 0.01 * np.round(held(recording.columns["level_m"], 0.06, 10**6) / 0.01)
+    assert all(pattern.quantum <= 0.01 + 1e-9 for pattern in patterns(station, recording, level_m=level_m))

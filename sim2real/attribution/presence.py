@@ -1,0 +1,55 @@
+"""Whether each effect of a set is there, by what the likelihood leaves open of its strengths."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from wetwell.protocols.arrays import Flags, Floats
+from wetwell.sim2real.attribution.fitting import Fit
+from wetwell.sim2real.likelihood.evidence import Evidence
+
+SURE = 0.95
+"""Probability of the region of an effect's strengths that must not hold neutral. [1]"""
+LEAST_KNOWN = 1.0
+"""Precision from which a parameter is known at all: a standard deviation of its whole range."""
+
+
+def are_there(fit: Fit, found: Evidence) -> bool:
+    r"""Whether no effect's strengths may all be neutral at once.
+
+    $$(x - x_0)^T \Sigma^{-1} (x - x_0) > \chi^2_{.95}$$
+
+    with the strengths x, their neutral values, and the covariance Σ of the likelihood, all other parameters free.
+    A strength without a slope, such as a limit, is there where it is not neutral; its signature tells its worth.
+
+    Parameters
+    ----------
+    fit : Fit
+    found : Evidence
+        Its parameters are those of the fit.
+    """
+    is_known = np.diag(found.precision) > LEAST_KNOWN
+    covariance = np.zeros_like(found.precision)
+    among = np.ix_(is_known, is_known)
+    covariance[among] = np.linalg.pinv(found.precision[among])
+    best = fit.position + found.step
+    first = 0
+    for candidate in fit.candidates:
+        neutral = {
+            first + k: free.normalised(free.neutral)
+            for k, free in enumerate(candidate.free)
+            if free.neutral is not None
+        }
+        first += len(candidate.free)
+        place = np.array(list(neutral), dtype=np.int64)
+        away = best[place] - np.array(list(neutral.values()))
+        if place.size and not _is_away(away, covariance[np.ix_(place, place)], is_known[place]):
+            return False
+    return True
+
+
+def _is_away(away: Floats, covariance: Floats, is_known: Flags) -> bool:
+    if np.any(away[~is_known] != 0.0):
+        return True
+    inverse = np.linalg.pinv(covariance[np.ix_(is_known, is_known)])
+    square = float(away[is_known] @ inverse @ away[is_known])
+    return square > float(chi2.ppf(SURE, is_known.sum()))
