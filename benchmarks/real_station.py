@@ -28,7 +28,7 @@ from wetwell.protocols.recordings.recording import Recording, read_recording
 from wetwell.protocols.station.station_file import EffectTable, Station, load_station
 from wetwell.protocols.timestamps import from_iso, to_iso
 from wetwell.services.batch.conversion import convert_files
-from wetwell.services.batch.gap import THREADS
+from wetwell.services.batch.gap.diagnosis import THREADS
 from wetwell.services.batch.recordings import detect
 from wetwell.services.reports.charts import Series, bar_chart, line_chart
 from wetwell.sim2real.calibration.calibration import calibrate

@@ -59,6 +59,11 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     return Kernel(function, _OPTIONS | {"no_cpython_wrapper": True})
 
 
+def allocating(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function that makes arrays of its own: references are counted, and no code is put in its place."""
+    return Kernel(function, _ALLOCATING)
+
+
 def plain(function: Callable[P, R]) -> Callable[P, R]:
     """The Python function of a kernel that calls no other: for a few numbers, without the compiler."""
     return cast("Callable[P, R]", cast("Any", function).py_func)
@@ -101,10 +106,5 @@ def _numba() -> Any:
     return numba
 
 
-_OPTIONS: dict[str, Any] = {
-    "cache": True,
-    "nogil": True,
-    "error_model": "numpy",
-    "_nrt": False,
-    "forceinline": True,
-}
+_ALLOCATING: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_OPTIONS: dict[str, Any] = _ALLOCATING | {"_nrt": False, "forceinline": True}

@@ -12,10 +12,10 @@ from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.api.result import Picture, StationResult, html_table
 from wetwell.services.api.sources import RecordingSource, StationSource, rows_of, station_of
-from wetwell.services.batch.gap import check_effects, diagnose_rows
+from wetwell.services.batch.gap.diagnosis import check_effects, diagnose_rows
 from wetwell.services.reports.charts import bar_chart
-from wetwell.services.reports.gap_lead import lead
-from wetwell.services.reports.gap_page import gap_page
+from wetwell.services.reports.gap.lead import lead
+from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.diagnosis.report import FoundEffect, GapReport
 from wetwell.sim2real.recording.preparation import Preparation, prepare
 

@@ -187,7 +187,7 @@ def gap_diagnose(
     if prior is not None and is_batch:
         raise ConfigError("gap diagnose: --prior is for one diagnosis: not with --apart, --recordings or --scheduler")
     if is_batch:
-        from wetwell.services.batch.diagnoses import cases_of, diagnose_all
+        from wetwell.services.batch.gap.diagnoses import cases_of, diagnose_all
 
         cases = cases_of(station, given, table, reading)
         processes = min(workers or cores(), max(len(cases), 1))
@@ -198,9 +198,9 @@ def gap_diagnose(
     if station is None:
         raise ConfigError("gap diagnose: give --station FILE with --recording")
     plant = find_station(station)
-    from wetwell.services.batch.gap import diagnose_file
+    from wetwell.services.batch.gap.diagnosis import diagnose_file
     from wetwell.services.batch.watch.prior import read_prior
-    from wetwell.services.reports.gap_terminal import gap_lines, progress_bar
+    from wetwell.services.reports.gap.terminal import gap_lines, progress_bar
 
     known = None if prior is None else read_prior(prior)
     with progress_bar("diagnosis") as progress:
@@ -226,7 +226,7 @@ def gap_experiment(
     """Say which act at the station tells apart what a diagnosis leaves open, and what it costs."""
     import json
 
-    from wetwell.services.batch.experiment import experiments_of
+    from wetwell.services.batch.gap.experiment import experiments_of
     from wetwell.services.reports.experiment_table import experiment_lines
     from wetwell.services.stations import find_station
 
@@ -252,7 +252,7 @@ def gap_replay(
     from wetwell.services.stations import find_station
 
     reading, plant = reading_of(time_zone, as_station=as_station), find_station(station)
-    from wetwell.services.batch.gap import replay_file
+    from wetwell.services.batch.gap.diagnosis import replay_file
 
     print_result(replay_file(plant, recording, out, reading, closed_loop=closed_loop), as_json=as_json)
 
@@ -287,7 +287,7 @@ def gap_watch(
 
     from wetwell.services.batch.watch.history import watch_history
     from wetwell.services.historian.store.opening import open_store
-    from wetwell.services.reports.gap_terminal import progress_bar
+    from wetwell.services.reports.gap.terminal import progress_bar
     from wetwell.services.watch.words import watch_lines
 
     kept = with_history(settings, history).historian

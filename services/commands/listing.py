@@ -153,7 +153,7 @@ def effects_new(
     as_json: JsonOption = False,
 ) -> None:
     """Write the files of a new effect from the correction of a diagnosis, for a person to finish."""
-    from wetwell.services.batch.new_effect import new_effect
+    from wetwell.services.batch.gap.new_effect import new_effect
 
     print_result(new_effect(diagnosis, name, out), as_json=as_json)
 

@@ -55,7 +55,7 @@ def simulate(
     as_json: JsonOption = False,
 ) -> None:
     """Write a simulated recording, with truth columns."""
-    from wetwell.services.batch.experiment import steps_of
+    from wetwell.services.batch.gap.experiment import steps_of
     from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 

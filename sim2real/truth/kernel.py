@@ -14,18 +14,13 @@ References
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar, cast
 
-import numba
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.jit import allocating
 from wetwell.protocols.orders import Orders, go_on, valves
 from wetwell.sim2real.truth.spec import CONE, PRISM, Spec
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 STEPS = 20
 STEP_S = 1.0 / STEPS
@@ -39,12 +34,7 @@ _PLC_ROWS = 5
 _STOPPED = 1e-9
 
 
-def _compiled(function: Callable[P, R]) -> Callable[P, R]:
-    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-    return cast("Callable[P, R]", numba.njit(**options)(function))
-
-
-@_compiled
+@allocating
 def area_m2(spec: Spec, level_m: float) -> float:
     """Cross-section of the wet well at a level. [m²]."""
     if spec.shape == PRISM:
@@ -57,7 +47,7 @@ def area_m2(spec: Spec, level_m: float) -> float:
     return spec.area_m2 * (spec.floor_factor + (1.0 - spec.floor_factor) * share)
 
 
-@_compiled
+@allocating
 def shaft_ratio(command: float, bow: float) -> float:
     """Speed of the shaft for a command: linear, bowed to a half cosine, or to a parabola."""
     if bow >= 0.0:
@@ -65,7 +55,7 @@ def shaft_ratio(command: float, bow: float) -> float:
     return (1.0 + bow) * command - bow * command * command
 
 
-@_compiled
+@allocating
 def torque_ratio(speed: float, flow: float, rated_flow: float) -> float:
     """Torque over the rated one: parabola in the flow, square in the speed."""
     if speed <= 0.0:
@@ -74,7 +64,7 @@ def torque_ratio(speed: float, flow: float, rated_flow: float) -> float:
     return speed**2 * max(0.35 + 0.9 * share - 0.25 * share**2, 0.1)
 
 
-@_compiled
+@allocating
 def pipe_loss(flow: float, spec: Spec) -> tuple[float, float]:
     """Loss of a pipe of coefficient 1 and its derivative: between rough (q²) and Blasius (q^1.75)."""
     rough = flow * flow
@@ -85,7 +75,7 @@ def pipe_loss(flow: float, spec: Spec) -> tuple[float, float]:
     return (1.0 - share) * rough + share * smooth, 2.0 * (1.0 - share) * flow + 1.75 * share * smooth / flow
 
 
-@_compiled
+@allocating
 def pump_head_m(spec: Spec, i: int, speed: float, flow: float, level_m: float) -> tuple[float, float]:
     """Head of a pump at its flange and its derivative by the flow; wear and vortex taken off."""
     inner = flow
@@ -98,7 +88,7 @@ def pump_head_m(spec: Spec, i: int, speed: float, flow: float, level_m: float) -
     return spec.head_factor[i] * head - spec.vortex_m * (sucked * speed) ** 2, spec.head_factor[i] * slope
 
 
-@_compiled
+@allocating
 def integrate(
     spec: Spec,
     level_m: float,
@@ -148,7 +138,7 @@ def integrate(
         _load(spec, pump, well[_LEVEL], voltage_factor[second])
 
 
-@_compiled
+@allocating
 def _decide(spec: Spec, plc: Floats, order: Integers, pump: Floats) -> None:
     """One scan of the PLC: at most one start, in rotation, or one stop, of the pump that started last."""
     running, levels, pumps = int(plc[_RUNNING]), spec.start_m.size, order.size
@@ -172,7 +162,7 @@ def _decide(spec: Spec, plc: Floats, order: Integers, pump: Floats) -> None:
         pump[_ON, order[running - 1]] = 0.0
 
 
-@_compiled
+@allocating
 def _obey(speed_ratio: Floats, plc: Floats, order: Integers, pump: Floats) -> None:
     """Pumps run as an operator wants it; who still runs keeps its place in the order of the starts."""
     running, before = 0, int(plc[_RUNNING])
@@ -190,7 +180,7 @@ def _obey(speed_ratio: Floats, plc: Floats, order: Integers, pump: Floats) -> No
     plc[_RUNNING], plc[_OVER], plc[_UNDER] = running, 0.0, 0.0
 
 
-@_compiled
+@allocating
 def _turn(spec: Spec, pump: Floats, swing: float, speed_factor: Floats) -> None:
     """Move the commands by a step, and with them the speeds that the water sees."""
     for i in range(pump.shape[1]):
@@ -206,7 +196,7 @@ def _turn(spec: Spec, pump: Floats, swing: float, speed_factor: Floats) -> None:
         pump[_SPEED, i] = shaft_ratio(command, spec.ramp_bow) * swing * (1.0 - slip) * (1.0 - rag) * speed_factor[i]
 
 
-@_compiled
+@allocating
 def _move(spec: Spec, pump: Floats, well: Floats, loss_factor: float, extra_lift_m: float) -> tuple[float, float]:
     """Move the water by a step; mean flow out of the wet well and flow back into it. [m³/s]."""
     pumps = pump.shape[1]
@@ -248,7 +238,7 @@ def _move(spec: Spec, pump: Floats, well: Floats, loss_factor: float, extra_lift
     return out, back
 
 
-@_compiled
+@allocating
 def _fill(spec: Spec, well: Floats, net: float, out: float) -> None:
     """Move level, its sensor, air and siphon by a step under a net inflow and the flow pumped out. [m³/s]."""
     level_m = well[_LEVEL] + net * STEP_S / area_m2(spec, well[_LEVEL])
@@ -265,7 +255,7 @@ def _fill(spec: Spec, well: Floats, net: float, out: float) -> None:
     well[_PRIMED] = well[_PRIMED] + STEP_S if out > spec.siphon_flow else 0.0
 
 
-@_compiled
+@allocating
 def _load(spec: Spec, pump: Floats, level_m: float, voltage_factor: float) -> None:
     """Head over each pump and power that it takes; a pump without a command shows none."""
     for i in range(pump.shape[1]):

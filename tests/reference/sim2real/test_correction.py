@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.protocols.station.station_file import load_station
 from wetwell.services.batch.field_data import write_station
-from wetwell.services.reports.gap_page import gap_page
+from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.correction.learning import learn
 from wetwell.sim2real.diagnosis.correction import weighed
 from wetwell.sim2real.diagnosis.diagnosis import diagnose

@@ -9,7 +9,7 @@ from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.protocols.station.materiality import Materiality
 from wetwell.protocols.station.station_file import EffectTable, load_station
-from wetwell.services.batch.gap import diagnose_file, replay_file
+from wetwell.services.batch.gap.diagnosis import diagnose_file, replay_file
 from wetwell.services.stations import find_scenario
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.diagnosis.report import GapReport

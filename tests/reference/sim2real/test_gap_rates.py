@@ -5,7 +5,7 @@ import pytest
 
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.protocols.station.station_file import EffectTable
-from wetwell.services.batch.gap import replay_file
+from wetwell.services.batch.gap.diagnosis import replay_file
 from wetwell.services.stations import find_scenario
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.recording.regimes import REGIMES, regimes_of

@@ -18,8 +18,8 @@ from wetwell.protocols.recordings.recording import write_recording
 from wetwell.services.batch import executors
 from wetwell.services.batch.backtest import sources_of, write_backtest
 from wetwell.services.batch.dataset import make_dataset, plan_of
-from wetwell.services.batch.diagnoses import cases_of, diagnose_all
-from wetwell.services.batch.gap import diagnose_file
+from wetwell.services.batch.gap.diagnoses import cases_of, diagnose_all
+from wetwell.services.batch.gap.diagnosis import diagnose_file
 from wetwell.services.batch.parallel import Failure, work_through
 from wetwell.services.trial.plan import TrialPlan
 from wetwell.services.trial.run import run_trial
@@ -148,7 +148,7 @@ def test_diagnoses_are_those_of_single_recordings_and_a_bad_one_is_told(
     assert "wrong.toml" in errors["other"]
     assert not any("\n" in error for error in errors.values())
     monkeypatch.setattr(
-        "wetwell.services.batch.diagnoses.diagnose_file", None
+        "wetwell.services.batch.gap.diagnoses.diagnose_file", None
     )  # what is there is not diagnosed again
     cases = cases_of("alpha", [Path("good.parquet")], None)
     again = diagnose_all(cases, tmp_path / "there", 1, only=["friction_bias"])

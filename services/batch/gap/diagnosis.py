@@ -16,7 +16,7 @@ from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import prepared, write_station
-from wetwell.services.reports.gap_page import gap_page
+from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.calibration.validation import Validation, validate
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wetwell.services.reports.gap_lead import differences
+from wetwell.services.reports.gap.lead import differences
 
 
 def test_differences_are_those_of_full_speed_rows_in_units_and_shares():

@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 from wetwell.services.reports.charts import Section, folded, page, paragraph, share_bars, table
-from wetwell.services.reports.gap_correction import correction_section
-from wetwell.services.reports.gap_lead import effect_words, lead, shrinkage_words
-from wetwell.services.reports.gap_pictures import duty_picture, trace_pictures
-from wetwell.services.reports.gap_statistics import statistics
+from wetwell.services.reports.gap.correction import correction_section
+from wetwell.services.reports.gap.lead import effect_words, lead, shrinkage_words
+from wetwell.services.reports.gap.pictures import duty_picture, trace_pictures
+from wetwell.services.reports.gap.statistics import statistics
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.diagnosis.report import AnswerProbability, GapReport
 

@@ -13,7 +13,7 @@ from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import ConfigError, WetwellError
 from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.batch.gap import diagnose_file
+from wetwell.services.batch.gap.diagnosis import diagnose_file
 from wetwell.services.batch.journal import Journal, fingerprint, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.stations import find_station

@@ -6,7 +6,7 @@ from wetwell.protocols.arrays import Integers
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.reports.charts import Series, line_chart, scatter
-from wetwell.services.reports.gap_lead import FULL_SPEED, NAMES_OF
+from wetwell.services.reports.gap.lead import FULL_SPEED, NAMES_OF
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction

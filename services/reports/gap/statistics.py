@@ -3,7 +3,7 @@
 import numpy as np
 
 from wetwell.services.reports.charts import Series, heat_map, paragraph, percent, scatter, share_bars, table
-from wetwell.services.reports.gap_lead import effect_words
+from wetwell.services.reports.gap.lead import effect_words
 from wetwell.sim2real.diagnosis.covariates import best_covariate
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.diagnosis.report import ClosedLoopComparison, DetectorVerdicts, GapReport

@@ -8,7 +8,7 @@ import pytest
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.services.batch.field_data import write_station
-from wetwell.services.batch.new_effect import new_effect
+from wetwell.services.batch.gap.new_effect import new_effect
 
 TABLE = {
     "name": "learnt_correction",

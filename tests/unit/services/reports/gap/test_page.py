@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from wetwell.protocols.station.station_file import EffectTable, Station
-from wetwell.services.reports.gap_page import gap_page
+from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation

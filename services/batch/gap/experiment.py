@@ -12,7 +12,7 @@ from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.orders import Step
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.batch.gap import LEFT_OPEN
+from wetwell.services.batch.gap.diagnosis import LEFT_OPEN
 from wetwell.sim2real.experiments.left_open import LeftOpen
 from wetwell.sim2real.experiments.proposals import proposals_of
 from wetwell.sim2real.experiments.reported import ProposedAct, proposed_acts, refused_acts

@@ -1,0 +1,1 @@
+"""Diagnoses of files: one, many, the next experiment, and a new effect made from one."""
