@@ -6,11 +6,14 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.recording.regimes import REGIMES
-from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.bins import LEVEL, Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
 SPANS = 32
 """More than there are spans since a regime began."""
+SURGES = (0.0, 1.0, 3.0, 7.0)
+"""Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
+of it: rain comes faster than that. Each as likely. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +30,10 @@ class Block:
         Numbers from 0 within the block.
     variance, allowed : (k,) arrays
         As of `Cells`.
+    surges : tuple of float
+        Variance that surges of the inflow may add, over `variance`; each as likely.
+    surge : float
+        The one that is supposed.
     """
 
     signal: int
@@ -36,6 +43,8 @@ class Block:
     cycle: Integers
     variance: Floats
     allowed: Floats
+    surges: tuple[float, ...]
+    surge: float = 0.0
 
     def group_sums(self, values: Floats) -> Floats:
         """(groups, ...) sums of (k, ...) values."""
@@ -92,7 +101,7 @@ class Cells:
         return squares
 
 
-def cells_of(bins: Bins, condition: Integers) -> Cells:
+def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
     r"""Cells of the bins of a recording.
 
     $$\sigma^2 = \overline{f} / n, \qquad a^2 = m^2 + 1 - \overline{f}$$
@@ -105,6 +114,8 @@ def cells_of(bins: Bins, condition: Integers) -> Cells:
     bins : Bins
     condition : (bins,) array
         As `conditions_of` makes it: what is in another condition is in another group.
+    has_inflow : bool
+        Whether the inflow is measured; else nobody knows the noise of the level well.
     """
     key = (condition * (int(group_of(bins).max(initial=0)) + 1) + group_of(bins)) * SPANS + phase(bins)
     groups, group_of_bin = np.unique(key, return_inverse=True)
@@ -131,6 +142,7 @@ def cells_of(bins: Bins, condition: Integers) -> Cells:
                 cycle=np.unique(cycle[rows], return_inverse=True)[1],
                 variance=variance[rows],
                 allowed=allowed[rows],
+                surges=(0.0,) if has_inflow or key // len(REGIMES) != LEVEL else SURGES,
             )
         )
     return Cells(of_bin=of_bin, counts=counts, group=group, variance=variance, allowed=allowed, blocks=tuple(blocks))

@@ -67,12 +67,13 @@ def expected_squares(block: Block) -> Floats:
 def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -> tuple[Floats, float]:
     r"""Products of columns under the inverse of the covariance, and the logarithm of its determinant.
 
-    $$C = \operatorname{diag}\left(\sigma^2 + \tfrac12 (c a)^2 + (s_c f)^2\right) + \sum_c v_c v_c^T
+    $$C = \operatorname{diag}\left(\sigma^2 + d^2 + (s_c f)^2\right) + \sum_c v_c v_c^T
     + \tfrac{o^2}{2} \left(a a^T + \sum_g a_g a_g^T\right)
-    + \tfrac{s^2}{2} \left(f f^T + \sum_g f_g f_g^T\right), \quad v^2 = \tfrac12 (c a)^2 + (s_w w)^2$$
+    + \tfrac{s^2}{2} \left(f f^T + \sum_g f_g f_g^T\right), \quad
+    d^2 = \tfrac12 \left((c a)^2 + u \sigma^2\right), \quad v^2 = d^2 + (s_w w)^2$$
 
-    with what is allowed a, the signature f, what swings w, and the `Allowance` of offset o, change c, form s and
-    changing form $s_c$; `SWING` $s_w$; groups g are common to all cycles, and cycles c to all groups.
+    with what is allowed a, the surge u, the signature f, what swings w, and the `Allowance` of offset o, change c,
+    form s and changing form $s_c$; `SWING` $s_w$; groups g are common to all cycles, and cycles c to all groups.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     ----------
     .. [1] W. W. Hager, Updating the inverse of a matrix, SIAM Review 31, 1989 (Woodbury's identity).
     """
-    changing = 0.5 * (allowance.change * block.allowed) ** 2
+    changing = 0.5 * ((allowance.change * block.allowed) ** 2 + block.surge * block.variance)
     variance = block.variance + changing + (allowance.changing_form * form.signature) ** 2
     in_cycle = np.sqrt(changing + (SWING * form.swinging) ** 2)
     parts = [(block.allowed, allowance.offset)]

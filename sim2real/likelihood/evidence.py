@@ -47,7 +47,8 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     \qquad H = \sum_b J_b^T C_b^{-1} J_b$$
 
     with the residuals r at the best parameters, their slopes J, a prior that is even over the range of each
-    parameter, and in each block b the groups that are poor by what the fit leaves; π has `POORLY` for each of them.
+    parameter, and in each block b the groups that are poor, and the surges of the inflow, by what the fit leaves; π
+    has `POORLY` for each poor group, and the share of a surge.
 
     Parameters
     ----------
@@ -68,11 +69,9 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     inner = np.zeros((count + 1, count + 1))
     for block in cells.blocks:
         own = form.chosen(block.rows)
-        is_poor = _poor(block, residuals[block.rows], own)
-        loose, loose_form = _loosened(block, own, is_poor)
-        products, log_det = projected(loose, columns[block.rows], loose_form, GOOD)
-        prior = is_poor.sum() * np.log(POORLY) + (~is_poor).sum() * np.log(1.0 - POORLY)
-        likely.append((float(prior) - 0.5 * log_det, products))
+        tried = [_weighed(scaled, columns[block.rows], own) for scaled in surging(block)]
+        log, products = max(tried, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
+        likely.append((log - float(np.log(len(tried))), products))
         inner += products
     precision, slope = inner[1:, 1:], inner[1:, 0]
     step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
@@ -88,9 +87,23 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     )
 
 
+def surging(block: Block) -> list[Block]:
+    """A block with each surge that there may be."""
+    return [replace(block, surge=surge) for surge in block.surges]
+
+
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     """Evidence without any effect."""
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
+
+
+def _weighed(block: Block, columns: Floats, form: Form) -> tuple[float, Floats]:
+    """Logarithm of prior and volume of a block, and the products of columns, of which the first are the residuals."""
+    is_poor = _poor(block, columns[:, 0], form)
+    loose, loose_form = _loosened(block, form, is_poor)
+    products, log_det = projected(loose, columns, loose_form, GOOD)
+    prior = is_poor.sum() * np.log(POORLY) + (~is_poor).sum() * np.log(1.0 - POORLY)
+    return float(prior) - 0.5 * log_det, products
 
 
 def _poor(block: Block, residuals: Floats, form: Form) -> Flags:
@@ -98,7 +111,7 @@ def _poor(block: Block, residuals: Floats, form: Form) -> Flags:
     counts = block.group_sums(np.ones(residuals.size))
     mean, noise, allowed, signature = (
         block.group_sums(values) / counts
-        for values in (residuals, block.variance, block.allowed**2, form.signature**2)
+        for values in (residuals, (1.0 + block.surge) * block.variance, block.allowed**2, form.signature**2)
     )
     scatter = block.group_sums((residuals - mean[block.group]) ** 2)
 

@@ -1,14 +1,14 @@
 """What no effect of the library does: discrepancies of any size, in any signal and regime."""
 
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 from scipy.special import logsumexp
 
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import CHANGING, POOR, Allowance, Form, projected
-from wetwell.sim2real.likelihood.evidence import Evidence
+from wetwell.sim2real.likelihood.evidence import Evidence, surging
 
 SCALES = (3.0, 10.0, 30.0)
 """Times what is allowed that something unknown may be in a block, each as likely."""
@@ -34,8 +34,8 @@ def flexible_factor(cells: Cells, found: Evidence, form: Form) -> float:
     for block, known in zip(cells.blocks, found.by_block, strict=True):
         residuals, own = found.residuals[block.rows, None], form.chosen(block.rows)
         logs = []
-        for allowance in allowances:
-            products, log_det = projected(block, residuals, own, allowance)
+        for scaled, allowance in product(surging(block), allowances):
+            products, log_det = projected(scaled, residuals, own, allowance)
             logs.append(-0.5 * (float(products[0, 0]) + log_det))
         unknown = float(logsumexp(logs)) - np.log(len(logs))
         total += float(np.logaddexp(known, unknown) - np.log(2.0) - known)

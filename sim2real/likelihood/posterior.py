@@ -109,8 +109,8 @@ def _log_prior(effects: tuple[str, ...], library: int, log_share: Callable[[tupl
 
 
 def verdict_of(posterior: Sequence[SetProbability]) -> Verdict:
-    """The most probable verdict, all sets of effects together."""
-    totals: dict[Verdict, float] = {"none": 0.0, "unknown": 0.0, "effect": 0.0}
+    """The most probable verdict of what was weighed, all sets of effects together; `MISSED` decides none."""
+    totals: dict[Verdict, float] = {"none": 0.0, "unknown": -MISSED, "effect": 0.0}
     for one in posterior:
         totals[one.verdict] += one.probability
     return max(totals, key=lambda verdict: totals[verdict])

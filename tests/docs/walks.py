@@ -162,5 +162,9 @@ LEFT_OUT_PAGES = {
     "docs/maintenance.md": "needs a crew's visits over days; "
     "tests/integration/services/detector/test_maintenance.py enters acts",
     "README.md": "make check runs this test; make up is `wetwell up`, which a walk runs",
+    "docs/correction.md": "starts from a diagnosis that found something unknown; "
+    "tests/unit/services/batch/gap/test_new_effect.py makes the files and runs their test",
+    "docs/experiments.md": "needs an act at a station; tests/reference/sim2real/test_experiments.py plays one",
+    "docs/gap-watch.md": "needs a history of days; tests/integration/services/watch looks at one",
     "docs/real-station.md": "its recording states no licence and is not here; benchmarks/real_station.py reads it",
 }

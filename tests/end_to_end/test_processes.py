@@ -143,7 +143,7 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
         with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/stations/alpha", timeout=10) as page:
             assert json.load(page)["model"]["station"] == "alpha"
         children = _children(up.pid)
-        assert len(children) == 5
+        assert len(children) == 6
         code, out, err = stop(up, signal.SIGINT)
         assert code == 0, err
         assert f"mbpoll -m tcp -p {modbus_port}" in out

@@ -35,7 +35,7 @@ def test_the_true_model_leaves_what_is_expected(plant, every_s, metered_share):
     regimes, replay = regimes_of(traces, truth.station), Replay(traces, truth.station)
     prediction = replay.run()
     residuals = StationResiduals(traces, truth.station, regimes, prediction, replay.doubt())
-    cells = cells_of(residuals.bins, np.zeros(residuals.bins.size, dtype=int))
+    cells = cells_of(residuals.bins, np.zeros(residuals.bins.size, dtype=int), has_inflow=True)
     left = cells.means(residuals.of(prediction))
     limits = {STEADY: STEADILY, MULTI_PUMP: SEVERAL}
     steady = 0

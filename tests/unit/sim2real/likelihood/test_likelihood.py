@@ -35,7 +35,7 @@ def cells():
         tolerance=0.1 * ones,
         material=np.where(signal == FLOW, 1.5, 0.7),
     )
-    return cells_of(bins, np.zeros(bins.size, dtype=int))
+    return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=True)
 
 
 def dense(block, form, allowance):
