@@ -19,6 +19,11 @@ CYCLES, EACH = 12, 3
 
 @pytest.fixture
 def cells():
+    """As `made`, with a meter of the inflow."""
+    return made(has_inflow=True)
+
+
+def made(*, has_inflow):
     """A flow that runs and a level at rest: two spans of time in a cycle, the first of one bin, the next of two."""
     half = CYCLES * EACH
     signal = np.repeat([FLOW, LEVEL], half)
@@ -35,13 +40,13 @@ def cells():
         tolerance=0.1 * ones,
         material=np.where(signal == FLOW, 1.5, 0.7),
     )
-    return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=True)
+    return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=has_inflow)
 
 
 def dense(block, form, allowance):
     """The covariance, written down."""
     f, allowed = form.signature, block.allowed
-    changing = 0.5 * (allowance.change * allowed) ** 2
+    changing = 0.5 * ((allowance.change * allowed) ** 2 + block.surge * block.variance)
     in_cycle = np.sqrt(changing + (SWING * form.swinging) ** 2)
     whole = np.diag(block.variance + changing + (allowance.changing_form * f) ** 2)
     whole += (block.cycle[:, None] == block.cycle[None, :]) * np.outer(in_cycle, in_cycle)
@@ -64,10 +69,12 @@ def test_cells_are_the_means_of_spans_in_cycles(cells):
     "allowance", [GOOD, POOR, Allowance(offset=3.0, change=2.0, form=0.3, changing_form=0.7)], ids=str
 )
 @pytest.mark.parametrize("has_form", [True, False])
-def test_products_are_those_of_the_dense_covariance(cells, allowance, has_form):
+@pytest.mark.parametrize("surge", [0.0, 3.0])
+def test_products_are_those_of_the_dense_covariance(cells, allowance, has_form, surge):
     rng = np.random.default_rng(5)
     columns, form = rng.normal(size=(cells.group.size, 3)), some_form(cells, rng) if has_form else no_form(cells)
-    for block in cells.blocks:
+    for without in cells.blocks:
+        block = replace(without, surge=surge)
         own = form.chosen(block.rows)
         products, log_det = projected(block, columns[block.rows], own, allowance)
         whole = dense(block, own, allowance)
@@ -145,3 +152,18 @@ def test_an_error_of_a_whole_cycle_is_less_of_a_surprise_than_as_many_of_single_
     shared[level.rows] = np.repeat(2.0, level.rows.size) * rng.choice([-1.0, 1.0], CYCLES)[level.cycle]
     single[level.rows] = 2.0 * rng.choice([-1.0, 1.0], level.rows.size)
     assert evidence_of_none(cells, shared).log > evidence_of_none(cells, single).log
+
+
+def test_surges_of_an_inflow_without_a_meter_are_no_surprise_in_the_level_and_one_in_the_flow():
+    with_meter, without = made(has_inflow=True), made(has_inflow=False)
+    noise = np.random.default_rng(12).normal(size=with_meter.group.size) * np.sqrt(with_meter.variance)
+    for signal, gains in ((LEVEL, True), (FLOW, False)):
+        (rows,) = [block.rows for block in with_meter.blocks if block.signal == signal]
+        residuals = noise.copy()
+        residuals[rows] *= 2.5
+        gain = evidence_of_none(without, residuals).log - evidence_of_none(with_meter, residuals).log
+        assert (gain > 1.0) == gains
+        factors = [
+            flexible_factor(each, evidence_of_none(each, residuals), no_form(each)) for each in (with_meter, without)
+        ]
+        assert (factors[1] < factors[0] - 0.1) == gains
