@@ -49,7 +49,7 @@ class Guard:
     Without tokens the page is for this machine: a request by any other host name comes by one that was made to point
     here. With tokens every request for data must bring one, as `Authorization: Bearer` or as the cookie that the
     login sets. An act (anything but GET and HEAD) must be JSON, come from this page itself, and needs an operator.
-    Of an address that has tried too many wrong tokens, no more are heard for a while.
+    Where an address has tried too many wrong tokens, it is told to wait; a right one is heard all the same.
 
     Parameters
     ----------
@@ -88,13 +88,8 @@ class Guard:
         if refusal is None and self._tokens_file is not None:
             token = token_in(headers)
             holder, refusal = self._admitted(scope["method"], path, token)
-            if (
-                holder is None
-                and token
-                and path.startswith(_GUARDED)
-                and path != _LOGIN
-                and refusal in {None, _NEEDED}
-            ):
+            is_wrong = token and holder is None and path.startswith(_GUARDED) and path != _LOGIN
+            if is_wrong and refusal in {None, _NEEDED}:
                 refusal = too_many(self._attempts, scope) or refusal
             state = scope.setdefault("state", {})
             state["holder"] = holder
