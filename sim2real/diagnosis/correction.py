@@ -6,6 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import EffectTable
+from wetwell.sim2real.attribution.intervals import TWO_SIDED
 from wetwell.sim2real.correction.learning import Learnt
 from wetwell.sim2real.correction.wording import UNITS_OF_TERMS, equation, name_of, sentence
 from wetwell.sim2real.diagnosis.report import CorrectionAddend, CorrectionReport, Gap
@@ -16,7 +17,6 @@ from wetwell.simulator.parameters import PlantParameters
 
 LEAST_CLOSED = 0.5
 """Share of the gap that a correction surely closes: one that leaves the larger part is no explanation. [1]"""
-TWO_SIDED_95 = 1.96
 LEAST_WIDTH = 0.03
 """Half width of an interval at the least, as a share of the size: the form of a shape is a guess. [1]"""
 
@@ -84,7 +84,7 @@ def _addends(learnt: Learnt, reference: float) -> tuple[CorrectionAddend, ...]:
     for k, ((name, shape), value) in enumerate(zip(names, values, strict=True)):
         own = slice(ends[k], ends[k + 1])
         spread = _spread(learnt.sizes[own], learnt.covariance[own, own])
-        half = max(TWO_SIDED_95 * spread, LEAST_WIDTH * abs(value))
+        half = max(TWO_SIDED * spread, LEAST_WIDTH * abs(value))
         ci = (scale * (value - half), scale * (value + half))
         found.append(CorrectionAddend(covariate=name, shape=shape, size=scale * value, ci=ci, unit=unit or "1"))
     return tuple(found)
