@@ -220,9 +220,9 @@ def test_children_stop_when_the_supervisor_is_killed(tmp_path: Path) -> None:
     flags += ["--data", str(tmp_path)]
     with wetwell("up", *flags) as up:
         end = time.monotonic() + DEADLINE_S
-        while len(children := _children(up.pid)) < 5 and time.monotonic() < end:
+        while len(children := _children(up.pid)) < 6 and time.monotonic() < end:
             time.sleep(0.05)  # real processes: there is no virtual time here
-        assert len(children) == 5
+        assert len(children) == 6
         up.kill()
         while any(_is_alive(child) for child in children) and time.monotonic() < end:
             time.sleep(0.05)
