@@ -26,4 +26,4 @@ class Materiality(Table):
     power_share: Positive = 0.01
     level_m: Positive = 0.005
     threshold_m: Positive = 0.01
-    time_s: Positive = 0.1
+    time_s: Positive = 0.5

@@ -62,6 +62,8 @@ class Fitter:
     bins : Bins
     plant : PlantParameters
         The station as it is.
+    station : Station
+        As its file says.
     plain : Fit
         Without any effect.
     periods : int
@@ -73,6 +75,7 @@ class Fitter:
         self._residuals = residuals
         self.rows = rows
         self.bins = residuals.bins
+        self.station = replay.station
         self.periods = int(replay.period[-1]) + 1
         prediction = replay.run()
         self.plant = prediction.plant

@@ -7,14 +7,15 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.presence import are_there
+from wetwell.sim2real.attribution.presence import are_there, strengths_of
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import Form, no_form
+from wetwell.sim2real.likelihood.covariance import GOOD, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of, slopes_of
+from wetwell.sim2real.residuals.rates import rate_of
 from wetwell.simulator.effects.effect import Effect
 
 HOPELESS = (0.5, 50.0)
@@ -91,26 +92,25 @@ class Hypotheses:
         ]
 
     def _flexible(self, one: Hypothesis) -> float:
-        return flexible_factor(self._cells, one.evidence, one.form)
+        return flexible_factor(one.evidence, one.form)
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))
 
     def _weighed(self, fit: Fit) -> Hypothesis:
         cells, residuals = self._cells, self._means(fit)
-        signatures = [self._signature(fit, member, residuals) for member in range(len(fit.names))]
+        fewer = [self._fitter.without(fit, member) for member in range(len(fit.names))]
+        signatures = [np.zeros(residuals.size) if one is None else self._means(one) - residuals for one in fewer]
         slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
         form = self._form(fit, signatures)
-        found = evidence(cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form)
-        is_possible = all(self._matters(one) for one in signatures) and are_there(fit, found)
+        found = evidence(
+            cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form, strengths_of(fit)
+        )
+        is_possible = are_there(fit, found) and all(
+            one is not None and self._matters(signature, form, self._late(one))
+            for one, signature in zip(fewer, signatures, strict=True)
+        )
         return Hypothesis(fit=fit, evidence=found, form=form, is_possible=is_possible)
-
-    def _signature(self, fit: Fit, member: int, residuals: Floats) -> Floats:
-        """(cells,) what one of its effects does beside the others; nothing where these cannot stand without it."""
-        if len(fit.names) == 1:
-            return self._plain - residuals
-        fewer = self._fitter.without(fit, member)
-        return np.zeros(residuals.size) if fewer is None else self._means(fewer) - residuals
 
     def _form(self, fit: Fit, signatures: Sequence[Floats]) -> Form:
         swings = np.zeros(self._cells.group.size)
@@ -120,9 +120,27 @@ class Hypotheses:
         return Form(
             signature=np.sqrt(np.sum(np.square(signatures), axis=0)),
             swinging=np.sqrt(swings),
+            late=self._late(fit),
         )
 
-    def _matters(self, signature: Floats) -> bool:
-        """Whether an effect does more than what is allowed, in some group."""
+    def _late(self, fit: Fit) -> Floats:
+        """(cells,) what a time that is material changes in what is explained."""
+        explained = residuals_of(self._fitter.plain.residuals) - residuals_of(fit.residuals)
+        return self._fitter.station.materiality.time_s * self._cells.means(rate_of(self._fitter.bins, explained))
+
+    def _matters(self, signature: Floats, form: Form, late: Floats) -> bool:
+        """Whether an effect does more in some group than what is allowed, and than the others may have wrong there.
+
+        Parameters
+        ----------
+        signature : (cells,) array
+            Of the effect.
+        form : Form
+            Of all effects of the set.
+        late : (cells,) array
+            Of the others.
+        """
         cells = self._cells
-        return bool(np.any(cells.group_squares(signature) > cells.group_squares(cells.allowed)))
+        others = np.maximum(form.signature**2 - signature**2, 0.0)
+        wrong = cells.allowed**2 + late**2 + 2.0 * GOOD.form**2 * others
+        return bool(np.any(cells.group_squares(signature) > cells.group_squares(np.sqrt(wrong))))

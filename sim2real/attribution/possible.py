@@ -7,7 +7,7 @@ import numpy as np
 
 from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
-from wetwell.sim2real.likelihood.posterior import CREDIBLE, TEMPER, SetProbability
+from wetwell.sim2real.likelihood.posterior import CREDIBLE, SetProbability
 from wetwell.simulator.effects.effect import Effect
 
 MOST_SETS = 6
@@ -70,14 +70,14 @@ def _credible(sets: Iterable[SetProbability]) -> list[SetProbability]:
 def _spread(hypothesis: Hypothesis) -> list[Fit]:
     r"""The fit moved along the axes of its covariance, by a standard deviation each.
 
-    $$\Sigma = \left(\eta J^T C^{-1} J + 12 I\right)^{-1}$$
+    $$\Sigma = \left(J^T C^{-1} J + 12 I\right)^{-1}$$
 
-    in units of the ranges of the parameters, with the power η of the likelihood and its precision at the fit.
+    in units of the ranges of the parameters, with the precision of the likelihood at the fit.
     """
     fit = hypothesis.fit
     if fit.position.size == 0:
         return []
-    values, axes = np.linalg.eigh(TEMPER * hypothesis.evidence.precision + np.eye(fit.position.size) / EVEN_VARIANCE)
+    values, axes = np.linalg.eigh(hypothesis.evidence.precision + np.eye(fit.position.size) / EVEN_VARIANCE)
     moved = []
     for value, axis in zip(values, axes.T, strict=True):
         step = axis / np.sqrt(value)

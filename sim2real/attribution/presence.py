@@ -31,20 +31,27 @@ def are_there(fit: Fit, found: Evidence) -> bool:
     covariance = np.zeros_like(found.precision)
     among = np.ix_(is_known, is_known)
     covariance[among] = np.linalg.pinv(found.precision[among])
-    best = fit.position + found.step
-    first = 0
-    for candidate in fit.candidates:
-        neutral = {
-            first + k: free.normalised(free.neutral)
-            for k, free in enumerate(candidate.free)
-            if free.neutral is not None
-        }
-        first += len(candidate.free)
+    for neutral in strengths_of(fit):
         place = np.array(list(neutral), dtype=np.int64)
-        away = best[place] - np.array(list(neutral.values()))
+        away = found.step[place] - np.array(list(neutral.values()))
         if place.size and not _is_away(away, covariance[np.ix_(place, place)], is_known[place]):
             return False
     return True
+
+
+def strengths_of(fit: Fit) -> list[dict[int, float]]:
+    """Of each effect the way from each of its strengths, by number, to neutral, over its range."""
+    found, first, position = [], 0, fit.position
+    for candidate in fit.candidates:
+        found.append(
+            {
+                first + k: free.normalised(free.neutral) - float(position[first + k])
+                for k, free in enumerate(candidate.free)
+                if free.neutral is not None
+            }
+        )
+        first += len(candidate.free)
+    return found
 
 
 def _is_away(away: Floats, covariance: Floats, is_known: Flags) -> bool:

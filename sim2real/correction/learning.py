@@ -10,8 +10,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.correction.bin_covariates import Place, bin_covariates
 from wetwell.sim2real.correction.dictionary import PERIOD_RATIO, Atom, dictionary, near
 from wetwell.sim2real.correction.means import means_of
-from wetwell.sim2real.correction.selection import PROPOSED, SIZE_PRIOR, Gram, Proposal, proposals
-from wetwell.sim2real.likelihood.posterior import TEMPER
+from wetwell.sim2real.correction.selection import PROPOSED, SIZE_PRIOR, TEMPER, Gram, Proposal, proposals
 from wetwell.sim2real.recording.regimes import IDLE
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import asinh_loss

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.likelihood.covariance import CHANGING
+from wetwell.sim2real.likelihood.covariance import DIFFERING
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
@@ -17,7 +17,7 @@ class Means:
     $$C = \operatorname{diag}\left(\overline{f} / n + 1 - \overline{f} + (k\,m)^2\right) + \sum_g m_g^2\,1_g 1_g^T$$
 
     with the share f of a bin's variance that is noise, its n bins, and the material size m, of which the share
-    `CHANGING` k may change from cycle to cycle: an offset of a group g that all cycles share is none while it is
+    `DIFFERING` k may change from cycle to cycle: an offset of a group g that all cycles share is none while it is
     small.
 
     Attributes
@@ -70,7 +70,7 @@ def means_of(bins: Bins) -> Means:
         of_bin=of_bin,
         counts=counts,
         group=group,
-        weight=1.0 / (noise / counts + 1.0 - noise + (CHANGING * material) ** 2),
+        weight=1.0 / (noise / counts + 1.0 - noise + (DIFFERING * material) ** 2),
         group_material=np.maximum(np.bincount(group, material) / np.bincount(group), LEAST_MATERIAL),
     )
 

@@ -8,9 +8,10 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.correction.dictionary import Atom
 from wetwell.sim2real.correction.means import Means
-from wetwell.sim2real.likelihood.posterior import TEMPER
 from wetwell.simulator.corrections.parts import TERMS, Term
 
+TEMPER = 0.3
+"""Power of the likelihood of a correction: its cells are not as independent as `Means` takes them to be. [1]"""
 SIZE_PRIOR = 0.3
 """Standard deviation of the size of an addend before anything is seen, as a share of its term. [1]"""
 PART_PRIOR = 0.1

@@ -11,9 +11,8 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
-from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Form, projected
-from wetwell.sim2real.likelihood.evidence import POORLY
-from wetwell.sim2real.likelihood.posterior import TEMPER
+from wetwell.sim2real.likelihood.covariance import Form
+from wetwell.sim2real.likelihood.evidence import weighed
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
@@ -55,7 +54,7 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
         best = means(one.effects)
         moved = [means(effects) - best for effects in one.spread]
         signature = np.abs(without - best)
-        form = Form(signature=signature, swinging=np.zeros(signature.size))
+        form = Form(signature=signature, swinging=np.zeros(signature.size), late=np.zeros(signature.size))
         found.append(_log_probability(cells, best, np.array([*moved]).reshape(len(moved), best.size).T, form))
     return np.array(found)
 
@@ -64,13 +63,7 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form)
     columns = np.column_stack([residuals, moved])
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
-        own = form.chosen(block.rows)
-        each = [
-            (chance - 0.5 * log_det, products)
-            for chance, allowance in ((float(np.log(1.0 - POORLY)), GOOD), (float(np.log(POORLY)), POOR))
-            for products, log_det in (projected(block, columns[block.rows], own, allowance),)
-        ]
-        likelier, products = max(each, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
+        likelier, products, _ = weighed(block, columns[block.rows], form.chosen(block.rows))
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]
@@ -81,7 +74,7 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form)
 def told(probability: Floats, logs: Floats) -> Floats:
     r"""(truths, sets) posterior after an act, by what the truth is.
 
-    $$P'(S \mid T) \propto P(S)\, p(z_T \mid S)^\eta$$
+    $$P'(S \mid T) \propto P(S)\, p(z_T \mid S)$$
 
     Parameters
     ----------
@@ -90,7 +83,7 @@ def told(probability: Floats, logs: Floats) -> Floats:
     logs : (truths, sets) array
         Logarithm of how probable what the act shows under each truth is, beside what was known.
     """
-    weights = np.log(np.maximum(probability, 1e-300)) + TEMPER * logs
+    weights = np.log(np.maximum(probability, 1e-300)) + logs
     return np.asarray(np.exp(weights - logsumexp(weights, axis=1, keepdims=True)), dtype=np.float64)
 
 

@@ -32,6 +32,8 @@ class Block:
         As of `Cells`.
     surges : tuple of float
         Variance that surges of the inflow may add, over `variance`; each as likely.
+    span : (groups,) array
+        Span of the time since the regime began, and condition, of each group: numbers from 0; pumps have the same.
     surge : float
         The one that is supposed.
     """
@@ -44,6 +46,7 @@ class Block:
     variance: Floats
     allowed: Floats
     surges: tuple[float, ...]
+    span: Integers
     surge: float = 0.0
 
     def group_sums(self, values: Floats) -> Floats:
@@ -117,8 +120,10 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
     has_inflow : bool
         Whether the inflow is measured; else nobody knows the noise of the level well.
     """
-    key = (condition * (int(group_of(bins).max(initial=0)) + 1) + group_of(bins)) * SPANS + phase(bins)
+    span_of_bin = condition * SPANS + phase(bins)
+    key = group_of(bins) * (int(span_of_bin.max(initial=0)) + 1) + span_of_bin
     groups, group_of_bin = np.unique(key, return_inverse=True)
+    span = _first(group_of_bin, span_of_bin)
     cycles = int(bins.cycle.max(initial=0)) + 1
     keys, of_bin = np.unique(group_of_bin * cycles + bins.cycle, return_inverse=True)
     group, cycle = keys // cycles, keys % cycles
@@ -142,6 +147,7 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
                 cycle=np.unique(cycle[rows], return_inverse=True)[1],
                 variance=variance[rows],
                 allowed=allowed[rows],
+                span=np.unique(span[np.unique(group[rows])], return_inverse=True)[1],
                 surges=(0.0,) if has_inflow or key // len(REGIMES) != LEVEL else SURGES,
             )
         )

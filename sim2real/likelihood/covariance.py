@@ -8,30 +8,61 @@ from scipy.linalg import cho_factor, cho_solve
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 
-OFFSET = 0.4
-"""Standard deviation of the error of a good model that cycles share, over what is allowed. [1]"""
-CHANGING = 0.5
-"""Ratio of the part of an error that changes from cycle to cycle to the part that cycles share. [1]"""
-GOOD_FORM = 0.07
-"""Standard deviation of the error of form of a good effect, as a share of what it explains. [1]"""
+OFFSET = 0.3
+"""Standard deviation of the error of a good model, over what is allowed: in a block, and in a span of time. [1]"""
+FORM = 0.04
+"""The same of the error of form of a good effect, as a share of what it explains. [1]"""
 POOR_FORM = 0.35
 """The same of a poor one, as in seconds of starts; an error of the model is then as large as is allowed. [1]"""
-SWING = 0.5
-"""The same where an effect is known by how much it swings in time, and not by its course. [1]"""
+DIFFERING = 0.5
+"""Ratio of errors that differ between pumps, or from cycle to cycle, to those that are alike. [1]"""
+EVEN_FORM = 0.1
+"""Ratio of errors of form that differ so little that they hardly matter to those that are alike. [1]"""
+SWINGS = (0.1, 0.5, 1.5)
+"""Error of form of effects that are known by how much they swing in time, not by their course; each as likely. [1]"""
+
+
+LATE = (1.0, 0.0, 0.1)
+"""How alike pumps and spans of time are early or late: in a block, in a span, each by itself. [1]"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Errors:
+    """Standard deviations: in units of what is allowed, and as a share of what the effects explain; also arrays."""
+
+    offset: float | Floats
+    form: float | Floats
+
+    def times(self, share: float) -> "Errors":
+        """A share of them."""
+        return Errors(offset=share * self.offset, form=share * self.form)
+
+
+GOOD = Errors(offset=OFFSET, form=FORM)
+POOR = Errors(offset=1.0, form=POOR_FORM)
+EVEN = Errors(offset=DIFFERING * OFFSET, form=EVEN_FORM * FORM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowance:
-    """Standard deviations of errors: in units of what is allowed, and as shares of what the effects explain."""
+    """What may be wrong in a block.
 
-    offset: float
-    change: float
-    form: float
-    changing_form: float
+    Attributes
+    ----------
+    span : Errors
+        (groups,) of what pumps and cycles share in a span of time.
+    own : Errors
+        (groups,) of what cycles share in a group.
+    changing : Errors
+        (k,) of what changes from cycle to cycle.
+    swing : float
+        Of `SWINGS`.
+    """
 
-
-GOOD = Allowance(offset=OFFSET, change=CHANGING * OFFSET, form=GOOD_FORM, changing_form=CHANGING * GOOD_FORM)
-POOR = Allowance(offset=1.0, change=CHANGING, form=POOR_FORM, changing_form=CHANGING * POOR_FORM)
+    span: Errors
+    own: Errors
+    changing: Errors
+    swing: float = SWINGS[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,24 +75,28 @@ class Form:
         What the effects explain, in one number: the root of the sum of squares of what each does.
     swinging : (cells,) array
         Root mean square, within its block, of what those do that swing in time.
+    late : (cells,) array
+        Change of what they explain together within the time by which a signal may be early or late.
     """
 
     signature: Floats
     swinging: Floats
+    late: Floats
 
     def chosen(self, rows: Integers) -> "Form":
         """Of some of the cells."""
-        return Form(signature=self.signature[rows], swinging=self.swinging[rows])
+        return Form(signature=self.signature[rows], swinging=self.swinging[rows], late=self.late[rows])
 
 
 def no_form(cells: Cells) -> Form:
     """Where there are no effects."""
-    return Form(signature=np.zeros(cells.group.size), swinging=np.zeros(cells.group.size))
+    nothing = np.zeros(cells.group.size)
+    return Form(signature=nothing, swinging=nothing, late=nothing)
 
 
 def expected_squares(block: Block) -> Floats:
     """(k,) mean squares of the residuals of a good model: noise, and what it may be off."""
-    return np.asarray(block.variance + (GOOD.offset**2 + GOOD.change**2) * block.allowed**2, dtype=np.float64)
+    return np.asarray(block.variance + (2.0 + 2.0 * DIFFERING**2) * OFFSET**2 * block.allowed**2, dtype=np.float64)
 
 
 def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -> tuple[Floats, float]:
@@ -91,14 +126,21 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     ----------
     .. [1] W. W. Hager, Updating the inverse of a matrix, SIAM Review 31, 1989 (Woodbury's identity).
     """
-    changing = 0.5 * ((allowance.change * block.allowed) ** 2 + block.surge * block.variance)
-    variance = block.variance + changing + (allowance.changing_form * form.signature) ** 2
-    in_cycle = np.sqrt(changing + (SWING * form.swinging) ** 2)
-    parts = [(block.allowed, allowance.offset)]
+    own = allowance.changing
+    changing = 0.5 * (
+        (own.offset * block.allowed) ** 2 + block.surge * block.variance + (allowance.swing * form.swinging) ** 2
+    )
+    variance, in_cycle = block.variance + changing + (own.form * form.signature) ** 2, np.sqrt(changing)
+    span, each = allowance.span, allowance.own
+    parts: list[tuple[Floats, float, float | Floats, float | Floats]] = [
+        (block.allowed, OFFSET, span.offset, each.offset)
+    ]
     if np.any(form.signature):
-        parts.append((form.signature, allowance.form))
+        parts.append((form.signature, FORM, span.form, each.form))
+    if np.any(form.late):
+        parts.append((form.late, *LATE))
     weight = 1.0 / variance
-    groups, cycles = int(block.group.max()) + 1, int(block.cycle.max()) + 1
+    groups, cycles = block.span.size, int(block.cycle.max()) + 1
     size = groups * len(parts)
     cycle_weight = 1.0 / (1.0 + block.cycle_sums(weight * in_cycle**2))
     by_cycle = block.cycle_sums(columns * (weight * in_cycle)[:, None])
@@ -106,17 +148,27 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     loaded = np.zeros((cycles, size))
     inner, crossed = np.zeros((size, size)), np.zeros((size, columns.shape[1]))
     log_det = float(np.sum(np.log(variance)) - np.sum(np.log(cycle_weight)))
-    for i, (load, deviation) in enumerate(parts):
-        own = slice(i * groups, (i + 1) * groups)
+    for i, (load, of_block, of_span, of_group) in enumerate(parts):
+        place = slice(i * groups, (i + 1) * groups)
         loaded[block.cycle, i * groups + block.group] = weight * in_cycle * load
-        crossed[own] = block.group_sums(columns * (weight * load)[:, None])
-        for j, (other, _) in enumerate(parts):
-            inner[own, j * groups : (j + 1) * groups] += np.diag(block.group_sums(weight * load * other))
-        # the inverse of d²/2 (1 + 11ᵀ), of an offset that all groups share and of their own
-        inner[own, own] += 2.0 / deviation**2 * (np.eye(groups) - 1.0 / (1.0 + groups))
-        log_det += groups * np.log(0.5 * deviation**2) + np.log1p(groups)
+        crossed[place] = block.group_sums(columns * (weight * load)[:, None])
+        for j, (other, *_) in enumerate(parts):
+            inner[place, j * groups : (j + 1) * groups] += np.diag(block.group_sums(weight * load * other))
+        precision, log_volume = _alike(block.span, of_block, of_span, of_group)
+        inner[place, place] += precision
+        log_det += log_volume
     inner -= loaded.T @ (loaded * cycle_weight[:, None])
     crossed -= loaded.T @ (by_cycle * cycle_weight[:, None])
     factor = cho_factor(inner, lower=True)
     log_det += 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
     return np.asarray(products - crossed.T @ cho_solve(factor, crossed), dtype=np.float64), log_det
+
+
+def _alike(span: Integers, of_block: float, of_span: float | Floats, own: float | Floats) -> tuple[Floats, float]:
+    """Inverse and log determinant of the covariance of groups: alike in a block, in a span, each by itself."""
+    covariance = (
+        of_block**2 + np.outer(of_span, of_span) * (span[:, None] == span[None, :]) + np.eye(span.size) * own**2
+    )
+    factor = cho_factor(covariance, lower=True)
+    inverse = cho_solve(factor, np.eye(span.size))
+    return np.asarray(inverse, dtype=np.float64), 2.0 * float(np.sum(np.log(np.diag(factor[0]))))

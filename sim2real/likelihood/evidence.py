@@ -1,18 +1,28 @@
 """How probable the cells are under a set of effects, its parameters and errors of form integrated out."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, product
 
 import numpy as np
 from scipy.linalg import solve
+from scipy.special import logsumexp
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import Block, Cells
-from wetwell.sim2real.likelihood.covariance import GOOD, POOR, Allowance, Form, no_form, projected
+from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
+from wetwell.sim2real.likelihood.ways import likeliest
 
-POORLY = 0.1
-"""Probability that a right model is poor in a group. [1]"""
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stirred:
+    """A block with a surge of the inflow, and the error of the course of what swings."""
+
+    block: Block
+    swing: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +41,8 @@ class Evidence:
         To these parameters from the fit, over their ranges.
     precision : (parameters, parameters) array
         Inverse of the covariance of the parameters, over their ranges.
+    stirred : tuple of Stirred
+        Each block with its likeliest surge and swing.
     """
 
     log: float
@@ -38,9 +50,16 @@ class Evidence:
     residuals: Floats
     step: Floats
     precision: Floats
+    stirred: tuple[Stirred, ...]
 
 
-def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evidence:
+def evidence(
+    cells: Cells,
+    residuals: Floats,
+    slopes: Floats,
+    form: Form,
+    neutral: Sequence[Mapping[int, float]] = (),
+) -> Evidence:
     r"""Laplace's approximation around a fit.
 
     $$\ln p(z \mid S) = \sum_b \ln p(r_b \mid \text{poor}_b) + \ln \pi(\text{poor}) - \tfrac12 \ln\det(1 + H / 2\pi),
@@ -58,6 +77,9 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     slopes : (cells, parameters) array
         Change of the residuals over the range of each parameter, at the fit.
     form : Form
+    neutral : sequence of mapping of int to float
+        Of each effect the way from the place of each of its strengths to neutral, over its range: an effect may
+        have all of them, or one alone.
 
     References
     ----------
@@ -66,30 +88,53 @@ def evidence(cells: Cells, residuals: Floats, slopes: Floats, form: Form) -> Evi
     count = slopes.shape[1]
     columns = np.column_stack([residuals, slopes])
     likely: list[tuple[float, Floats]] = []
+    stirred: list[Stirred] = []
     inner = np.zeros((count + 1, count + 1))
     for block in cells.blocks:
-        own = form.chosen(block.rows)
-        tried = [_weighed(scaled, columns[block.rows], own) for scaled in surging(block)]
-        log, products = max(tried, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
-        likely.append((log - float(np.log(len(tried))), products))
+        log, products, one = weighed(block, columns[block.rows], form.chosen(block.rows))
+        likely.append((log, products))
+        stirred.append(one)
         inner += products
     precision, slope = inner[1:, 1:], inner[1:, 0]
     step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
     along = np.r_[1.0, step]
     by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products in likely])
-    occam = float(np.linalg.slogdet(np.eye(count) + precision / (2.0 * np.pi))[1])
+    peak = float(along @ inner @ along)
+    logs = [
+        _of_part(inner, fixed) + 0.5 * peak
+        for fixed in (
+            dict(chain.from_iterable(one.items() for one in parts)) for parts in product(*map(_partly, neutral))
+        )
+    ]
     return Evidence(
-        log=float(by_block.sum()) - 0.5 * occam,
+        log=float(by_block.sum()) + float(logsumexp(logs)) - float(np.log(len(logs))),
         by_block=by_block,
         residuals=residuals + slopes @ step,
         step=step,
         precision=precision,
+        stirred=tuple(stirred),
     )
 
 
-def surging(block: Block) -> list[Block]:
-    """A block with each surge that there may be."""
-    return [replace(block, surge=surge) for surge in block.surges]
+def _partly(neutral: Mapping[int, float]) -> list[dict[int, float]]:
+    """What is neutral where all strengths of an effect act, and where one alone does."""
+    alone = [{k: way for k, way in neutral.items() if k != one} for one in neutral]
+    return [{}, *alone] if len(neutral) > 1 else [{}]
+
+
+def _of_part(inner: Floats, fixed: Mapping[int, float]) -> float:
+    """Logarithm of the integral over the parameters that are not fixed, each at its way from the fit."""
+    first = np.zeros(inner.shape[0])
+    first[0] = 1.0
+    for k, way in fixed.items():
+        first[1 + k] = way
+    free = [1 + k for k in range(inner.shape[0] - 1) if k not in fixed]
+    precision, slope = inner[np.ix_(free, free)], inner[free] @ first
+    peak = float(first @ inner @ first)
+    if free:
+        step = -solve(precision + np.eye(len(free)) * TRUSTED**-2, slope, assume_a="pos")
+        peak += float(2.0 * slope @ step + step @ precision @ step)
+    return -0.5 * (peak + float(np.linalg.slogdet(np.eye(len(free)) + precision / (2.0 * np.pi))[1]))
 
 
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
@@ -97,36 +142,27 @@ def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
 
 
-def _weighed(block: Block, columns: Floats, form: Form) -> tuple[float, Floats]:
-    """Logarithm of prior and volume of a block, and the products of columns, of which the first are the residuals."""
-    is_poor = _poor(block, columns[:, 0], form)
-    loose, loose_form = _loosened(block, form, is_poor)
-    products, log_det = projected(loose, columns, loose_form, GOOD)
-    prior = is_poor.sum() * np.log(POORLY) + (~is_poor).sum() * np.log(1.0 - POORLY)
-    return float(prior) - 0.5 * log_det, products
+def weighed(block: Block, columns: Floats, form: Form) -> tuple[float, Floats, Stirred]:
+    """A block under what is likeliest to be wrong in it.
 
+    Parameters
+    ----------
+    block : Block
+    columns : (k, n) array
+        The first are the residuals.
+    form : Form
+        Of the block's cells.
 
-def _poor(block: Block, residuals: Floats, form: Form) -> Flags:
-    """(groups,) whether a group is more probable as a poor one, by its mean and its scatter over the cycles."""
-    counts = block.group_sums(np.ones(residuals.size))
-    mean, noise, allowed, signature = (
-        block.group_sums(values) / counts
-        for values in (residuals, (1.0 + block.surge) * block.variance, block.allowed**2, form.signature**2)
-    )
-    scatter = block.group_sums((residuals - mean[block.group]) ** 2)
-
-    def log(allowance: Allowance) -> Floats:
-        changing = noise + allowance.change**2 * allowed + allowance.changing_form**2 * signature
-        shared = changing / counts + allowance.offset**2 * allowed + allowance.form**2 * signature
-        log_volume = np.log(shared) + (counts - 1.0) * np.log(changing)
-        return np.asarray(-0.5 * (log_volume + mean**2 / shared + scatter / changing), dtype=np.float64)
-
-    return np.asarray(log(POOR) + np.log(POORLY) > log(GOOD) + np.log(1.0 - POORLY))
-
-
-def _loosened(block: Block, form: Form, is_poor: Flags) -> tuple[Block, Form]:
-    """A block and its form, as if all were good: what is allowed, and what is explained, is larger in poor groups."""
-    own = is_poor[block.group]
-    allowed = np.where(own, POOR.offset / GOOD.offset, 1.0) * block.allowed
-    signature = np.where(own, POOR.form / GOOD.form, 1.0) * form.signature
-    return replace(block, allowed=allowed), replace(form, signature=signature)
+    Returns
+    -------
+    log, products, stirred : float, (n, n) array, Stirred
+        Logarithm of prior and volume, the products of the columns, and the likeliest surge and swing.
+    """
+    tried = []
+    for surge, swing in product(block.surges, SWINGS if np.any(form.swinging) else SWINGS[:1]):
+        one = Stirred(block=replace(block, surge=surge), swing=swing)
+        log_prior, allowance = likeliest(one.block, columns[:, 0], form, swing)
+        products, log_det = projected(one.block, columns, form, allowance)
+        tried.append((log_prior - 0.5 * log_det, products, one))
+    log, products, stirred = max(tried, key=lambda each: each[0] - 0.5 * float(each[1][0, 0]))
+    return log - float(np.log(len(tried))), products, stirred

@@ -1,20 +1,29 @@
 """What no effect of the library does: discrepancies of any size, in any signal and regime."""
 
-from dataclasses import replace
-from itertools import chain, product
-
 import numpy as np
 from scipy.special import logsumexp
 
-from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import CHANGING, POOR, Allowance, Form, projected
-from wetwell.sim2real.likelihood.evidence import Evidence, surging
+from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, projected
+from wetwell.sim2real.likelihood.evidence import Evidence
+from wetwell.sim2real.likelihood.ways import Way, Ways, likeliest
 
 SCALES = (3.0, 10.0, 30.0)
 """Times what is allowed that something unknown may be in a block, each as likely."""
 
 
-def flexible_factor(cells: Cells, found: Evidence, form: Form) -> float:
+_LARGE = [(Way(errors=Errors(offset=scale, form=POOR.form), is_poor=True),) for scale in SCALES]
+_SMALLER = [(Way(errors=one.errors.times(DIFFERING), is_poor=True),) for (one,) in _LARGE]
+UNKNOWN = (
+    *(Ways(span=large) for large in _LARGE),
+    *(Ways(own=large) for large in _LARGE),
+    *(Ways(changing=smaller) for smaller in _SMALLER),
+    *(Ways(span=large, changing=smaller) for large, smaller in zip(_LARGE, _SMALLER, strict=True)),
+    *(Ways(own=large, changing=smaller) for large, smaller in zip(_LARGE, _SMALLER, strict=True)),
+)
+"""What something unknown may be: alike for all pumps or in each, changing, or both; each as likely."""
+
+
+def flexible_factor(found: Evidence, form: Form) -> float:
     r"""Logarithm of how much more probable the residuals are if something unknown may be in them.
 
     $$F = \prod_b \frac{\tfrac12\,p(r_b) + \tfrac12 \sum_k p_k\, p(r_b \mid \lambda_k, \mu_k)}{p(r_b)}$$
@@ -24,25 +33,19 @@ def flexible_factor(cells: Cells, found: Evidence, form: Form) -> float:
 
     Parameters
     ----------
-    cells : Cells
     found : Evidence
     form : Form
         Of the effects beside which it acts.
     """
-    allowances = list(chain.from_iterable(_unknown(scale) for scale in SCALES))
     total = 0.0
-    for block, known in zip(cells.blocks, found.by_block, strict=True):
-        residuals, own = found.residuals[block.rows, None], form.chosen(block.rows)
+    for one, known in zip(found.stirred, found.by_block, strict=True):
+        rows = one.block.rows
+        residuals, own = found.residuals[rows, None], form.chosen(rows)
         logs = []
-        for scaled, allowance in product(surging(block), allowances):
-            products, log_det = projected(scaled, residuals, own, allowance)
-            logs.append(-0.5 * (float(products[0, 0]) + log_det))
+        for ways in UNKNOWN:
+            log_prior, allowance = likeliest(one.block, residuals[:, 0], own, one.swing, ways)
+            products, log_det = projected(one.block, residuals, own, allowance)
+            logs.append(log_prior - 0.5 * (float(products[0, 0]) + log_det))
         unknown = float(logsumexp(logs)) - np.log(len(logs))
         total += float(np.logaddexp(known, unknown) - np.log(2.0) - known)
     return total
-
-
-def _unknown(scale: float) -> tuple[Allowance, ...]:
-    """Offsets of a scale, changes of it, and both."""
-    offset, change = replace(POOR, offset=scale), replace(POOR, change=CHANGING * scale)
-    return offset, change, replace(offset, change=change.change)

@@ -15,8 +15,6 @@ NONE_PRIOR = 0.5
 """Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
-TEMPER = 0.3
-"""Power of the likelihood: its blocks are not as independent as it takes them to be. [1]"""
 MISSED = 0.15
 """Probability that the truth is not among what was weighed: too small to be seen, or of another form. [1]"""
 CREDIBLE = 0.95
@@ -57,11 +55,11 @@ def posterior_of(
 ) -> tuple[SetProbability, ...]:
     r"""Probabilities of the answers, best first; they sum to 1.
 
-    $$P(S) = (1 - \epsilon) \frac{(1 - u)\,\pi_S\,L_S^\eta}{Z}, \qquad
-    P(\text{unknown}) = \epsilon + (1 - \epsilon) \frac{u \sum_S \pi_S\,(L_S F_S)^\eta}{Z}, \qquad
+    $$P(S) = (1 - \epsilon) \frac{(1 - u)\,\pi_S\,L_S}{Z}, \qquad
+    P(\text{unknown}) = \epsilon + (1 - \epsilon) \frac{u \sum_S \pi_S\,L_S F_S}{Z}, \qquad
     \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
 
-    with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q, `TEMPER` η,
+    with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q,
     n effects in the library, the sum Z of the numerators, and `MISSED` ε.
 
     Parameters
@@ -73,21 +71,16 @@ def posterior_of(
     log_share : callable, optional
         Logarithm of the share of a set among those of its size, in the place of 1 / n: `Priors.log_share`.
 
-    References
-    ----------
-    .. [1] P. Grünwald, T. van Ommen, Inconsistency of Bayesian inference for misspecified linear models, and a
-       proposal for repairing it, Bayesian Analysis 12, 2017 (the power of the likelihood).
-
     Examples
     --------
     >>> far = Weight(effects=("ragging",), log=-90.0, log_flexible=0.0)
     >>> best = posterior_of([Weight(effects=(), log=0.0, log_flexible=-9.0), far], 25)[0]
     >>> best.verdict, round(best.probability, 2)
-    ('none', 0.82)
+    ('none', 0.85)
     """
     priors = np.array([_log_prior(weight.effects, library, log_share) for weight in weights])
-    sets = priors + TEMPER * np.array([weight.log for weight in weights])
-    unknown = priors + TEMPER * np.array([weight.log + weight.log_flexible for weight in weights])
+    sets = priors + np.array([weight.log for weight in weights])
+    unknown = priors + np.array([weight.log + weight.log_flexible for weight in weights])
     logs = np.r_[np.log(1.0 - UNKNOWN_PRIOR) + sets, np.log(UNKNOWN_PRIOR) + logsumexp(unknown)]
     shares = (1.0 - MISSED) * np.exp(logs - logsumexp(logs))
     shares[-1] += MISSED

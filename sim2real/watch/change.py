@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.likelihood.covariance import CHANGING
+from wetwell.sim2real.likelihood.covariance import DIFFERING
 from wetwell.sim2real.watch.look import Shift
 
 FALSE_CHANGES = 1e-4
@@ -14,7 +14,7 @@ FALSE_CHANGES = 1e-4
 
 
 def changed_groups(
-    now: Mapping[str, Shift], before: Mapping[str, Shift], least: float = CHANGING, false: float = FALSE_CHANGES
+    now: Mapping[str, Shift], before: Mapping[str, Shift], least: float = DIFFERING, false: float = FALSE_CHANGES
 ) -> dict[str, float]:
     r"""Groups that have changed by more than a station may change by itself, the largest difference first.
 

@@ -11,7 +11,9 @@ from wetwell.sim2real.likelihood.evidence import Evidence
 
 def found(precision):
     count = precision.shape[0]
-    return Evidence(log=0.0, by_block=np.zeros(0), residuals=np.zeros(0), step=np.zeros(count), precision=precision)
+    return Evidence(
+        log=0.0, by_block=np.zeros(0), residuals=np.zeros(0), step=np.zeros(count), precision=precision, stirred=()
+    )
 
 
 def fit_of(name, move):

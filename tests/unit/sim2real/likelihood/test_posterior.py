@@ -30,7 +30,7 @@ def test_probabilities_sum_to_1_and_the_best_comes_first():
 @pytest.mark.parametrize(
     ("weights", "verdict"),
     [
-        ([NONE, weight("ragging", log=5.0)], "none"),  # not worth a name
+        ([NONE, weight("ragging", log=2.0)], "none"),  # not worth a name
         ([NONE, weight("ragging", log=500.0)], "effect"),
         ([NONE, weight("ragging", log=500.0, log_flexible=60.0)], "unknown"),  # leaves what it cannot do
         ([Weight(effects=(), log=0.0, log_flexible=60.0), weight("ragging", log=5.0)], "unknown"),
@@ -43,7 +43,7 @@ def test_the_verdict_is_what_is_most_probable(weights, verdict):
 
 def test_a_further_effect_has_to_earn_its_place():
     pair = ("motor_slip", "ragging")
-    for gain, expected in ((5.0, ("ragging",)), (50.0, pair)):
+    for gain, expected in ((2.0, ("ragging",)), (20.0, pair)):
         posterior = posterior_of([NONE, weight("ragging", log=900.0), weight(*pair, log=900.0 + gain)], 25)
         assert best_set(posterior) == expected
 

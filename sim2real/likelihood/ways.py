@@ -1,0 +1,144 @@
+"""Where a model is good and where it is poor: the likeliest way, by what a fit leaves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.likelihood.cells import Block
+from wetwell.sim2real.likelihood.covariance import (
+    DIFFERING,
+    EVEN,
+    GOOD,
+    LATE,
+    POOR,
+    Allowance,
+    Errors,
+    Form,
+)
+
+POORLY = 0.1
+"""Probability that a right model is poor in a span or group; and that a block is one where it mostly is. [1]"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """Errors that there may be, and whether these are poor."""
+
+    errors: Errors
+    is_poor: bool
+
+
+ALIKE = (Way(errors=GOOD, is_poor=False), Way(errors=POOR, is_poor=True))
+"""What may be wrong alike for all pumps and cycles in a span of time."""
+DIFFERENT = (
+    Way(errors=EVEN, is_poor=False),
+    Way(errors=GOOD.times(DIFFERING), is_poor=False),
+    Way(errors=POOR.times(DIFFERING), is_poor=True),
+)
+"""What may differ between pumps, or between cycles."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ways:
+    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle."""
+
+    span: Sequence[Way] = ALIKE
+    own: Sequence[Way] = DIFFERENT
+    changing: Sequence[Way] = DIFFERENT
+
+
+KNOWN = Ways()
+
+
+def likeliest(
+    block: Block, residuals: Floats, form: Form, swing: float, ways: Ways = KNOWN
+) -> tuple[float, Allowance]:
+    """What may be wrong, most probably, by the means of groups and their scatter over the cycles.
+
+    Parameters
+    ----------
+    block : Block
+    residuals : (k,) array
+    form : Form
+        Of the block's cells.
+    swing : float
+        Of `SWINGS`.
+    ways : Ways
+
+    Returns
+    -------
+    log_prior, allowance : float, Allowance
+        Logarithm of the probability of the ways that were chosen, and what they allow.
+    """
+    counts = block.group_sums(np.ones(residuals.size))
+    mean, noise, allowed, signature, swinging, late = (
+        block.group_sums(values) / counts
+        for values in (
+            residuals,
+            (1.0 + block.surge) * block.variance,
+            block.allowed**2,
+            form.signature**2,
+            form.swinging**2,
+            form.late**2,
+        )
+    )
+
+    def variances(of: Sequence[Way]) -> Floats:
+        return np.array([one.errors.offset**2 * allowed + one.errors.form**2 * signature for one in of])
+
+    scatter = block.group_sums((residuals - mean[block.group]) ** 2)
+    changes = noise + swing**2 * swinging + variances(ways.changing)
+    changing, log_prior = _chosen(-0.5 * ((counts - 1.0) * np.log(changes) + scatter / changes), ways.changing)
+    of_mean = _picked(changes, changing) / counts
+
+    spans = np.bincount(block.span)
+    apart = of_mean + (LATE[2] ** 2) * late + variances(ways.own)
+    weight = 1.0 / (of_mean + variances(ways.own)[-1])
+    middle = np.bincount(block.span, weight * mean) / np.bincount(block.span, weight)
+    freedom = (1.0 - 1.0 / spans)[block.span]
+    away = (mean - middle[block.span]) ** 2
+    own, prior = _chosen(-0.5 * (freedom * np.log(apart) + away / apart), ways.own)
+    log_prior += prior
+
+    left = np.bincount(block.span, _picked(apart, own)) / spans**2 + np.bincount(block.span, late) / spans
+    alike = left + np.array([np.bincount(block.span, one) / spans for one in variances(ways.span)])
+    span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span)
+    log_prior += prior
+    return log_prior, Allowance(
+        span=_errors(ways.span, span[block.span]),
+        own=_errors(ways.own, own),
+        changing=_errors(ways.changing, changing[block.group]),
+        swing=swing,
+    )
+
+
+def _chosen(logs: Floats, ways: Sequence[Way]) -> tuple[Integers, float]:
+    """(n,) likeliest of the ways by their (ways, n) logarithms, and the logarithm of the probability of the choice.
+
+    A block is prone to be poor with the probability with which one of its members is where it is not.
+    """
+    poor = np.array([way.is_poor for way in ways])
+    if poor.all():
+        return np.zeros(logs.shape[1], dtype=np.int64), 0.0
+    tried = []
+    for share, log_prone in ((POORLY, np.log(1.0 - POORLY)), (1.0 - POORLY, np.log(POORLY))):
+        log_priors = np.log(np.where(poor, share / poor.sum(), (1.0 - share) / (~poor).sum()))
+        best = np.argmax(logs + log_priors[:, None], axis=0)
+        log_prior = float(log_priors[best].sum() + log_prone)
+        tried.append((float(_picked(logs, best).sum()) + log_prior, best, log_prior))
+    _, best, log_prior = max(tried, key=lambda one: one[0])
+    return best, log_prior
+
+
+def _picked(values: Floats, chosen: Integers) -> Floats:
+    """(n,) of (ways, n) values."""
+    return values[chosen, np.arange(chosen.size)]
+
+
+def _errors(ways: Sequence[Way], chosen: Integers) -> Errors:
+    return Errors(
+        offset=np.array([way.errors.offset for way in ways])[chosen],
+        form=np.array([way.errors.form for way in ways])[chosen],
+    )
