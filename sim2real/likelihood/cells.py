@@ -53,6 +53,10 @@ class Block:
         """(groups, ...) sums of (k, ...) values."""
         return _sums(self.group, values)
 
+    def group_means(self, values: Floats) -> Floats:
+        """(groups,) means of (k,) values."""
+        return self.group_sums(values) / self.group_sums(np.ones(values.size))
+
     def cycle_sums(self, values: Floats) -> Floats:
         """(cycles, ...) sums of (k, ...) values."""
         return _sums(self.cycle, values)

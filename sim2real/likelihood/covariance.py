@@ -136,7 +136,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
         (block.allowed, OFFSET, span.offset, each.offset)
     ]
     if np.any(form.signature):
-        parts.append((form.signature, FORM, span.form, each.form))
+        parts.append((block.group_means(form.signature)[block.group], FORM, span.form, each.form))
     if np.any(form.late):
         parts.append((form.late, *LATE))
     weight = 1.0 / variance

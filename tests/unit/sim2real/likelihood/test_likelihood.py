@@ -67,7 +67,7 @@ def dense(block, form, allowance):
     same_group, same_span = group[:, None] == group[None, :], of_cell[:, None] == of_cell[None, :]
     for load, of_block, of_span, each in (
         (allowed, GOOD.offset, span.offset, own.offset),
-        (f, GOOD.form, span.form, own.form),
+        (block.group_means(f)[group], GOOD.form, span.form, own.form),
     ):
         spans, groups = of_span[group], each[group]
         alike = of_block**2 + np.outer(spans, spans) * same_span + np.outer(groups, groups) * same_group
