@@ -7,7 +7,7 @@ from wetwell.services.reports.gap.lead import effect_words
 from wetwell.sim2real.diagnosis.report import GapReport
 from wetwell.sim2real.experiments.reported import OrderedStep, ProposedAct
 
-_WORDS = (
+_WHAT_IT_SAYS = (
     "Each act was simulated under every answer that is left. Information is what it is expected to tell: 1 bit "
     "answers one question of yes or no. The truth is the probability that the right answer is expected to have "
     "afterwards. The price is that of energy and work{prices}. An act tells answers apart where the evidence is "
@@ -31,7 +31,9 @@ def experiments_table(report: GapReport, *, are_prices_default: bool) -> str:
     if report.experiments:
         prices = ", at default prices: the station file has no costs" if are_prices_default else ""
         head = [*_HEAD, "limits", "tells apart"]
-        body += paragraph(_WORDS.format(prices=prices)) + table(head, [_row(act) for act in report.experiments])
+        body += paragraph(_WHAT_IT_SAYS.format(prices=prices)) + table(
+            head, [_row(act) for act in report.experiments]
+        )
     if report.refused:
         rows = [[effect_words(act.act), act.reason] for act in report.refused]
         body += paragraph("May not be done at this station:") + table(["act", "rule that it would break"], rows)
