@@ -440,4 +440,5 @@ export default {
   "power meter": "Leistungsmesser",
   "telemetry": "Telemetrie",
   "station": "Station",
+  "Pages": "Seiten",
 };
