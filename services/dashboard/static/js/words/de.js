@@ -441,4 +441,13 @@ export default {
   "telemetry": "Telemetrie",
   "station": "Station",
   "Pages": "Seiten",
+  "alarm service": "Alarmdienst",
+  "dashboard": "Seite",
+  "detector": "Detektor",
+  "fleet": "Flotte",
+  "gateway": "Gateway",
+  "historian": "Historian",
+  "router": "Router",
+  "simulator": "Simulator",
+  "watch of the gap": "Überwachung des Abstands",
 };
