@@ -15,8 +15,8 @@ import pytest
 from walks import LEFT_OUT_PAGES, WALKS, Walk
 
 ROOT = Path(__file__).parents[2]
-PORTS = ("7447", "8080", "5020", "9100")
-"""Of the bus, the control-room page, the PLC and the figures; a walk has its own."""
+PORTS = ("7447", "8080", "5020", "5021", "9100")
+"""Of the bus, the control-room page, two PLCs and the figures; a walk has its own."""
 PATIENCE_S = 240
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?")
 """A number; not one that is part of a name."""
@@ -157,7 +157,7 @@ def free_ports() -> dict[str, str]:
 
 def environment_of(folder: Path, ports: dict[str, str]) -> dict[str, str]:
     """Environment in which `wetwell` and `python` are those of the test, and services take its ports."""
-    bus, page, plc, _ = ports.values()
+    bus, page, plc, *_ = ports.values()
     binaries = folder / "bin"
     binaries.mkdir()
     (binaries / "wetwell").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m wetwell.services "$@"\n')

@@ -62,7 +62,10 @@ WALKS = (
     Walk(("docs/add-a-station.md",), services=("wetwell up",), shows_output=True),
     Walk(
         ("docs/tutorial-connect-a-plc.md",),
-        services=("wetwell plc", "wetwell router", "wetwell gateway --plc", "wetwell detector", "wetwell dashboard"),
+        services=(
+            *("wetwell plc", "wetwell router", "wetwell gateway --plc", "wetwell detector", "wetwell dashboard"),
+            "python harbour_plc.py",
+        ),
         patient=("wetwell gateway read", "wetwell doctor"),
         codes={"wetwell doctor": 1},  # without historian and alarms it warns
         shows_output=True,

@@ -1,4 +1,4 @@
-"""An editor that knows schemas of TOML checks a file by the line that the docs tell to write: taplo is what it runs."""
+"""An editor checks a file by the line that the docs tell to write: here by taplo, which is what such editors run."""
 
 import json
 import subprocess
