@@ -20,7 +20,7 @@ from wetwell.services.commands import (
     recordings,
     token,
 )
-from wetwell.services.commands.groups import CommandGroup
+from wetwell.services.commands.inputs import CommandGroup
 from wetwell.services.commands.options import ADMINISTER, GAP, RUN
 
 app = typer.Typer(

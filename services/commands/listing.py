@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.groups import CommandGroup
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     ADMINISTER,
     AsStationOption,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.groups import CommandGroup
+from wetwell.services.commands.inputs import CommandGroup
 from wetwell.services.commands.options import ConfigOption, JsonOption, number, print_result
 from wetwell.services.security.role import Role
 
