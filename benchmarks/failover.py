@@ -23,7 +23,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
-from pair_site import Judged, PairSite, stations_of
+from detector_pair import Judged, Player, stations_of
+from pair_site import PairSite
 from postgres_server import running_server
 
 KINDS = ("kill", "freeze", "cut", "clock")
@@ -33,12 +34,12 @@ SETTLE_S = 5.0
 
 
 async def measure(
-    site: PairSite, kinds: list[str], rounds: int, seed: int
+    site: PairSite, player: Player, kinds: list[str], rounds: int, seed: int
 ) -> dict[str, list[tuple[float, float, float]]]:
     """Of each kind its rounds: when the accident was, when all was well again, after how long the lease was taken."""
     shifts = random.Random(seed)
     found: dict[str, list[tuple[float, float, float]]] = {kind: [] for kind in kinds}
-    async with site.running("a", "b"):
+    async with site.running("a", "b"), player.playing(site.bus, site.endpoint):
         await asyncio.sleep(SETTLE_S)
         for number in range(rounds):
             for kind in kinds:
@@ -46,8 +47,8 @@ async def measure(
                 found[kind].append((began_s, time.monotonic(), taken_s))
             print(f"round {number + 1} of {rounds}", file=sys.stderr)
         await asyncio.sleep(SETTLE_S)
-        await site.end_of_samples()
-        await asyncio.sleep(SETTLE_S)
+        await player.end_of_samples()
+        await player.all_heard()
     return found
 
 
@@ -77,9 +78,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="wetwell-failover-") as name, running_server() as server:
         folder = Path(name)
         stations = stations_of(folder, arguments.stations)
-        site = PairSite(server.url, folder, stations, arguments.speed, arguments.seed)
-        rounds = asyncio.run(measure(site, list(arguments.kinds), arguments.rounds, arguments.seed))
-        judged = site.judged()
+        files = (word for one in stations for word in ("--station", str(folder / f"{one.name}.toml")))
+        site = PairSite(server.url, folder, ["detector", *files])
+        player = Player(stations, arguments.speed, arguments.seed)
+        rounds = asyncio.run(measure(site, player, list(arguments.kinds), arguments.rounds, arguments.seed))
+        judged = player.judged()
     counts = {name: getattr(judged, name) for name in ("expected", "missing", "twice", "otherwise", "plain_twice")}
     result = {
         "machine": f"{os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}",

@@ -114,6 +114,7 @@ class Outbox:
             If another owns the role by now: nothing more is kept or sent.
         """
         while await self._news.wait():
+            self._news.clear()
             await self.flush()
 
     async def flush(self) -> None:
@@ -126,7 +127,6 @@ class Outbox:
         """
         while self._going is not None or self._after or not self._entry.is_empty:
             if self._going is None:
-                self._news.clear()
                 with self._lock:
                     self._going = self._entry, self._after
                     self._entry, self._after = Entry(), []
