@@ -36,5 +36,5 @@ def hang_up(connection: psycopg.Connection[Any]) -> None:
 
 def unfrozen(patience_s: float) -> str:
     """Options of a connection: the server ends a transaction whose process stands for so long. [s]."""
-    patience_ms = max(1, round(1000.0 * patience_s))
-    return f"-c idle_in_transaction_session_timeout={patience_ms} -c lock_timeout={patience_ms}"
+    milliseconds = max(1, round(1000.0 * patience_s))
+    return f"-c idle_in_transaction_session_timeout={milliseconds} -c lock_timeout={milliseconds}"
