@@ -19,7 +19,7 @@ from shifted_clock import shift_file
 from wetwell.protocols.bus.zenoh.link import ZenohBus, open_router
 from wetwell.services.lease.table import Standing, standings
 
-PATIENCE_S = 120.0
+PATIENCE_S = 300.0
 FRESH_S = 1.0
 """A member that was seen within this time stands by. [s]"""
 WATCHED_S = 2.0
