@@ -60,10 +60,14 @@ class ZenohPublisher:
     """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
 
     def __init__(
-        self, session: zenoh.Session, key: str, history: int, queries: "deque[tuple[ZenohPublisher, zenoh.Query]]"
+        self,
+        session: zenoh.Session,
+        key: str,
+        cache: PublisherCache,
+        queries: "deque[tuple[ZenohPublisher, zenoh.Query]]",
     ) -> None:
         self.key = key
-        self.cache = PublisherCache(history)
+        self.cache = cache
         self._silent_s = 0.0
         self._told_s = 0.0
         self._pause_s = 0.0
