@@ -10,6 +10,8 @@ BASE ?= python:3.11-slim-bookworm
 PYTEST := $(BIN)/pytest -q --numprocesses=3 --dist=worksteal --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
+# Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
+export OPENBLAS_NUM_THREADS = 1
 
 .PHONY: help up test check long soak lint types imports kernels format docs requirements clean sbom audit image
 

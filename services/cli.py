@@ -1,5 +1,6 @@
 """The command `wetwell`: its groups, and what it says when a user errs."""
 
+import os
 import sys
 from typing import Annotated, NoReturn
 
@@ -61,6 +62,7 @@ def wetwell(
 
 def main() -> NoReturn:
     """Run the command; an error of the user's is one line on standard error and exit code 2."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
     try:
         app(standalone_mode=True)
     except WetwellError as error:
