@@ -1,7 +1,7 @@
 """Recordings: made, prepared, converted, summed up."""
 
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
@@ -31,6 +31,9 @@ from wetwell.services.commands.options import (
     station_if,
 )
 
+if TYPE_CHECKING:
+    from wetwell.protocols.orders import Step
+
 app = typer.Typer()
 
 StationCheckOption = Annotated[
@@ -43,7 +46,7 @@ def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
     station: StationOption,
     scenario: ScenarioOption = "nominal",
-    days: Annotated[float | None, typer.Option(help="Length; default: the scenario's.")] = None,
+    days: Annotated[float | None, typer.Option(metavar="NUMBER", help="Length; default: the scenario's.")] = None,
     seed: SeedOption = 1,
     act: Annotated[
         Path | None,
@@ -55,13 +58,16 @@ def simulate(
     as_json: JsonOption = False,
 ) -> None:
     """Write a simulated recording, with truth columns."""
-    from wetwell.services.batch.gap.experiment import steps_of
     from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 
     given_s = None if days is None else positive(days, "--days") * 86_400.0
     start_ns = DEFAULT_START_NS if begin is None else stamp_of(begin, "--begin")
-    steps = () if act is None else steps_of(act)
+    steps: tuple[Step, ...] = ()
+    if act is not None:
+        from wetwell.services.batch.gap.experiment import steps_of
+
+        steps = steps_of(act)
     plant = plant_of(station, find_scenario(scenario), seed, start_ns, steps)
     length_s = plant.scenario.duration_s if given_s is None else given_s
     from wetwell.services.batch.recordings import simulate as write
@@ -81,7 +87,7 @@ def dataset(
     station: Annotated[
         list[str] | None, typer.Option("--station", metavar="FILE", help="Base station; may be given again.")
     ] = None,
-    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    days: Annotated[float, typer.Option(metavar="NUMBER", help="Length of each recording.")] = 1.0,
     form: Annotated[
         Literal["parquet", "csv.gz"], typer.Option("--format", help="Form of the recordings.")
     ] = "parquet",
@@ -131,7 +137,9 @@ def convert(
         str | None,
         typer.Option("--station", metavar="FILE", help="Station file, for drives in % of their nominal frequency."),
     ] = None,
-    form: Annotated[Literal["skab"], typer.Option("--from", help="Form of a file without mapping.")] = "skab",
+    form: Annotated[
+        Literal["skab"], typer.Option("--from", metavar="FORM", help="Form of a file without mapping.")
+    ] = "skab",
     as_json: JsonOption = False,
 ) -> None:
     """Turn an export of another system into a recording."""
