@@ -14,6 +14,7 @@ import zenoh
 from wetwell.protocols.bus.interface import Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.publisher import ZenohPublisher, at_once
 from wetwell.protocols.bus.zenoh.session import open_client_session, open_router_session, refusal
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
@@ -75,6 +76,7 @@ class ZenohBus:
         self._session = session
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
+        self._names = DeclaredNames(session)
         self._worker = ZenohWorker(session, is_router=is_router)
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
@@ -103,7 +105,7 @@ class ZenohBus:
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
-            publisher = ZenohPublisher(self._session, key, history, self._worker.queries)
+            publisher = ZenohPublisher(self._session, key, history, self._worker.queries, self._names)
         self._worker.add_publisher(publisher)
         return publisher
 
@@ -140,7 +142,9 @@ class ZenohBus:
         recover: bool,
     ) -> None:
         with refusal("subscribe to", ", ".join(keys[:3])):
-            subscription = ZenohSubscription(self._session, keys, history, mailbox, deliver, recover=recover)
+            subscription = ZenohSubscription(
+                self._session, self._names, keys, history, mailbox, deliver, recover=recover
+            )
             self._worker.add_subscription(subscription)
 
     def answer(self, key: str) -> Mailbox[Request]:

@@ -10,6 +10,7 @@ import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.session import reason
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.message import JSON_ENCODING
@@ -60,7 +61,12 @@ class ZenohPublisher:
     """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
 
     def __init__(
-        self, session: zenoh.Session, key: str, history: int, queries: "deque[tuple[ZenohPublisher, zenoh.Query]]"
+        self,
+        session: zenoh.Session,
+        key: str,
+        history: int,
+        queries: "deque[tuple[ZenohPublisher, zenoh.Query]]",
+        names: DeclaredNames,
     ) -> None:
         self.key = key
         self.cache = PublisherCache(history)
@@ -69,6 +75,9 @@ class ZenohPublisher:
         self._pause_s = 0.0
         self._rhythm_s = 0.0
         self._session = session
+        self._names = names
+        names.take()
+        self._tail: zenoh.Publisher | None = None
         self._queries = queries
         self._lock = threading.Lock()
         self._publisher = session.declare_publisher(
@@ -118,9 +127,17 @@ class ZenohPublisher:
         if not self.cache.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
             return False
         self._told_s = now_s
-        drop = zenoh.CongestionControl.DROP
-        self._session.put(tail_key(self.key), b"", attachment=self.cache.next_header, congestion_control=drop)
+        self._tell_end()
         return True
+
+    def _tell_end(self) -> None:
+        drop, key = zenoh.CongestionControl.DROP, tail_key(self.key)
+        if self._tail is None and self._names.take():
+            self._tail = self._session.declare_publisher(key, congestion_control=drop)
+        if self._tail is None:
+            self._session.put(key, b"", attachment=self.cache.next_header, congestion_control=drop)
+        else:
+            self._tail.put(b"", attachment=self.cache.next_header)
 
 
 def at_once(handle: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":

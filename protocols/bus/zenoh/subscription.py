@@ -11,6 +11,7 @@ from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import Page
 from wetwell.protocols.bus.sequencer import Sequencer, SourceStream
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.publisher import at_once
 
 logger = logging.getLogger(__name__)
@@ -32,6 +33,7 @@ class ZenohSubscription:
     def __init__(
         self,
         session: zenoh.Session,
+        names: DeclaredNames,
         keys: Sequence[str],
         history: int,
         mailbox: Mailbox[Any],
@@ -40,6 +42,7 @@ class ZenohSubscription:
         recover: bool,
     ) -> None:
         self.keys = keys
+        self._names = names
         self.history = history
         self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
@@ -49,6 +52,7 @@ class ZenohSubscription:
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         self._channels: list[Callable[[], zenoh.Sample | None]] = []
         for key in keys:
+            names.note(key)
             room = max(CHANNEL // len(keys), LEAST_CHANNEL)
             subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
             self._declared.append(subscriber)
@@ -70,14 +74,14 @@ class ZenohSubscription:
         sequencer, put = self.sequencer, zenoh.SampleKind.PUT
         is_crowded = self.is_crowded
         for try_recv in self._channels:
-            for _ in range(TURN):
-                sample = try_recv()
-                if sample is None:
-                    break
+            left = TURN
+            while left and (sample := try_recv()) is not None:  # of many channels most are empty, each time
+                left -= 1
                 if sample.kind != put:
                     continue
                 attached = sample.attachment if self.recovers else None
                 key, header = str(sample.key_expr), None if attached is None else attached.to_bytes()
+                self._names.add(key)
                 is_crowded = is_crowded or len(sequencer.ready) >= self._mailbox.half
                 if is_crowded and header is not None and sequencer.let_go(key, header):
                     continue

@@ -7,6 +7,7 @@ import zenoh
 
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
 
@@ -64,6 +65,7 @@ class Bench:
         self.got: list[bytes] = []
         self.subscription = ZenohSubscription(
             self.session,
+            DeclaredNames(self.session),
             [KEY],
             0,
             Mailbox(100),
