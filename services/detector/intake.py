@@ -23,6 +23,8 @@ KEPT_S = 2.0
 """Time in which what publishers keep comes, even if some of it is lost on the way once."""
 BACKFILLS_AT_ONCE = 8
 """Stations that ask the historian at the same time."""
+ORDERS_PACE_S = 0.1
+"""Orders come from people. [s]"""
 SAMPLES_AT_ONCE = 500
 """Samples that are judged before the other tasks have their turn."""
 
@@ -94,7 +96,7 @@ class Intake:
         self._behind = {judge: Waiting(room) for judge in judges if judge.is_restored}
         self._passed_over = 0
         self._samples = bus.collect(list(self._judges), history=ALL_KEPT, capacity=CAPACITY)
-        self._orders = bus.collect(list(self._obeying))
+        self._orders = bus.collect(list(self._obeying), pace_s=ORDERS_PACE_S)
 
     @property
     def dropped(self) -> int:

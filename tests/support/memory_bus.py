@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Self
 
-from wetwell.protocols.bus.interface import Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 
 REQUESTS = 1_000
@@ -103,6 +103,7 @@ class MemoryBus:
         history: int = 0,
         capacity: int = 10_000,
         recover: bool = True,  # noqa: ARG002 - nothing is lost here
+        pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each key in it."""
         mailbox: Mailbox[bytes] = Mailbox(capacity)
@@ -117,6 +118,7 @@ class MemoryBus:
         history: int = 0,
         capacity: int = 10_000,
         recover: bool = True,  # noqa: ARG002 - nothing is lost here
+        pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity)

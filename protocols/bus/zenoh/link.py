@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import zenoh
 
-from wetwell.protocols.bus.interface import Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
 from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
@@ -49,9 +49,9 @@ class ZenohBus:
     Characteristics: buffered: in each subscription, and in each publisher its last `history` messages, both with a
     bound in bytes · when full: a subscription that recovers lets messages go, as a slow way to it does, and asks for
     them again from the publisher's history when there is room; one that does not drops the oldest and counts it ·
-    threads: any may publish; one of the bus's own fetches what has come, each 10 ms · reconnect: a client comes back
-    by itself, usually within 0.5 s of the router; its publishers, subscriptions and what it announced are then as
-    before.
+    threads: any may publish; one of the bus's own fetches what has come, at the pace of each subscription ·
+    reconnect: a client comes back by itself, usually within 0.5 s of the router; its publishers, subscriptions and
+    what it announced are then as before.
 
     The messages of one publisher come in their order, each once. What was lost, or sent while a router was away,
     comes afterwards as far as the publisher keeps it; later messages of it wait until then, about a minute where
@@ -110,7 +110,7 @@ class ZenohBus:
         return publisher
 
     def subscribe(
-        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
+        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True, pace_s: float = PACE_S
     ) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
@@ -121,15 +121,21 @@ class ZenohBus:
         def deliver(messages: list[Keyed]) -> None:
             mailbox.extend([payload for _, payload in messages])
 
-        self._subscribe([key], history, mailbox, deliver, recover=recover)
+        self._subscribe([key], history, mailbox, deliver, recover=recover, pace_s=pace_s)
         return mailbox
 
     def collect(
-        self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000, recover: bool = True
+        self,
+        keys: Sequence[str],
+        *,
+        history: int = 0,
+        capacity: int = 10_000,
+        recover: bool = True,
+        pace_s: float = PACE_S,
     ) -> Mailbox[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity, _size_bytes)
-        self._subscribe(keys, history, mailbox, mailbox.extend, recover=recover)
+        self._subscribe(keys, history, mailbox, mailbox.extend, recover=recover, pace_s=pace_s)
         return mailbox
 
     def _subscribe(
@@ -140,10 +146,11 @@ class ZenohBus:
         deliver: Callable[[list[Keyed]], None],
         *,
         recover: bool,
+        pace_s: float,
     ) -> None:
         with refusal("subscribe to", ", ".join(keys[:3])):
             subscription = ZenohSubscription(
-                self._session, self._names, keys, history, mailbox, deliver, recover=recover
+                self._session, self._names, keys, history, mailbox, deliver, recover=recover, pace_s=pace_s
             )
             self._worker.add_subscription(subscription)
 

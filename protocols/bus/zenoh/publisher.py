@@ -58,7 +58,13 @@ def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0
 
 
 class ZenohPublisher:
-    """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
+    """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`.
+
+    Attributes
+    ----------
+    rests_until_s : float
+        Until then `settle` need not be asked, whatever is sent meanwhile. [s]
+    """
 
     def __init__(
         self,
@@ -70,6 +76,7 @@ class ZenohPublisher:
     ) -> None:
         self.key = key
         self.cache = PublisherCache(history)
+        self.rests_until_s = 0.0
         self._silent_s = 0.0
         self._told_s = 0.0
         self._pause_s = 0.0
@@ -121,10 +128,13 @@ class ZenohPublisher:
     def stir(self, now_s: float) -> None:
         """Say which message was the last as if it had just been sent: the link was away."""
         self._silent_s, self._told_s, self._rhythm_s = now_s - LAST_LOSS_S, 0.0, 0.0
+        self.rests_until_s = 0.0
 
     def settle(self, now_s: float) -> bool:
         """Tell those who follow which message was the last, if it is time to; whether it was."""
         if not self.cache.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
+            has_spoken = now_s - self._silent_s <= LAST_LOSS_S
+            self.rests_until_s = (self._silent_s if has_spoken else now_s) + LAST_LOSS_S
             return False
         self._told_s = now_s
         self._tell_end()

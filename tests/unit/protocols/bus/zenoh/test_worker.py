@@ -148,7 +148,7 @@ def test_no_period_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forg
     told: list[int] = []
 
     def publisher(number):
-        return SimpleNamespace(settle=lambda _: told.append(number) or True)
+        return SimpleNamespace(rests_until_s=0.0, settle=lambda _: told.append(number) or True)
 
     bench.worker._publishers = [publisher(number) for number in range(1_000)]
     rounds = 1_000 // TOLD_AT_ONCE
