@@ -1,7 +1,7 @@
 """Recordings: made, prepared, converted, summed up."""
 
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
@@ -31,6 +31,9 @@ from wetwell.services.commands.options import (
     station_if,
 )
 
+if TYPE_CHECKING:
+    from wetwell.protocols.orders import Step
+
 app = typer.Typer()
 
 StationCheckOption = Annotated[
@@ -55,20 +58,27 @@ def simulate(
     as_json: JsonOption = False,
 ) -> None:
     """Write a simulated recording, with truth columns."""
-    from wetwell.services.batch.gap.experiment import steps_of
     from wetwell.services.stations import find_scenario
     from wetwell.simulator.scenario import DEFAULT_START_NS
 
     given_s = None if days is None else positive(days, "--days") * 86_400.0
     start_ns = DEFAULT_START_NS if begin is None else stamp_of(begin, "--begin")
-    steps = () if act is None else steps_of(act)
-    plant = plant_of(station, find_scenario(scenario), seed, start_ns, steps)
+    plant = plant_of(station, find_scenario(scenario), seed, start_ns, _steps_of(act))
     length_s = plant.scenario.duration_s if given_s is None else given_s
-    from wetwell.services.batch.recordings import simulate as write
+    from wetwell.services.batch.simulation import simulate as write
 
     rows = write(plant, max(round(length_s), 1), out)
     summary = {"recording": str(out), "rows": rows, "station": plant.station.name, "seed": seed}
     print_result(summary, as_json=as_json)
+
+
+def _steps_of(act: Path | None) -> tuple["Step", ...]:
+    """Steps of an experiment; what knows experiments loads most of the diagnosis."""
+    if act is None:
+        return ()
+    from wetwell.services.batch.gap.experiment import steps_of
+
+    return steps_of(act)
 
 
 @app.command(cls=about("--station"), rich_help_panel=RECORD)
