@@ -11,7 +11,7 @@ PYTEST := $(BIN)/pytest -q --numprocesses=3 --dist=worksteal --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: help up test check soak lint types imports kernels format docs requirements clean sbom audit image
+.PHONY: help up test check long soak lint types imports kernels format docs requirements clean sbom audit image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -21,11 +21,14 @@ up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C 
 
 test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard each commit
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint imports types kernels
-	$(PYTEST) -m "not check and not soak"
+	$(PYTEST) -m "not check and not long and not soak"
 
 check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
-	$(BIN)/pytest -q --durations=10 -m "check and not soak" tests/browser  # alone: a page that is watched must keep up with its site
-	$(PYTEST) -m "check and not soak" --ignore=tests/browser
+	$(BIN)/pytest -q --durations=10 -m "check and not long and not soak" tests/browser  # alone: a page that is watched must keep up with its site
+	$(PYTEST) -m "check and not long and not soak" --ignore=tests/browser
+
+long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each other Python
+	$(PYTEST) -m "long and not soak"
 
 soak: $(VENV)/.dev  ## What needs the machine alone: kills at 600 times life; twenty starts, with a load on purpose
 	$(BIN)/pytest -q -m soak

@@ -39,8 +39,9 @@ from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import DAY_NS, Batch, EventRow, StationSpan
+from wetwell.services.historian.store.interface import DAY_NS, StationSpan
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.lifecycle import ticks
 from wetwell.services.stations import find_scenario, find_station
@@ -238,20 +239,24 @@ def keep_days(folder: Path, days: int) -> int:
     day = Samples.of_recording(recording)
     start_ns = int(day.time_ns[0])
     hours = Hours.of_samples(day, start_ns, start_ns + DAY_NS)
+    historian = Historian(store)
     verdicts = 0
     store.live.adopt([StationSpan(STATION, start_ns, start_ns + days * DAY_NS - 1)])
     for number in range(days):
         shift_ns = number * DAY_NS
         store.archive.write_samples(STATION, start_ns + shift_ns, replace(day, time_ns=day.time_ns + shift_ns))
-        events = [verdict_row(start_ns + shift_ns + second * 10**9, number) for second in range(0, 86_400, 450)]
-        store.write(Batch(events=events))
+        for second in range(0, 86_400, 450):
+            historian.handle("verdicts", verdict_at(start_ns + shift_ns + second * 10**9, number))
+            verdicts += 1
+        historian.commit(start_ns)
         store.live.write_hours(STATION, replace(hours, hour_ns=hours.hour_ns + shift_ns))
-        verdicts += len(events)
+    while historian.maintain(start_ns + days * DAY_NS):
+        pass
     store.close()
     return verdicts
 
 
-def verdict_row(time_ns: int, day: int) -> EventRow:
+def verdict_at(time_ns: int, day: int) -> bytes:
     """A verdict as long as those of the detector are."""
     state: State = "system_fault" if day // 10 % 2 else "normal"
     verdict = Verdict(
@@ -263,7 +268,7 @@ def verdict_row(time_ns: int, day: int) -> EventRow:
         evidence={"figures": [round(1e-3 * number, 3) for number in range(200)]},
         window=(time_ns - 300 * 10**9, time_ns),
     )
-    return EventRow("verdicts", STATION, time_ns, verdict.encode())
+    return verdict.encode()
 
 
 def page_of_days(days: int) -> dict[str, Any] | None:

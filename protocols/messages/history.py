@@ -22,9 +22,9 @@ class HistoryQuery(Message):
     come, or if they are more than `points` days, and of these the last `points`. Of verdicts, alarms and acts of
     maintenance the last `points` come, of episodes those that reach into the span. `changes` are the verdicts of
     which state, asset or stage is another than before, without their evidence, and for each pump the one that stood
-    at `start`. `stations`, asked about the station `_site`, gives a message for each station, with the times of its
-    `first` and `last` sample; a stamp that lies more than a day ahead of all others is not the last one until ten of
-    that time are there.
+    at `start`. `stations`, asked about the station `_site`, gives a message for each station, else for the one asked
+    about, with the times of its `first` and `last` sample; a stamp that lies more than a day ahead of all others is
+    not the last one until ten of that time are there.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ from wetwell.services.historian.hours import Hours, joined_hours
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store.interface import DAY_NS, StationSpan, Store, StoreError, blocks, day_of
+from wetwell.services.historian.summary import TEN_NS
 
 
 def answer(store: Store, station: str, payload: bytes) -> History:
@@ -31,12 +32,14 @@ def answer(store: Store, station: str, payload: bytes) -> History:
 
 def _answer(store: Store, station: str, query: HistoryQuery) -> History:
     spans = {span.station: span for span in store.stations()}
-    if query.kind == "stations":
+    if query.kind == "stations" and station == SITE:
         return History(
-            station=SITE, kind="stations", messages=tuple(_of_station(store, span) for span in spans.values())
+            station=SITE, kind="stations", messages=tuple(_of_station(store, each) for each in spans.values())
         )
     if station not in spans:
         return History(station=station, kind=query.kind, error=f"station '{station}' is not known")
+    if query.kind == "stations":
+        return History(station=station, kind="stations", messages=(_of_station(store, spans[station]),))
     if query.kind in ("samples", "kpi"):
         return _of_span(store, spans[station], query)
     return History(station=station, kind=query.kind, messages=_messages(store, station, query))
@@ -80,8 +83,23 @@ def _of_samples(store: Store, station: str, start_ns: int, end_ns: int, points: 
     if store.is_few(station, start_ns, end_ns, points):
         samples = merged(list(blocks(store, station, start_ns, end_ns)))
         return _columns(station, "samples", samples.time_ns, _by_name(samples))
-    summary = store.summary(station, start_ns, end_ns, -(-(end_ns - start_ns) // points))
+    summary = store.summary(station, *spans_of(start_ns, end_ns, points))
     return _columns(station, "samples", summary.time_ns, summary.columns())
+
+
+def spans_of(start_ns: int, end_ns: int, points: int) -> tuple[int, int, int]:
+    """Start, end and length of at most so many equal spans; from an hour on all three are whole tens of minutes.
+
+    Examples
+    --------
+    >>> [value / TEN_NS for value in spans_of(TEN_NS // 2, 60 * TEN_NS + 1, 7)]
+    [1.0, 61.0, 9.0]
+    """
+    span_ns = -(-(end_ns - start_ns) // points)
+    if span_ns < HOUR_NS:
+        return start_ns, end_ns, span_ns
+    start_ns, end_ns = (-(-each_ns // TEN_NS) * TEN_NS for each_ns in (start_ns, end_ns))
+    return start_ns, end_ns, -(-(end_ns - start_ns) // (points * TEN_NS)) * TEN_NS
 
 
 def _of_raw(store: Store, station: str, start_ns: int, end_ns: int, points: int) -> History:

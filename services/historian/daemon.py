@@ -33,6 +33,9 @@ CAPACITY = 200_000
 """Most messages of one kind that wait to be taken; what publishers hold comes when there is room."""
 PACE_S = 0.1
 """A tenth of the time between two commits: to take each message as it comes costs more than to keep it. [s]"""
+ANSWERS_AT_ONCE = 4
+"""Questions that are answered at the same time: a page of a station asks about as many."""
+
 PAYLOADS_AT_ONCE = 1_000
 """Payloads that are taken before the other tasks have their turn."""
 
@@ -135,7 +138,18 @@ async def _maintain(historian: Historian, period_s: float) -> None:
 
 
 async def _answer(historian: Historian, questions: Subscription[Request]) -> None:
-    while True:
-        for request in await questions.receive():
-            station = request.key.removeprefix(f"{ROOT}/").removesuffix("/history")
+    """Answer some questions at a time, so that a long one does not hold up the others."""
+    gate = asyncio.Semaphore(ANSWERS_AT_ONCE)
+
+    async def reply(request: Request) -> None:
+        station = request.key.removeprefix(f"{ROOT}/").removesuffix("/history")
+        try:
             request.reply(await asyncio.to_thread(historian.answer, station, request.payload))
+        finally:
+            gate.release()
+
+    async with asyncio.TaskGroup() as group:
+        while True:
+            for request in await questions.receive():
+                await gate.acquire()
+                group.create_task(reply(request), name="historian.reply")

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from wetwell.detector.verdict.episodes import EpisodeLog, episodes_of
 from wetwell.protocols.messages.history import LONGEST_NS, Episode
 from wetwell.protocols.messages.verdict import Verdict
+from wetwell.services.historian.changes import verdicts_of_before
 from wetwell.services.historian.store.interface import EventRow, Store, StoreError
 
 LAST_ROWS = 5_000
@@ -49,9 +50,9 @@ def kept_episodes(store: Store, station: str) -> list[Episode]:
 
 
 def episodes_between(store: Store, station: str, start_ns: int, end_ns: int) -> list[Episode]:
-    """Episodes that reach into a span; gathered from the verdicts where none were kept."""
+    """Episodes that reach into a span; gathered from the verdicts of earlier versions where none were kept."""
     found: Iterable[Episode] = kept_episodes(store, station)
     if not found:
-        payloads = store.events("verdicts", station, start_ns, end_ns, LAST_VERDICTS)
+        payloads = verdicts_of_before(store, station, start_ns, end_ns, LAST_VERDICTS)
         found = episodes_of(map(Verdict.decode, payloads))
     return [one for one in found if one.since < end_ns and (one.to is None or one.to >= start_ns)]

@@ -18,6 +18,7 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.answers import answer
+from wetwell.services.historian.changes import ChangeKeeper
 from wetwell.services.historian.episodes import EpisodeKeeper
 from wetwell.services.historian.rows import SampleRow, pack, pack_block
 from wetwell.services.historian.spool import Row, Spool, size_of
@@ -62,7 +63,7 @@ class Historian:
 
     def __init__(self, store: Store, *, spool_rows: int = 500_000) -> None:
         self._store = store
-        self._episodes = EpisodeKeeper(store)
+        self._keepers = EpisodeKeeper(store), ChangeKeeper(store)
         self._spool_rows = spool_rows
         self._spool = Spool(spool_rows)
         self._counts: Counter[str] = Counter(
@@ -86,7 +87,7 @@ class Historian:
         self._spool.put(rows)
 
     def _rows(self, kind: PayloadKind, payload: bytes) -> Sequence[Row]:
-        """Rows of a payload; a verdict also brings those of the episodes that it changes.
+        """Rows of a payload; a verdict also brings those of the episodes and states that it changes.
 
         Raises
         ------
@@ -98,7 +99,9 @@ class Historian:
         event = _EVENTS[kind].decode(payload)
         _check(event.station, event.time)
         row = EventRow(kind, event.station, event.time, payload)
-        return [row, *(self._episodes.rows(event) if isinstance(event, Verdict) else ())]
+        if not isinstance(event, Verdict):
+            return [row]
+        return [row, *(more for keeper in self._keepers for more in keeper.rows(event))]
 
     def commit(self, now_ns: int) -> int:
         """Give what waits to the store, and return how many samples, verdicts and alarms are now acknowledged.

@@ -12,6 +12,8 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.samples import Samples
 
 MINUTE_NS = 60 * NS_PER_S
+TEN_NS = 10 * MINUTE_NS
+"""Ten minutes: each complete day is kept as such summaries, too, for questions about long spans."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,11 @@ pytestmark = [pytest.mark.check, pytest.mark.timeout(1800)]
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
-VERSIONS = ("3.11", "3.12", "3.13", "3.14")
+OWN = f"3.{sys.version_info.minor}"
+VERSIONS = [
+    version if version == OWN else pytest.param(version, marks=pytest.mark.long)
+    for version in ("3.11", "3.12", "3.13", "3.14")
+]
 IMPORT_ALL = """
 import importlib, json, pkgutil, wetwell
 names = [found.name for found in pkgutil.walk_packages(wetwell.__path__, "wetwell.") if "__main__" not in found.name]

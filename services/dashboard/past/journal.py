@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from wetwell.protocols.bus.interface import Bus
-from wetwell.protocols.bus.keys import SITE
 from wetwell.protocols.messages.history import History
 from wetwell.services.dashboard.past.bands import alarm_bands, verdict_bands
 from wetwell.services.dashboard.past.client import history
@@ -63,5 +62,5 @@ async def journal(bus: Bus, stations: Sequence[str], query: Mapping[str, str]) -
 
 async def is_kept(bus: Bus, station: str) -> bool:
     """Whether the historian knows a station."""
-    answer = await history(bus, SITE, {}, kind="stations")
+    answer = await history(bus, station, {}, kind="stations")
     return any(message.get("station") == station for message in answer.messages)

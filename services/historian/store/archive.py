@@ -1,6 +1,8 @@
-"""Days that are complete, a Parquet file each: `samples/station=alpha/2026-11-20.parquet`; in `minutes/` likewise.
+"""Days that are complete, a Parquet file each: `samples/station=alpha/2026-11-20.parquet`; others likewise.
 
-A file of samples is a recording with two more columns, `seq` and `quality`; it carries its station.
+A file of samples is a recording with two more columns, `seq` and `quality`; it carries its station. In `minutes/` a
+day of which only minutes are left has columns by name. In `tens/` each day has a summary of its ten minutes: five
+columns, of which four are lists as long as `columns_of`, so that a file is read in .4 ms and not in 2.5.
 """
 
 import logging
@@ -23,8 +25,9 @@ from wetwell.services.historian.summary import Summary
 
 log = logging.getLogger(__name__)
 
-Form = Literal["samples", "minutes"]
+Form = Literal["samples", "minutes", "tens"]
 _STAMP = pa.timestamp("ns", tz="UTC")
+_SUMMARY = ("count", "mean", "low", "high")
 _FEW_VALUES = ("running", "count", "quality")
 """Endings of columns that repeat a few values; the others are measured, and take a third less as streams of bytes."""
 
@@ -57,8 +60,8 @@ class Archive:
             return None
         return Samples(
             time_ns=_stamps(table),
-            seq=table["seq"].to_numpy(),
-            quality=table["quality"].to_numpy().astype(np.int64),
+            seq=_numbers(table["seq"]),
+            quality=_numbers(table["quality"]).astype(np.int64),
             values=_matrix(table, columns_of(pumps_of(table.column_names))),
         )
 
@@ -93,18 +96,20 @@ class Archive:
             high=_matrix(table, [f"{name}_max" for name in names]),
         )
 
+    def tens(self, station: str, day_ns: int) -> Summary | None:
+        """Ten minutes of a day; None if there is no file."""
+        table = self._read("tens", station, day_ns)
+        if table is None:
+            return None
+        return Summary(time_ns=_stamps(table), **{name: _of_lists(table[name]) for name in _SUMMARY})
+
     def write_samples(self, station: str, day_ns: int, samples: Samples) -> None:
         """Write the samples of a day, and see that they can be read back."""
         columns = {"seq": pa.array(samples.seq), "quality": pa.array(samples.quality.astype(np.int8))}
         values = dict(zip(samples.columns, samples.values.T, strict=True))
         path = self.path("samples", station, day_ns)
         _write(path, samples.time_ns, values, columns, Origin(station=station))
-        kept = self.samples(station, day_ns)
-        if kept is None or not all(
-            np.array_equal(getattr(kept, name), getattr(samples, name), equal_nan=True)
-            for name in ("time_ns", "seq", "quality", "values")
-        ):
-            raise StoreError(f"{path}: does not hold what was written")
+        _check(path, self.samples(station, day_ns), samples, ("time_ns", "seq", "quality", "values"))
 
     def write_minutes(self, station: str, day_ns: int, minutes: Summary) -> None:
         """Write the minutes of a day, and see that they can be read back."""
@@ -112,12 +117,14 @@ class Archive:
         counts = {f"{name}_count": column for name, column in zip(names, minutes.count.T, strict=True)}
         path = self.path("minutes", station, day_ns)
         _write(path, minutes.time_ns, minutes.columns() | counts, {}, Origin(station=station))
-        kept = self.minutes(station, day_ns)
-        if kept is None or not all(
-            np.array_equal(getattr(kept, name), getattr(minutes, name), equal_nan=True)
-            for name in ("time_ns", "count", "mean", "low", "high")
-        ):
-            raise StoreError(f"{path}: does not hold what was written")
+        _check(path, self.minutes(station, day_ns), minutes, ("time_ns", *_SUMMARY))
+
+    def write_tens(self, station: str, day_ns: int, tens: Summary) -> None:
+        """Write the ten minutes of a day, and see that they can be read back."""
+        path = self.path("tens", station, day_ns)
+        lists = {name: _as_lists(getattr(tens, name)) for name in _SUMMARY}
+        _write(path, tens.time_ns, {}, lists, Origin(station=station))
+        _check(path, self.tens(station, day_ns), tens, ("time_ns", *_SUMMARY))
 
     def damage(self) -> list[str]:
         """Daily files that cannot be read, or whose pages are not what was written."""
@@ -176,6 +183,13 @@ class Archive:
         return table
 
 
+def _check(path: Path, kept: Samples | Summary | None, given: Samples | Summary, names: tuple[str, ...]) -> None:
+    if kept is None or not all(
+        np.array_equal(getattr(kept, name), getattr(given, name), equal_nan=True) for name in names
+    ):
+        raise StoreError(f"{path}: does not hold what was written")
+
+
 def _write(path: Path, time_ns: Integers, values: dict[str, Floats], columns: dict[str, Any], origin: Origin) -> None:
     arrays = {name: pa.array(column, mask=np.isnan(column)) for name, column in values.items()}
     table = pa.table({"time": pa.array(time_ns, _STAMP), **columns, **arrays})
@@ -213,10 +227,31 @@ def _sync_folders(folder: Path) -> None:
             os.close(descriptor)
 
 
+def _as_lists(matrix: Floats) -> Any:
+    return pa.FixedSizeListArray.from_arrays(pa.array(matrix.ravel()), matrix.shape[1])
+
+
+def _of_lists(column: Any) -> Floats:
+    numbers: Any = np.from_dlpack(column.combine_chunks().flatten())
+    matrix: Floats = numbers.reshape(len(column), -1)
+    return matrix
+
+
+def _numbers(column: Any) -> Any:
+    """Array of a column, NaN for null; unlike `to_numpy` this does not load pandas, where that is installed."""
+    array = column.combine_chunks()
+    if not array.null_count:
+        return np.from_dlpack(array)
+    places = slice(array.offset, array.offset + len(array))
+    validity, values = array.buffers()
+    is_there = np.unpackbits(np.frombuffer(validity, dtype=np.uint8), bitorder="little")[places]
+    return np.where(is_there, np.frombuffer(values, dtype=np.float64)[places], np.nan)
+
+
 def _stamps(table: pa.Table) -> Integers:
-    stamps: Integers = table["time"].cast(pa.int64()).to_numpy()
+    stamps: Integers = _numbers(table["time"].cast(pa.int64()))
     return stamps
 
 
 def _matrix(table: pa.Table, names: tuple[str, ...] | list[str]) -> Floats:
-    return np.stack([table[name].to_numpy() for name in names], axis=1)
+    return np.stack([_numbers(table[name]) for name in names], axis=1)

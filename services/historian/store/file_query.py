@@ -2,17 +2,19 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import duckdb
 import numpy as np
 
 from wetwell.protocols.quantities import columns_of, pumps_of
-from wetwell.services.historian.store.archive import Form
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.summary import Summary
 
-_FIGURES: dict[Form, str] = {
+Named = Literal["samples", "minutes"]
+"""Forms of daily files whose columns have the names of quantities."""
+
+_FIGURES: dict[Named, str] = {
     "samples": 'count("{0}"), avg("{0}"), min("{0}"), max("{0}")',
     "minutes": 'coalesce(sum("{0}_count"), 0), sum("{0}" * "{0}_count") / sum("{0}_count"), min("{0}_min"), '
     'max("{0}_max")',
@@ -20,7 +22,7 @@ _FIGURES: dict[Form, str] = {
 
 
 def summary_of_files(
-    form: Form, paths: Sequence[Path], start_ns: int, end_ns: int, origin_ns: int, span_ns: int
+    form: Named, paths: Sequence[Path], start_ns: int, end_ns: int, origin_ns: int, span_ns: int
 ) -> Summary:
     """Summary of the rows from `start_ns` until before `end_ns` over equal spans from `origin_ns` on.
 

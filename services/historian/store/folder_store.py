@@ -12,7 +12,7 @@ from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.store.archive import Archive, Form
-from wetwell.services.historian.store.file_query import summary_of_files
+from wetwell.services.historian.store.file_query import Named, summary_of_files
 from wetwell.services.historian.store.interface import (
     DAY_NS,
     Batch,
@@ -24,7 +24,7 @@ from wetwell.services.historian.store.interface import (
 )
 from wetwell.services.historian.store.live_database import LiveDatabase
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
-from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
+from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
 from wetwell.services.runtime.folder_lock import folder_held
 
 log = logging.getLogger(__name__)
@@ -138,7 +138,7 @@ class FolderStore:
         return count <= points
 
     def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
-        """Summary of the days in files by DuckDB, of those that are in the database, too, by NumPy."""
+        """Summary of the days in files from their ten minutes or by DuckDB, of those in the database by NumPy."""
         try:
             return self._summary(station, start_ns, end_ns, span_ns)
         except StoreError:
@@ -149,13 +149,18 @@ class FolderStore:
         of_samples = set(self._filed("samples", station, start_ns, end_ns))
         of_minutes = set(self._filed("minutes", station, start_ns, end_ns))
         parts = []
+        if start_ns % TEN_NS == end_ns % TEN_NS == span_ns % TEN_NS == 0:
+            tens = self._kept_tens(station, (of_samples | of_minutes) - live_ns)
+            parts.append(joined(tens.values()).between(start_ns, end_ns).over(start_ns, span_ns))
+            of_samples -= tens.keys()
+            of_minutes -= tens.keys()
         for day_ns in sorted(live_ns | (of_samples & of_minutes)):
             day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
             minutes = self.archive.minutes(station, day_ns)
             if minutes is not None:  # late samples, or a downsampling that was broken off
                 day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
             parts.append(day.over(start_ns, span_ns))
-        filed: dict[Form, set[int]] = {
+        filed: dict[Named, set[int]] = {
             "samples": of_samples - live_ns - of_minutes,
             "minutes": of_minutes - live_ns - of_samples,
         }
@@ -164,6 +169,16 @@ class FolderStore:
                 paths = [self.archive.path(form, station, day_ns) for day_ns in sorted(days_ns)]
                 parts.append(summary_of_files(form, paths, start_ns, end_ns, start_ns, span_ns))
         return joined(parts).over(start_ns, span_ns)
+
+    def _kept_tens(self, station: str, days_ns: set[int]) -> dict[int, Summary]:
+        """Ten minutes of those days that have them; what cannot be read is worked out anew in time."""
+        kept = {}
+        for day_ns in sorted(days_ns):
+            with contextlib.suppress(StoreError):
+                tens = self.archive.tens(station, day_ns)
+                if tens is not None:
+                    kept[day_ns] = tens
+        return kept
 
     def _filed(self, form: Form, station: str, start_ns: int, end_ns: int) -> list[int]:
         return [day_ns for day_ns in self.archive.days_ns(form, station) if start_ns - DAY_NS < day_ns < end_ns]
@@ -177,8 +192,8 @@ class FolderStore:
         return self.live.hours(station, start_ns, end_ns)
 
     def maintain(self, now_ns: int) -> str | None:
-        """Turn one day into a file, or one old file into minutes, or delete one that is too old."""
-        return maintain_one(self, now_ns, (self._roll, self._downsample, self._delete_old))
+        """Turn one day into files, or one old file into minutes, or delete one that is too old."""
+        return maintain_one(self, now_ns, (self._roll, self._sum_up, self._downsample, self._delete_old))
 
     def scrub(self) -> Iterator[None]:
         """Look through all that is kept, a part at a time; what is damaged is put aside and told."""
@@ -217,9 +232,9 @@ class FolderStore:
             self.live.adopt(spans)  # into the new one
 
     def _roll(self, station: str, newest_ns: int) -> str | None:
-        """Write the file of the oldest day in the database that is complete, then delete its rows.
+        """Write the files of the oldest day in the database that is complete, then delete its rows.
 
-        A crash between the two leaves both; they are read once, and the step is done again.
+        A crash between leaves both; they are read once, and the step is done again.
         """
         first_ns = self.live.next_time_ns(station, -(2**63))
         if first_ns is None or day_of(first_ns) >= newest_ns - self._keep_live_days * DAY_NS:
@@ -236,10 +251,32 @@ class FolderStore:
             self.samples(station, end_ns, end_ns + HOUR_NS),
         )
         self.archive.write_samples(station, day_ns, samples)
+        self._write_tens(station, day_ns, samples)
         if day_ns not in self.archive.days_ns("minutes", station):  # else these are a few late ones
             self.live.write_hours(station, Hours.of_samples(merged([before, samples, after]), day_ns, end_ns))
         self.live.delete_samples(station, live)
         return f"{self.archive.path('samples', station, day_ns)}: {len(samples)} samples"
+
+    def _sum_up(self, station: str, _newest_ns: int) -> str | None:
+        """Work out the ten minutes of a day that has none: one of an earlier version, or that were damaged."""
+        days_ns = {*self.archive.days_ns("samples", station), *self.archive.days_ns("minutes", station)}
+        day_ns = min(days_ns - {*self.archive.days_ns("tens", station)}, default=None)
+        if day_ns is None:
+            return None
+        refused = sum(self.archive.put_aside_damaged(form, station, day_ns) for form in get_args(Named))
+        self._refused_files += refused
+        if refused:
+            return f"station '{station}': damaged files put aside"
+        samples = self.archive.samples(station, day_ns)
+        self._write_tens(station, day_ns, Samples.of_rows([]) if samples is None else samples)
+        return f"{self.archive.path('tens', station, day_ns)}: summed up"
+
+    def _write_tens(self, station: str, day_ns: int, samples: Samples) -> None:
+        """Sum up samples of a day, and minutes that earlier ones of it have become."""
+        day, minutes = Summary.of(samples), self.archive.minutes(station, day_ns)
+        if minutes is not None:
+            day = fuller(minutes, day.over(day_ns, MINUTE_NS))
+        self.archive.write_tens(station, day_ns, day.over(day_ns, TEN_NS))
 
     def _downsample(self, station: str, newest_ns: int) -> str | None:
         """Turn the oldest file of samples into minutes, if it is old enough."""
@@ -265,7 +302,7 @@ class FolderStore:
         if self._keep_days is None:
             return None
         end_ns = newest_ns - self._keep_days * DAY_NS
-        for form in ("samples", "minutes"):
+        for form in get_args(Form):
             days_ns = self.archive.days_ns(form, station)
             if days_ns and days_ns[0] < end_ns:
                 self.archive.delete(form, station, days_ns[0])

@@ -16,7 +16,7 @@ DAY_NS = 86_400 * NS_PER_S
 
 DIGEST_BYTES = 8
 
-EventKind = Literal["verdicts", "alarms", "episodes", "maintenance"]
+EventKind = Literal["verdicts", "changes", "alarms", "episodes", "maintenance"]
 
 
 class StoreError(WetwellError):
@@ -24,7 +24,7 @@ class StoreError(WetwellError):
 
 
 class EventRow(NamedTuple):
-    """A verdict, or an alarm, an episode or an act of maintenance after a change, as it came."""
+    """A verdict, its news, or an alarm, an episode or an act of maintenance after a change."""
 
     kind: EventKind
     station: str
@@ -103,7 +103,10 @@ class Store(Protocol):
         """Whether a span has at most so many samples, and none that have become minutes."""
 
     def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
-        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
+        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become.
+
+        Where start, end and span are whole tens of minutes, a store may answer from summaries of ten minutes.
+        """
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""

@@ -278,10 +278,11 @@ class LiveDatabase:
         return intact
 
     def delete_events(self, station: str, end_ns: int) -> int:
-        """Delete verdicts and alarms from before `end_ns`; returns how many."""
+        """Delete verdicts and alarms from before `end_ns`, but not what changed when; returns how many."""
         with self._transaction() as database:
             return database.execute(
-                "DELETE FROM event WHERE station = (SELECT id FROM station WHERE name = ?) AND time_ns < ?",
+                "DELETE FROM event WHERE station = (SELECT id FROM station WHERE name = ?) AND time_ns < ? "
+                "AND kind != 'changes'",
                 (station, end_ns),
             ).rowcount
 

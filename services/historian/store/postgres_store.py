@@ -281,8 +281,11 @@ class PostgresStore:
                 deleted += database.execute(
                     psycopg.sql.SQL(
                         "DELETE FROM {} WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
-                        "AND time_ns < %s"
-                    ).format(psycopg.sql.Identifier("wetwell", table)),
+                        "AND time_ns < %s {}"
+                    ).format(
+                        psycopg.sql.Identifier("wetwell", table),
+                        psycopg.sql.SQL("AND kind != 'changes'" if table == "event" else ""),
+                    ),
                     (station, newest_ns - self._keep_days * DAY_NS),
                 ).rowcount
         return f"station '{station}': {deleted} old rows deleted" if deleted else None

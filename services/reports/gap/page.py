@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from wetwell.services.reports.charts import Section, folded, page, paragraph, share_bars, table
 from wetwell.services.reports.gap.correction import correction_section
+from wetwell.services.reports.gap.experiments import experiments_table
 from wetwell.services.reports.gap.lead import effect_words, lead, shrinkage_words
 from wetwell.services.reports.gap.pictures import duty_picture, trace_pictures
 from wetwell.services.reports.gap.statistics import statistics
@@ -20,6 +21,7 @@ def gap_page(report: GapReport, diagnosis: Diagnosis) -> str:
     first = [
         paragraph(lead(report, diagnosis)),
         paragraph(f"What to do: {report.next_experiment}"),
+        experiments_table(report, are_prices_default=diagnosis.station.costs is None),
         *([paragraph(shrinkage_words(report))] if report.effects else []),
         *(paragraph(f"Note: {note}.") for note in report.notes),
     ]

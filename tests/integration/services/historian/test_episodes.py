@@ -8,6 +8,7 @@ from wetwell.protocols.messages.verdict import AssetFault, Severity, Verdict
 from wetwell.services.batch.crews import score_history
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.historian.store.interface import Batch, EventRow
 
 
 def verdict(time, value=None, *, is_old=False):
@@ -50,11 +51,9 @@ def test_an_episode_goes_on_over_a_restart_and_old_verdicts_that_come_again_chan
 
 def test_a_history_of_an_older_version_has_its_episodes_too(tmp_path):
     with contextlib.closing(FolderStore(tmp_path)) as store:
-        historian = Historian(store)
-        historian._episodes.rows = lambda _: []
-        for payload in (verdict(10, 1.0, is_old=True), verdict(20, 1.0, is_old=True), verdict(30, is_old=True)):
-            historian.handle("verdicts", payload)
-        historian.commit(0)
+        told = ((10, 1.0), (20, 1.0), (30, None))
+        rows = [EventRow("verdicts", "alpha", time, verdict(time, value, is_old=True)) for time, value in told]
+        store.write(Batch(events=rows))
         (message,) = asked(Historian(store), "episodes")
         episode = Episode.model_validate(message)
         assert (episode.asset, episode.state, episode.since, episode.to) == ("main", "system_fault", 10, 30)

@@ -27,6 +27,7 @@ QUESTIONS = [
     {"kind": "kpi", "points": 10_000},
     {"kind": "kpi", "points": 3},
     {"kind": "verdicts"},
+    {"kind": "changes"},
     {"kind": "stations"},
 ]
 
@@ -86,7 +87,7 @@ def filled(store: Store, days: int = 4) -> Historian:
     for day in range(days):
         historian.handle("verdicts", verdict(day).encode())
         historian.handle("verdicts", verdict(day).encode())
-    assert historian.commit(NOW_NS) == len(made) + 5 + 2 * days
+    assert historian.commit(NOW_NS) == len(made) + 5 + 2 * days + 1  # the first verdict is a change
     assert historian.figures(NOW_NS)["doubled"] == 5.0 + days
     return historian
 
@@ -148,6 +149,7 @@ def test_old_days_become_minutes_and_older_ones_go_while_figures_stay(
     assert ask(historian, kind="samples", raw=True).time[0] == DAY + 3 * DAY_NS
     told = ask(historian, kind="verdicts").messages
     assert [message["time"] for message in told] == [verdict(day).model_dump()["time"] for day in range(1, 6)]
+    assert len(ask(historian, kind="changes", start=DAY + 4 * DAY_NS).messages) == 1, "what stands is known for ever"
 
 
 @pytest.mark.parametrize("name", ["folder", "postgres"])

@@ -2,15 +2,20 @@
 
 import re
 from importlib.resources import files
+from typing import get_args
 
 import pytest
 
 from wetwell.detector.verdict.maintenance import _ADVICE, _CURED
 from wetwell.services.alarms.rules import RULES
+from wetwell.simulator.effects import LIBRARY
+from wetwell.simulator.effects.effect import Component
 
 STATIC = files("wetwell.services") / "dashboard" / "static"
 LANGUAGES = ("de",)
 SERVICES_SAY = {*_ADVICE.values(), *_CURED, *(rule.advice for rule in RULES.values())}
+SERVICES_NAME = {name.replace("_", " ") for name in (*LIBRARY, *get_args(Component))}
+"""Effects and places by which the watch calls a gap."""
 
 
 def modules(folder):
@@ -38,7 +43,7 @@ def test_the_page_has_texts():
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_catalogue_lacks_no_text_and_holds_no_other(language):
-    wanted = page_texts() | SERVICES_SAY
+    wanted = page_texts() | SERVICES_SAY | SERVICES_NAME
     assert sorted(wanted - catalogue(language).keys()) == []
     assert sorted(catalogue(language).keys() - wanted) == []
 

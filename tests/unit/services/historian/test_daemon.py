@@ -1,15 +1,16 @@
-"""The historian daemon over a damaged history: it takes anew from the publishers what they still keep."""
+"""The historian daemon: after damage it takes anew what publishers still keep; a long answer waits alone."""
 
 import asyncio
 import contextlib
 import logging
+import threading
 from pathlib import Path
 from unittest import mock
 
 from memory_bus import MemoryBus
 from virtual_loop import run_virtual
 
-from wetwell.protocols.bus.keys import sample_key
+from wetwell.protocols.bus.keys import history_key, sample_key
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian import daemon
@@ -58,3 +59,30 @@ def test_what_was_lost_comes_again_from_the_publishers(tmp_path, caplog):
         assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES + 2))
     assert (tmp_path / "live.sqlite.refused-1").exists()
     assert "what was lost is taken from the publishers" in caplog.text
+
+
+class Thinking:
+    """A historian that answers about the station "long" when it is told to."""
+
+    def __init__(self) -> None:
+        self.may_answer = threading.Event()
+
+    def answer(self, station: str, payload: bytes) -> bytes:
+        assert station != "long" or self.may_answer.wait(60.0)
+        return station.encode() + payload
+
+
+def test_a_long_answer_does_not_hold_up_the_others() -> None:
+    async def asked() -> tuple[list[bytes], list[bytes]]:
+        historian = Thinking()
+        answering = asyncio.create_task(daemon._answer(historian, bus.answer(history_key("*"))))
+        long = asyncio.create_task(bus.ask(history_key("long"), b"?", timeout_s=60.0))
+        quick = await bus.ask(history_key("quick"), b"!", timeout_s=60.0)
+        assert not long.done()
+        historian.may_answer.set()
+        answers = await long, quick
+        answering.cancel()
+        return answers
+
+    with MemoryBus() as bus:
+        assert asyncio.run(asked()) == ([b"long?"], [b"quick!"])

@@ -22,7 +22,6 @@ export function pastStore(station, range, told) {
     const [from, to] = range.limits();
     const key = `${range.isLive} ${from} ${to}`;
     loaded = { at: performance.now(), end: to, key };
-    loadThen();
     const isMine = () => loaded.key === key;
     const samples = range.isLive ? Promise.resolve(null) : trendsOf(station.name, from, to + 1, POINTS);
     const [trends, bands] = await Promise.allSettled([samples, bandsOf(station.name, from, to + 1)]);
@@ -31,6 +30,7 @@ export function pastStore(station, range, told) {
     store.trends = trends.value ?? null;
     if (bands.value) store.bands = { verdicts: inMillis(bands.value.verdicts), alarms: withStanding(inMillis(bands.value.alarms)) };
     told(new Set(["past", "bands"]));
+    loadThen(); // behind what most look at
   }
 
   /** An alarm that has stood since before the range has not changed in it: the page knows it from the alarms of now. */
@@ -63,7 +63,8 @@ export function pastStore(station, range, told) {
 
   /** Asks anew when a range that ends with the last sample has moved on by a part of itself. */
   function update() {
-    loadThen();
+    if (!Number.isFinite(loaded.at)) return; // before the page knows where the time of the station ends
+    if (store.trends || range.isLive) loadThen();
     if (!range.isOpen || performance.now() - loaded.at < AGAIN_MS) return;
     const [from, to] = range.limits();
     if (Math.abs(to - loaded.end) > (to - from) / STEPS) load();

@@ -3,6 +3,7 @@
 import { query, remember } from "../base/address.js";
 import { announce, html, say } from "../base/dom.js";
 import { moment, zone } from "../base/format.js";
+import { pastOf } from "../base/past.js";
 import { grade } from "../base/quality.js";
 import { icon, isFault, state as look } from "../base/states.js";
 import { follow } from "../base/stream.js";
@@ -152,7 +153,6 @@ function lastRow({ times, columns }, pumps) {
 
 /** Time of the last sample that the historian has of a station, where nothing is heard of it. */
 async function lastKept(name) {
-  const answer = await fetch("/api/stations/_site/history?kind=stations").then((told) => told.json()).catch(() => null);
-  const last = answer?.messages?.find((each) => each.station === name)?.last;
-  return last ? Date.parse(last) : undefined;
+  const [known] = await pastOf(name, "stations").then((told) => told.messages, () => []);
+  return known?.last ? Date.parse(known.last) : undefined;
 }

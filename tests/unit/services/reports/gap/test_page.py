@@ -70,6 +70,12 @@ def test_no_name_of_a_column_or_effect_is_left_as_the_code_has_it(rough_main):
     assert re.findall(r"\b[a-z0-9]+_[a-z0-9_]+\b", rough_main[1]) == []
 
 
+def test_what_to_do_is_followed_by_the_acts_only_where_there_are_some(rough_main):
+    report, text = rough_main
+    assert not report.experiments
+    assert "Which acts would tell more" not in text
+
+
 def test_a_station_as_its_file_says_has_no_parameters_to_show():
     report, text = page_of(STATION)
     assert report.verdict == "none"
