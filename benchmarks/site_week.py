@@ -18,7 +18,7 @@ from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
-from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.checkpoint import checkpoint_in
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
@@ -46,7 +46,8 @@ class Week:
         self._historian = Historian(FolderStore(folder / "history"))
         self._service = AlarmService(bus, AlarmSettings(state_dir=folder / "alarms"), files, lambda: self._clock)
         self._judges = [
-            StationDetector(bus, station, checkpoint=Checkpoint(folder / "state", station.name)) for station in files
+            StationDetector(bus, station, checkpoint=checkpoint_in(folder / "state", station.name))
+            for station in files
         ]
         self._intake = Intake(bus, self._judges)
         self._publishers = [bus.publisher(sample_key(station.name), history=LEAST_KEPT) for station in files]

@@ -22,7 +22,7 @@ from site_load import Played, messages_of, prepare
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.station.station_file import load_station
-from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.checkpoint import checkpoint_in
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
@@ -87,7 +87,7 @@ def detector(folder: Path, load: list[Played], gather: int) -> float:
             StationDetector(
                 bus,
                 load_station(folder / "stations" / f"{each.name}.toml"),
-                checkpoint=Checkpoint(folder / "state", each.name),
+                checkpoint=checkpoint_in(folder / "state", each.name),
             )
             for each in load
         ]

@@ -1,16 +1,13 @@
 """What the tests share: the paper's station, a deadline-free hypothesis, real recordings, a PostgreSQL server."""
 
 import os
-import shutil
-import socket
-import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from postgres_server import PostgresServer, is_installed, running_server
 
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.services.cli import main
@@ -59,42 +56,10 @@ def run_wetwell(monkeypatch) -> Callable[..., int]:
     return run
 
 
-class PostgresServer:
-    """A server of Debian's package, on a free port of this machine, in a folder of its own."""
-
-    def __init__(self, programs: Path, folder: Path) -> None:
-        self._programs, self._folder = programs, folder
-        self._user = ["runuser", "-u", "postgres", "--"] if os.getuid() == 0 else []
-        with socket.socket() as listener:
-            listener.bind(("127.0.0.1", 0))
-            self.port = listener.getsockname()[1]
-        self.url = f"postgresql://wetwell@127.0.0.1:{self.port}/postgres"
-        self._run("initdb", "-D", folder / "data", "-U", "wetwell", "--auth=trust", "--no-sync")
-
-    def start(self) -> None:
-        options = f"-p {self.port} -c listen_addresses=127.0.0.1 -c fsync=off -k {self._folder}"
-        self._run("pg_ctl", "-D", self._folder / "data", "-w", "-l", self._folder / "log", "-o", options, "start")
-
-    def stop(self) -> None:
-        """Stop at once, as a crash would."""
-        self._run("pg_ctl", "-D", self._folder / "data", "-m", "immediate", "stop")
-
-    def _run(self, program: str, *arguments: object) -> None:
-        command = [*self._user, str(self._programs / program), *map(str, arguments)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=self._folder, timeout=60)
-
-
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[PostgresServer]:
     """A running PostgreSQL server."""
-    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
-    if not found:
+    if not is_installed():
         pytest.skip("PostgreSQL is not installed where Debian's package puts it")
-    folder = Path(tempfile.mkdtemp(prefix="wetwell-postgres-"))
-    if os.getuid() == 0:
-        shutil.chown(folder, "postgres")
-    server = PostgresServer(found[-1].parent, folder)
-    server.start()
-    yield server
-    server.stop()
-    shutil.rmtree(folder)
+    with running_server() as server:
+        yield server

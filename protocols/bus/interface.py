@@ -29,6 +29,25 @@ class Publisher(Protocol):
         """
 
 
+@dataclass(frozen=True)
+class KeptStream:
+    """What publishers before have sent on a key, for one that goes on where they ended: numbers go on, too.
+
+    Attributes
+    ----------
+    source : bytes
+        8 bytes that tell this stream from all others on the key.
+    end : int
+        Number of the next message.
+    payloads : tuple of bytes
+        The last messages before it, oldest first.
+    """
+
+    source: bytes
+    end: int
+    payloads: tuple[bytes, ...] = ()
+
+
 class Subscription(Protocol[T]):
     """Messages of a key, waiting to be received by one event loop.
 
@@ -62,11 +81,22 @@ class Presence:
     is_alive: bool
 
 
-class Bus(Protocol):
-    """A connection that publishes, subscribes, asks and answers, and shows that a service lives."""
+class Outlet(Protocol):
+    """The side of a bus on which one publishes."""
 
     def publisher(self, key: str, *, history: int = 1) -> Publisher:
         """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss."""
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether messages can reach others now."""
+
+
+class Bus(Outlet, Protocol):
+    """A connection that publishes, subscribes, asks and answers, and shows that a service lives."""
+
+    def publisher(self, key: str, *, history: int = 1, goes_on: KeptStream | None = None) -> Publisher:
+        """Publisher on a key that keeps the last `history` messages; with `goes_on` it continues others' stream."""
 
     def subscribe(
         self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True, pace_s: float = PACE_S
@@ -100,7 +130,3 @@ class Bus(Protocol):
 
     def watch(self, key: str) -> Subscription[Presence]:
         """Services that are announced under a key expression: those that live now, then each change."""
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether messages can reach others now."""

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field, ValidationError
 
+from wetwell.protocols.bus.interface import KeptStream
 from wetwell.protocols.messages.message import Message
 
 SOURCE_BYTES = 8
@@ -74,16 +75,18 @@ class Page(NamedTuple):
 
 
 class PublisherCache:
-    """What one publisher keeps. Its `source` is new with each life, its numbers count up from 0.
+    """What one publisher keeps. Its `source` is new with each life, its numbers count up from 0, unless it goes on.
 
     Parameters
     ----------
     history : int
         Most messages that are kept, >= 1, up to `KEPT_BYTES`; one that holds many things counts as many. The last one
         is always kept.
+    goes_on : KeptStream, optional
+        What was sent before on the same key, by others.
     """
 
-    def __init__(self, history: int) -> None:
+    def __init__(self, history: int, goes_on: KeptStream | None = None) -> None:
         self.source = secrets.token_bytes(SOURCE_BYTES)
         self.end = 0
         self._history = history
@@ -91,6 +94,10 @@ class PublisherCache:
         self._weights: deque[int] = deque()
         self._weight = self._bytes = 0
         self._lock = threading.Lock()
+        if goes_on is not None:
+            self.source, self.end = goes_on.source, goes_on.end - len(goes_on.payloads)
+            for payload in goes_on.payloads:
+                self.add(payload)
 
     def add(self, payload: bytes, weight: int = 1) -> bytes:
         """Keep a message that counts as so many; the sequence header that goes with it."""

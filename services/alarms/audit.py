@@ -8,7 +8,9 @@ import hashlib
 import json
 import logging
 import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Protocol
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
@@ -17,6 +19,43 @@ from wetwell.protocols.timestamps import to_iso
 log = logging.getLogger(__name__)
 
 LINK = "link"
+
+
+class AuditTrail(Protocol):
+    """Where acts are written down before they take effect."""
+
+    def write(self, now_ns: int, **fields: object) -> None:
+        """Write an act down.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written.
+        """
+
+
+class LineAudit:
+    """An audit whose lines, each with its link, go to somebody who keeps them with what they change.
+
+    Parameters
+    ----------
+    last : str, optional
+        The last line that is there.
+    keep : callable
+        Takes a line.
+    """
+
+    def __init__(self, last: str | None, keep: Callable[[str], None]) -> None:
+        entry = None if last is None else _entry(last)
+        self._link = "" if entry is None else str(entry.get(LINK, ""))
+        self._keep = keep
+
+    def write(self, now_ns: int, **fields: object) -> None:
+        """Write an act down."""
+        entry: dict[str, object] = {"time": to_iso(now_ns), **fields}
+        log.info("audit: %s", json.dumps(entry, ensure_ascii=False))
+        self._link = link_of(self._link, entry)
+        self._keep(json.dumps(entry | {LINK: self._link}, ensure_ascii=False))
 
 
 class Audit:
@@ -100,17 +139,23 @@ def link_of(before: str, entry: dict[str, object]) -> str:
 def broken_lines(path: Path) -> list[int]:
     """Numbers, from 1, of lines that are damaged, or whose link does not follow from the line before.
 
-    Lines without a link, of an earlier version, are passed over where none with one stands before them.
-
     Raises
     ------
     OSError
         If the file cannot be read.
     """
-    broken, before = [], ""
     if not path.exists():
         return []
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+    return broken_among(path.read_text(encoding="utf-8", errors="replace").splitlines())
+
+
+def broken_among(lines: Iterable[str]) -> list[int]:
+    """Numbers, from 1, of lines that are damaged, or whose link does not follow from the line before.
+
+    Lines without a link, of an earlier version, are passed over where none with one stands before them.
+    """
+    broken, before = [], ""
+    for number, line in enumerate(lines, start=1):
         entry = _entry(line)
         link = None if entry is None else entry.pop(LINK, None)
         if entry is not None and link is None and not before:

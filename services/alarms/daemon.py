@@ -1,6 +1,7 @@
 """The alarms daemon: owns bus and clocks, and gives what comes to the service."""
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -18,7 +19,9 @@ from wetwell.protocols.bus.keys import (
     verdict_key,
 )
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.alarms.service import SOURCES, AlarmService
+from wetwell.services.alarms.audit import LineAudit
+from wetwell.services.alarms.service import SOURCES, AlarmService, Kept
+from wetwell.services.alarms.state_file import KeptSite
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
@@ -56,8 +59,33 @@ async def serve_alarms(settings: Settings, stations: Sequence[Station]) -> None:
 
 
 async def _run(settings: Settings, stations: Sequence[Station]) -> None:
+    if settings.lease.url is not None:
+        await _keep_in_turn(settings, stations)
     with await connect(settings) as bus:
         await keep_alone(settings, bus, stations)
+
+
+async def _keep_in_turn(settings: Settings, stations: Sequence[Station]) -> None:
+    """Keep the alarms of a site for ever while this process owns the role; stand by while it does not."""
+    from wetwell.services.lease.membership import Membership  # noqa: PLC0415
+    from wetwell.services.lease.outbox import KeptRequest, Outbox, OutboxPlace  # noqa: PLC0415 - only pairs need it
+
+    with contextlib.closing(Membership(settings.lease, "alarms")) as role:
+        while True:
+            with await connect(settings) as bus:
+                await role.take(bus)
+
+                async def work(outbox: Outbox, bus: Bus = bus) -> None:
+                    kept = Kept(
+                        KeptSite(OutboxPlace(outbox, "alarms")), LineAudit(outbox.last_line, outbox.write_down)
+                    )
+                    service = AlarmService(outbox, settings.alarms, stations, clocks, kept)
+                    try:
+                        await keep(bus, service, settings.health.period_s, lambda one: KeptRequest(one, outbox))
+                    finally:
+                        service.save()
+
+                await role.act(bus, work)
 
 
 async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) -> None:
@@ -79,8 +107,13 @@ async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) 
             service.save()
 
 
-async def keep(bus: Bus, service: AlarmService, health_period_s: float) -> None:
-    """Let the alarms of a site work on a bus for ever."""
+async def keep(
+    bus: Bus,
+    service: AlarmService,
+    health_period_s: float,
+    asked: Callable[[Request], Request] = lambda request: request,
+) -> None:
+    """Let the alarms of a site work on a bus for ever; acts of operators are answered through `asked`."""
     samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000, pace_s=PACE_S)
     sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000, pace_s=PACE_S)
     verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, pace_s=PACE_S)
@@ -98,6 +131,9 @@ async def keep(bus: Bus, service: AlarmService, health_period_s: float) -> None:
     def answer_report(request: Request) -> None:
         request.reply(service.report().encode())
 
+    def handle_act(request: Request) -> None:
+        service.handle_act(asked(request))
+
     def handle_status(message: Keyed) -> None:
         service.handle_status(message[1])
 
@@ -108,7 +144,7 @@ async def keep(bus: Bus, service: AlarmService, health_period_s: float) -> None:
         group.create_task(_feed(gaps, service.handle_gap, service), name="alarms.gaps")
         group.create_task(_feed(statuses, handle_status, service), name="alarms.statuses")
         group.create_task(_feed(presences, service.handle_presence, service), name="alarms.presences")
-        group.create_task(_feed(acts, service.handle_act, service), name="alarms.acts")
+        group.create_task(_feed(acts, handle_act, service), name="alarms.acts")
         group.create_task(_feed(reports, answer_report, service), name="alarms.reports")
         group.create_task(_look(service), name="alarms.look")
         group.create_task(report_health(bus, SITE, "alarms", health_period_s, figures), name="alarms.health")

@@ -4,8 +4,9 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
-from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Request
+from wetwell.protocols.bus.interface import Outlet, Presence, Publisher, Request
 from wetwell.protocols.bus.keys import SITE, alarm_act_key, alarm_key
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.alarm import (
@@ -26,11 +27,11 @@ from wetwell.protocols.messages.sample_block import LevelBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
-from wetwell.services.alarms.audit import Audit
+from wetwell.services.alarms.audit import Audit, AuditTrail
 from wetwell.services.alarms.record import AlarmRecord
 from wetwell.services.alarms.registry import SHELF, AlarmRegistry
 from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
-from wetwell.services.alarms.state_file import SiteState, StateFile, StationState
+from wetwell.services.alarms.state_file import KeptSite, SiteState, StationState, site_in
 from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
 from wetwell.services.alarms.status import ActRefusedError, AlarmStatus
 from wetwell.services.runtime.settings import AlarmSettings
@@ -46,8 +47,18 @@ MAX_STATIONS = 10_000
 _MODES: Mapping[str, Mode | None] = {"maintenance": "maintenance", "stop": "stopped", "resume": None}
 
 
+@dataclass(frozen=True)
+class Kept:
+    """Where the alarms keep their state and their audit."""
+
+    site: KeptSite
+    audit: AuditTrail
+
+
 class AlarmService:
     """The alarms of a site on a bus. Synchronous; `now` gives the clocks.
+
+    Without `kept`, state and audit are in the folder of the settings.
 
     Raises
     ------
@@ -56,7 +67,12 @@ class AlarmService:
     """
 
     def __init__(
-        self, bus: Bus, settings: AlarmSettings, stations: Sequence[Station], now: Callable[[], Now]
+        self,
+        bus: Outlet,
+        settings: AlarmSettings,
+        stations: Sequence[Station],
+        now: Callable[[], Now],
+        kept: Kept | None = None,
     ) -> None:
         self._bus = bus
         self._settings = settings
@@ -64,8 +80,8 @@ class AlarmService:
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._counts: Counter[str] = Counter()
         self._lost_s: float | None = None
-        self._audit = Audit(settings.state_dir)
-        self._file = StateFile(settings.state_dir)
+        kept = kept or Kept(site_in(settings.state_dir), Audit(settings.state_dir))
+        self._audit, self._file = kept.audit, kept.site
         self._no_limits = limits_of(settings, None)
         self._limits = {station.name: limits_of(settings, station) for station in stations}
         rules = {name: change.model_dump(exclude_none=True) for name, change in settings.rules.items()}

@@ -7,12 +7,13 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError, WetwellError, first_fault
 from wetwell.services.alarms.registry import RegistryState
-from wetwell.services.runtime.state_file import put_aside, read_kept
+from wetwell.services.runtime.state_file import FilePlace, StatePlace
 
 log = logging.getLogger(__name__)
+
+STATE_NAME = "alarms.json"
 
 
 class StationState(BaseModel):
@@ -36,12 +37,17 @@ class SiteState(BaseModel):
     stations: dict[str, StationState] = Field(default_factory=dict)
 
 
-class StateFile:
-    """A file with the last state; without a folder nothing is kept. `errors` counts failed writes in a row."""
+class KeptSite:
+    """The last state in its place; without one nothing is kept. `errors` counts failed writes in a row.
 
-    def __init__(self, folder: Path | None) -> None:
+    Parameters
+    ----------
+    place : StatePlace, optional
+    """
+
+    def __init__(self, place: StatePlace | None) -> None:
         self.errors = 0
-        self._path = None if folder is None else folder / "alarms.json"
+        self._place = place
 
     def load(self) -> SiteState | None:
         """The state that was kept; None if there is none, or none that can be read.
@@ -49,12 +55,10 @@ class StateFile:
         Raises
         ------
         ConfigError
-            If the folder cannot be used.
+            If the place cannot be used.
         """
-        if self._path is None:
-            return None
-        data = read_kept(self._path, "alarms.state_dir")
-        if data is None:
+        data = None if self._place is None else self._place.read()
+        if self._place is None or data is None:
             return None
         try:
             return read_state(data)
@@ -62,24 +66,28 @@ class StateFile:
             fault = first_fault(error)
         except DamagedStateError as error:
             fault = str(error)
-        aside = put_aside(self._path)
-        log.warning("%s: %s; kept as %s, the alarms begin anew", self._path.name, fault, aside)
+        aside = self._place.put_aside()
+        log.warning("%s: %s; kept as %s, the alarms begin anew", STATE_NAME, fault, aside)
         return None
 
     def save(self, state: SiteState) -> None:
         """Write the state; a disk that refuses is told once, and the last file stays."""
-        if self._path is None:
+        if self._place is None:
             return
         try:
             body = state.model_dump_json().encode()
-            with atomic_file(self._path) as file:
-                file.write(body + b"\n" + checksum(body))
+            self._place.write(body + b"\n" + checksum(body))
         except RecordingError as error:
             if not self.errors:
                 log.warning("%s; alarms go on without", error)
             self.errors += 1
         else:
             self.errors = 0
+
+
+def site_in(folder: Path | None) -> KeptSite:
+    """State in a folder; without one nothing is kept."""
+    return KeptSite(None if folder is None else FilePlace(folder / STATE_NAME, "alarms.state_dir"))
 
 
 class DamagedStateError(WetwellError):

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
@@ -19,11 +19,11 @@ from wetwell.services.commands.options import (
 if TYPE_CHECKING:
     from wetwell.services.runtime.settings import Settings
 
-app = typer.Typer(invoke_without_command=True)
+app = typer.Typer(cls=CommandGroup, invoke_without_command=True)
 
 AlarmOption = Annotated[str, typer.Option("--alarm", metavar="ALARM", help="Such as pump2.pump_fault.")]
-ByOption = Annotated[str, typer.Option("--by", help="Who does it; kept in the audit.")]
-ReasonOption = Annotated[str, typer.Option("--reason", help="Why; kept in the audit.")]
+ByOption = Annotated[str, typer.Option("--by", metavar="NAME", help="Who does it; kept in the audit.")]
+ReasonOption = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why; kept in the audit.")]
 
 
 @app.callback()
@@ -110,7 +110,9 @@ def shelve(
     alarm: AlarmOption,
     station: StationNameOption,
     by: ByOption,
-    minutes: Annotated[float, typer.Option("--minutes", help="For how long on the wall clock, at most a week.")],
+    minutes: Annotated[
+        float, typer.Option("--minutes", metavar="NUMBER", help="For how long on the wall clock, at most a week.")
+    ],
     reason: ReasonOption = "",
     zenoh: ZenohOption = None,
     config: ConfigOption = None,

@@ -17,7 +17,7 @@ def doctor(
         list[str] | None,
         typer.Option("--station", metavar="FILE", help="Station that must be there; may be given again."),
     ] = None,
-    seconds: Annotated[float, typer.Option("--seconds", help="How long to listen.")] = 5.0,
+    seconds: Annotated[float, typer.Option("--seconds", metavar="NUMBER", help="How long to listen.")] = 5.0,
     verify: Annotated[
         bool,
         typer.Option(

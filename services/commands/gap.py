@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     AsStationOption,
     ConfigOption,
@@ -27,10 +27,11 @@ from wetwell.services.commands.options import (
     run,
     settings_of,
     signals_named,
+    there,
     with_history,
 )
 
-app = typer.Typer(no_args_is_help=True, help="The gap between simulation and reality.")
+app = typer.Typer(cls=CommandGroup, no_args_is_help=True, help="The gap between simulation and reality.")
 
 
 @app.command("trial")
@@ -43,18 +44,21 @@ def gap_trial(
         typer.Option(help="What stands for reality; both: fine and swmm."),
     ] = "fine",
     kinds: Annotated[
-        str, typer.Option(help="Of single, pair, none, open, leave_one_out, triple; with commas.")
+        str, typer.Option(metavar="NAMES", help="Of single, pair, none, open, leave_one_out, triple; with commas.")
     ] = "single,pair,none,open,leave_one_out,triple",
     days: Annotated[
         float | None,
-        typer.Option(help="Length of each recording; default 1, or 14 with rows further apart than a minute."),
+        typer.Option(
+            metavar="NUMBER", help="Length of each recording; default 1, or 14 with rows further apart than a minute."
+        ),
     ] = None,
     every: Annotated[str, typer.Option(metavar="S", help="Seconds from row to row; several with commas.")] = "1",
     value: Annotated[
-        str, typer.Option(help="What a row holds: of instant, mean, held; several with commas.")
+        str, typer.Option(metavar="NAMES", help="What a row holds: of instant, mean, held; several with commas.")
     ] = "instant",
     without_signals: Annotated[
-        str, typer.Option("--without-signals", help="Of level, inflow, flow, head, power; with commas.")
+        str,
+        typer.Option("--without-signals", metavar="NAMES", help="Of level, inflow, flow, head, power; with commas."),
     ] = "",
     with_inflow: Annotated[
         float, number("--with-inflow", low=0.0, high=1.0, help="Share of the cases with an inflow meter.")
@@ -116,10 +120,12 @@ def gap_trial(
 def gap_families(
     trials: Annotated[
         list[Path],
-        typer.Option("--trial", metavar="DIR", help="Folder of a trial that is scored; may be given again."),
+        typer.Option(
+            "--trial", metavar="DIR", help="Folder of a trial that is scored; may be given again.", callback=all_there
+        ),
     ],
     learnt_on: Annotated[
-        str, typer.Option("--learnt-on", help="Families that constants were learnt on; with commas.")
+        str, typer.Option("--learnt-on", metavar="NAMES", help="Families that constants were learnt on; with commas.")
     ] = "",
     as_json: JsonOption = False,
 ) -> None:
@@ -212,7 +218,9 @@ def gap_diagnose(
 
 @app.command("experiment", cls=about("--diagnosis"))
 def gap_experiment(
-    diagnosis: Annotated[Path, typer.Option("--diagnosis", metavar="DIR", help="Folder that gap diagnose wrote.")],
+    diagnosis: Annotated[
+        Path, typer.Option("--diagnosis", metavar="DIR", help="Folder that gap diagnose wrote.", callback=there)
+    ],
     station: Annotated[
         str | None, typer.Option("--station", metavar="FILE", help="Whose costs and levels count instead.")
     ] = None,
@@ -305,7 +313,10 @@ def gap_fleet(
     folders: Annotated[
         list[Path],
         typer.Option(
-            "--diagnoses", metavar="DIR", help="With report.json or watched gaps in it; may be given again."
+            "--diagnoses",
+            metavar="DIR",
+            help="With report.json or watched gaps in it; may be given again.",
+            callback=all_there,
         ),
     ],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="For gap diagnose --prior.")] = None,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     ConfigOption,
     JsonOption,
@@ -16,7 +16,7 @@ from wetwell.services.commands.options import (
     settings_of,
 )
 
-app = typer.Typer(invoke_without_command=True)
+app = typer.Typer(cls=CommandGroup, invoke_without_command=True)
 
 PlcOption = Annotated[Path, typer.Option("--plc", metavar="FILE", help="TOML file of one PLC, or of several.")]
 

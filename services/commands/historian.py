@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     OPERATE,
     RECORD,
@@ -53,7 +53,7 @@ def history(
     station: StationNameOption = "alpha",
     kind: Annotated[
         Literal["samples", "verdicts", "changes", "alarms", "episodes", "maintenance", "kpi", "stations"],
-        typer.Option(),
+        typer.Option("--kind", help="What is asked for."),
     ] = "kpi",
     last: Annotated[
         str | None, typer.Option(metavar="TIME", help="So long before the newest sample: 90s, 10m, 2h.")
@@ -142,7 +142,7 @@ def import_(
 
 
 maintenance_app = typer.Typer(
-    no_args_is_help=True, help="Log what crews did and found, and what the detector saw of it."
+    cls=CommandGroup, no_args_is_help=True, help="Log what crews did and found, and what the detector saw of it."
 )
 app.add_typer(maintenance_app, name="maintenance", rich_help_panel=OPERATE)
 
@@ -150,10 +150,16 @@ app.add_typer(maintenance_app, name="maintenance", rich_help_panel=OPERATE)
 @maintenance_app.command(cls=about("--station"))
 def add(
     station: StationNameOption,
-    asset: Annotated[str, typer.Option("--asset", help="Such as pump:2, main, sensor:pump2_flow_m3h.")],
-    act: Annotated[str, typer.Option("--act", help="Such as pulled, flushed, calibrated, impeller replaced.")],
-    by: Annotated[str, typer.Option("--by", help="Who did it.")],
-    found: Annotated[str, typer.Option("--found", help="Such as rags; nothing, if all was well.")] = "",
+    asset: Annotated[
+        str, typer.Option("--asset", metavar="NAME", help="Such as pump:2, main, sensor:pump2_flow_m3h.")
+    ],
+    act: Annotated[
+        str, typer.Option("--act", metavar="TEXT", help="Such as pulled, flushed, calibrated, impeller replaced.")
+    ],
+    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who did it.")],
+    found: Annotated[
+        str, typer.Option("--found", metavar="TEXT", help="Such as rags; nothing, if all was well.")
+    ] = "",
     at: Annotated[str | None, typer.Option("--at", metavar="TIME", help="ISO 8601; default: just now.")] = None,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,

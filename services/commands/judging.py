@@ -81,7 +81,9 @@ def backtest(
     ] = None,
     seeds: Annotated[int, number(low=1, help="Number of seeds of each scenario.")] = 1,
     first_seed: Annotated[int, number("--first-seed", low=0, help="The first of them.")] = 1,
-    days: Annotated[float | None, typer.Option(help="Length of each; default: the scenario's.")] = None,
+    days: Annotated[
+        float | None, typer.Option(metavar="NUMBER", help="Length of each; default: the scenario's.")
+    ] = None,
     dataset: Annotated[
         Path | None, typer.Option("--dataset", metavar="DIR", help="Folder that `wetwell dataset` has made.")
     ] = None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     ADMINISTER,
     AsStationOption,
@@ -18,16 +18,17 @@ from wetwell.services.commands.options import (
     print_result,
     reading_of,
     signals_named,
+    there,
 )
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
 app = typer.Typer()
-station_app = typer.Typer(no_args_is_help=True, help="Station files.")
-config_app = typer.Typer(no_args_is_help=True, help="Settings of the services.")
+station_app = typer.Typer(cls=CommandGroup, no_args_is_help=True, help="Station files.")
+config_app = typer.Typer(cls=CommandGroup, no_args_is_help=True, help="Settings of the services.")
 app.add_typer(station_app, name="station", rich_help_panel=ADMINISTER)
-effects_app = typer.Typer(help="Effects that a station file may name.")
+effects_app = typer.Typer(cls=CommandGroup, help="Effects that a station file may name.")
 app.add_typer(effects_app, name="effects", rich_help_panel=ADMINISTER)
 app.add_typer(config_app, name="config", rich_help_panel=ADMINISTER)
 
@@ -50,7 +51,9 @@ def station_show(
     station: StationOption,
     signals: Annotated[
         str | None,
-        typer.Option("--signals", help="Say what can be told apart by them: level, inflow, flow, head, power."),
+        typer.Option(
+            "--signals", metavar="NAMES", help="Say what can be told apart by them: level, inflow, flow, head, power."
+        ),
     ] = None,
     recording: Annotated[
         Path | None,
@@ -146,7 +149,10 @@ def effects(context: typer.Context, *, as_json: JsonOption = False) -> None:
 @effects_app.command("new")
 def effects_new(
     diagnosis: Annotated[
-        Path, typer.Option("--from", metavar="DIR", help="Folder of a diagnosis that has taken a correction.")
+        Path,
+        typer.Option(
+            "--from", metavar="DIR", help="Folder of a diagnosis that has taken a correction.", callback=there
+        ),
     ],
     name: Annotated[str, typer.Option("--name", metavar="NAME", help="Of the effect, such as night_grease.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="For its source, its test and what else to do.")],

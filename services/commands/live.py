@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from wetwell.services.commands.inputs import about
+from wetwell.services.commands.inputs import CommandGroup, about
 from wetwell.services.commands.options import (
     RUN,
     AsStationOption,
@@ -157,7 +157,7 @@ def plc(
     run(settings, serve_simulator(settings, plant, speed, PlantStart(), zenoh=False, modbus=True))
 
 
-detector_app = typer.Typer(invoke_without_command=True)
+detector_app = typer.Typer(cls=CommandGroup, invoke_without_command=True)
 app.add_typer(detector_app, name="detector", rich_help_panel=RUN)
 
 
@@ -185,7 +185,7 @@ def detector(
 @detector_app.command()
 def rebaseline(
     pump: Annotated[int, number(low=1, help="Pump, from 1.")],
-    by: Annotated[str, typer.Option(help="Who orders it; kept in the log and in the verdict.")],
+    by: Annotated[str, typer.Option(metavar="NAME", help="Who orders it; kept in the log and in the verdict.")],
     station: StationOption = "alpha",
     revert: Annotated[bool, typer.Option("--revert", help="Take the baseline back that was put aside last.")] = False,
     zenoh: ZenohOption = None,
@@ -209,19 +209,22 @@ def rebaseline(
 def release(
     station: StationNameOption,
     config: ConfigOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Judge a station again, from the next start on, that was left out because the detector had crashed at it."""
     kept = settings_of(config).detector
     from wetwell.services.detector.quarantine import Quarantine
 
-    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(station_name(station))
+    name = station_name(station)
+    Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(name)
+    print_result({"station": name, "judged": "from the next start on"}, as_json=as_json)
 
 
 @app.command(cls=about("--recording"), rich_help_panel=RUN)
 def replay(
     recording: RecordingOption,
     station: StationOption,
-    speed: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    speed: Annotated[float, typer.Option(metavar="NUMBER", help="How many times as fast as it was recorded.")] = 1.0,
     as_station: AsStationOption = False,
     time_zone: TimeZoneOption = None,
     zenoh: ZenohOption = None,

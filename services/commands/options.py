@@ -79,9 +79,10 @@ ScenarioOption = Annotated[
 ]
 SeedOption = Annotated[int, number(low=0, metavar="SEED", help="Same seed, same numbers.")]
 SpeedOption = Annotated[
-    float | None, typer.Option(help="Seconds of the station in a second on the wall; default: the scenario's.")
+    float | None,
+    typer.Option(metavar="NUMBER", help="Seconds of the station in a second on the wall; default: the scenario's."),
 ]
-ConfigOption = Annotated[Path | None, typer.Option("--config", help="TOML file with settings.")]
+ConfigOption = Annotated[Path | None, typer.Option("--config", metavar="FILE", help="TOML file with settings.")]
 ZenohOption = Annotated[str | None, typer.Option("--zenoh", metavar="ENDPOINT", help="Such as tcp/127.0.0.1:7447.")]
 ModbusOption = Annotated[
     str | None, typer.Option("--modbus", metavar="HOST:PORT", help="Address of the Modbus TCP server.")
@@ -94,8 +95,8 @@ WordOrderOption = Annotated[
 ]
 
 
-def _there(path: Path) -> Path:
-    """Refuse a file that is not there, before what would read it is loaded."""
+def there(path: Path) -> Path:
+    """Refuse a file or folder that is not there, before what would read it is loaded."""
     try:
         path.stat()
     except OSError as error:
@@ -105,11 +106,11 @@ def _there(path: Path) -> Path:
 
 def all_there(paths: list[Path] | None) -> list[Path] | None:
     """Refuse files of which one is not there."""
-    return None if paths is None else [_there(path) for path in paths]
+    return None if paths is None else [there(path) for path in paths]
 
 
 RecordingOption = Annotated[
-    Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.", callback=_there)
+    Path, typer.Option("--recording", metavar="FILE", help="CSV, CSV.gz or Parquet.", callback=there)
 ]
 TimeZoneOption = Annotated[
     str | None, typer.Option("--time-zone", metavar="ZONE", help="Of stamps that have none, such as Europe/Helsinki.")

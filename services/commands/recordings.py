@@ -46,7 +46,7 @@ def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="CSV, CSV.gz or Parquet.")],
     station: StationOption,
     scenario: ScenarioOption = "nominal",
-    days: Annotated[float | None, typer.Option(help="Length; default: the scenario's.")] = None,
+    days: Annotated[float | None, typer.Option(metavar="NUMBER", help="Length; default: the scenario's.")] = None,
     seed: SeedOption = 1,
     act: Annotated[
         Path | None,
@@ -91,7 +91,7 @@ def dataset(
     station: Annotated[
         list[str] | None, typer.Option("--station", metavar="FILE", help="Base station; may be given again.")
     ] = None,
-    days: Annotated[float, typer.Option(help="Length of each recording.")] = 1.0,
+    days: Annotated[float, typer.Option(metavar="NUMBER", help="Length of each recording.")] = 1.0,
     form: Annotated[
         Literal["parquet", "csv.gz"], typer.Option("--format", help="Form of the recordings.")
     ] = "parquet",
@@ -141,7 +141,9 @@ def convert(
         str | None,
         typer.Option("--station", metavar="FILE", help="Station file, for drives in % of their nominal frequency."),
     ] = None,
-    form: Annotated[Literal["skab"], typer.Option("--from", help="Form of a file without mapping.")] = "skab",
+    form: Annotated[
+        Literal["skab"], typer.Option("--from", metavar="FORM", help="Form of a file without mapping.")
+    ] = "skab",
     as_json: JsonOption = False,
 ) -> None:
     """Turn an export of another system into a recording."""

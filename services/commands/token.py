@@ -6,15 +6,21 @@ from typing import Annotated
 import typer
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.services.commands.inputs import CommandGroup
 from wetwell.services.commands.options import ConfigOption, JsonOption, number, print_result
 from wetwell.services.security.role import Role
 
-app = typer.Typer(no_args_is_help=True, help="Tokens of people and programs that use the dashboard.")
+app = typer.Typer(
+    cls=CommandGroup, no_args_is_help=True, help="Tokens of people and programs that use the dashboard."
+)
 
 FileOption = Annotated[
-    Path | None, typer.Option("--file", help="File of tokens; default: the setting security.tokens_file.")
+    Path | None,
+    typer.Option("--file", metavar="FILE", help="File of tokens; default: the setting security.tokens_file."),
 ]
-NameOption = Annotated[str, typer.Option("--name", help="Who holds it; stands in the record of acts.")]
+NameOption = Annotated[
+    str, typer.Option("--name", metavar="NAME", help="Who holds it; stands in the record of acts.")
+]
 
 
 @app.command()
@@ -57,11 +63,15 @@ def list_(file: FileOption = None, config: ConfigOption = None, *, as_json: Json
 
 
 @app.command()
-def revoke(name: NameOption, file: FileOption = None, config: ConfigOption = None) -> None:
+def revoke(
+    name: NameOption, file: FileOption = None, config: ConfigOption = None, *, as_json: JsonOption = False
+) -> None:
     """Take a token out of the file; it is refused from now on."""
     from wetwell.services.security.tokens import revoke_token
 
-    revoke_token(_file(file, config), name)
+    path = _file(file, config)
+    revoke_token(path, name)
+    print_result({"revoked": name, "file": str(path)}, as_json=as_json)
 
 
 def _file(file: Path | None, config: Path | None) -> Path:

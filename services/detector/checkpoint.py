@@ -10,11 +10,10 @@ from pathlib import Path
 
 from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SnapshotError
-from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.messages.maintenance import MaintenanceRecord
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.services.runtime.state_file import put_aside, read_kept
+from wetwell.services.runtime.state_file import FilePlace, StatePlace
 
 log = logging.getLogger(__name__)
 
@@ -37,13 +36,18 @@ class Told:
 
 
 class Checkpoint:
-    """A file with what was told, in its first line, and the last snapshot of the detector.
+    """What was told, in a first line, and the last snapshot of the detector.
 
-    Without a folder nothing is kept. A file that begins with the snapshot, as version 0.1 wrote it, is read too.
+    A file that begins with the snapshot, as version 0.1 wrote it, is read too.
+
+    Parameters
+    ----------
+    place : StatePlace, optional
+        Where it is kept; without it nothing is.
     """
 
-    def __init__(self, folder: Path | None, station: str) -> None:
-        self._path = None if folder is None else folder / f"{station}.detector.json"
+    def __init__(self, place: StatePlace | None) -> None:
+        self._place = place
         self._lock = threading.Lock()
         self._encoded = self._written = 0
 
@@ -56,18 +60,16 @@ class Checkpoint:
         Raises
         ------
         ConfigError
-            If the folder cannot be used.
+            If the place cannot be used.
         """
-        if self._path is None:
-            return None
-        data = read_kept(self._path, "detector.state_dir")
-        if data is None:
+        data = None if self._place is None else self._place.read()
+        if self._place is None or data is None:
             return None
         try:
             told, snapshot = _parted(data)
             detector.restore(snapshot)
         except SnapshotError as error:
-            log.warning("%s; kept as %s, learning starts again", error, put_aside(self._path))
+            log.warning("%s; kept as %s, learning starts again", error, self._place.put_aside())
             return None
         return told
 
@@ -78,7 +80,7 @@ class Checkpoint:
     def encode(self, detector: Detector, told: Told) -> tuple[int, bytes]:
         """The state as it is now, numbered, for `write`."""
         self._encoded += 1
-        if self._path is None:
+        if self._place is None:
             return self._encoded, b""
         head = {
             "schema": CHECKPOINT_SCHEMA,
@@ -93,14 +95,19 @@ class Checkpoint:
     def write(self, number: int, content: bytes) -> None:
         """Write what `encode` gave, in any thread; what is older than the file is left out."""
         with self._lock:
-            if self._path is None or number < self._written:
+            if self._place is None or number < self._written:
                 return
             try:
-                with atomic_file(self._path) as file:
-                    file.write(content)
+                self._place.write(content)
                 self._written = number
             except RecordingError as error:
                 log.warning("%s", error)
+
+
+def checkpoint_in(folder: Path | None, station: str) -> Checkpoint:
+    """Checkpoint of a station in a folder; without one nothing is kept."""
+    file = None if folder is None else FilePlace(folder / f"{station}.detector.json", "detector.state_dir")
+    return Checkpoint(file)
 
 
 def _parted(data: bytes) -> tuple[Told, bytes]:

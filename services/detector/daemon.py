@@ -5,13 +5,16 @@ import contextlib
 import gc
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
-from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.interface import Bus, Outlet
 from wetwell.protocols.bus.keys import status_key
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.checkpoint import Checkpoint, checkpoint_in
+from wetwell.services.detector.follower import Follower
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.kernels import load_kernels
 from wetwell.services.detector.quarantine import Quarantine
@@ -22,7 +25,15 @@ from wetwell.services.runtime.folder_lock import folder_held
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
 
+if TYPE_CHECKING:
+    from wetwell.services.lease.outbox import Outbox
+
 log = logging.getLogger(__name__)
+
+AGES_KEPT = 2.0
+"""A member that stands by keeps the samples of so many checkpoint periods: one may be late by a whole one."""
+LEAST_FOLLOWED_S = 30.0
+"""And of so much longer: from a state that was taken until it is written, and until the lease is over. [s]"""
 
 
 async def serve_detector(settings: Settings, stations: Sequence[Station]) -> None:
@@ -32,8 +43,45 @@ async def serve_detector(settings: Settings, stations: Sequence[Station]) -> Non
 
 async def _run(settings: Settings, stations: Sequence[Station]) -> None:
     await asyncio.to_thread(load_kernels)  # before it shows that it is there: samples come then
+    if settings.lease.url is not None:
+        await _judge_in_turn(settings, stations)
     with await connect(settings) as bus:
         await judge_alone(settings, bus, stations)
+
+
+async def _judge_in_turn(settings: Settings, stations: Sequence[Station]) -> None:
+    """Judge stations for ever while this process owns the role; follow their samples while it does not."""
+    from wetwell.services.lease.membership import Membership  # noqa: PLC0415 - only pairs need it
+
+    kept_s = AGES_KEPT * settings.detector.checkpoint_s + LEAST_FOLLOWED_S
+    with contextlib.closing(Membership(settings.lease, "detector")) as role:
+        while True:
+            with await connect(settings) as bus:
+                follower = Follower(bus, [station.name for station in stations], kept_s)
+                following = asyncio.create_task(follower.run(), name="detector.follow")
+                try:
+                    await role.take(bus)
+                finally:
+                    following.cancel()
+
+                async def work(outbox: "Outbox", bus: Bus = bus, follower: Follower = follower) -> None:
+                    await judge_all(settings, bus, stations, "detector", Turn(outbox, follower))
+
+                await role.act(bus, work)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What a detector has that takes over from another: where it tells and keeps, and who has followed until now."""
+
+    outbox: "Outbox"
+    follower: Follower
+
+    def checkpoint(self, station: str) -> Checkpoint:
+        """Checkpoint of a station in the ledger."""
+        from wetwell.services.lease.outbox import OutboxPlace  # noqa: PLC0415 - only pairs need it
+
+        return Checkpoint(OutboxPlace(self.outbox, station))
 
 
 async def judge_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) -> None:
@@ -48,7 +96,9 @@ async def judge_alone(settings: Settings, bus: Bus, stations: Sequence[Station])
         await judge_all(settings, bus, stations, "detector")
 
 
-async def judge_all(settings: Settings, bus: Bus, stations: Sequence[Station], name: str) -> None:
+async def judge_all(
+    settings: Settings, bus: Bus, stations: Sequence[Station], name: str, turn: Turn | None = None
+) -> None:
     """Judge stations for ever; their states are saved at the end.
 
     Parameters
@@ -61,8 +111,11 @@ async def judge_all(settings: Settings, bus: Bus, stations: Sequence[Station], n
         Those that have brought the process down too often are left out, and told.
     name : str
         Of this group of stations, for the trace of a crash.
+    turn : Turn, optional
+        Of one of a pair.
     """
     kept = settings.detector
+    outlet: Outlet = bus if turn is None else turn.outbox
     quarantine = Quarantine(kept.state_dir, name, kept.crash_tries, kept.crash_window_s)
     async with contextlib.AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         stack.callback(quarantine.close)
@@ -72,10 +125,13 @@ async def judge_all(settings: Settings, bus: Bus, stations: Sequence[Station], n
                 log.error("station '%s': left out after %d crashes", station.name, kept.crash_tries)
                 group.create_task(_show_left_out(bus, station.name, settings.health.period_s))
                 continue
-            judge = StationDetector(bus, station, kept.costs, Checkpoint(kept.state_dir, station.name), quarantine)
+            checkpoint = (
+                checkpoint_in(kept.state_dir, station.name) if turn is None else turn.checkpoint(station.name)
+            )
+            judge = StationDetector(outlet, station, kept.costs, checkpoint, quarantine)
             stack.callback(judge.keep)
             judges.append(judge)
-        intake = Intake(bus, judges)
+        intake = Intake(bus, judges, None if turn is None else turn.follower)
         gc.freeze()  # looking through the states of a thousand stations for garbage takes a quarter of a second
         stack.callback(gc.unfreeze)
         log.info("%d stations: waiting for samples", len(judges))

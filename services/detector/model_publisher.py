@@ -2,7 +2,7 @@
 
 from wetwell.detector.detector import Detector
 from wetwell.detector.verdict.station_model import StationModel
-from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.interface import Outlet
 from wetwell.protocols.bus.keys import model_key
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import Station
@@ -12,7 +12,7 @@ from wetwell.services.runtime.clock import now_ns
 class ModelPublisher:
     """Publishes the model of a station: at the beginning, after each run that was judged, and after each order."""
 
-    def __init__(self, bus: Bus, station: Station, detector: Detector) -> None:
+    def __init__(self, bus: Outlet, station: Station, detector: Detector) -> None:
         self._model = StationModel(station)
         self._detector = detector
         self._publisher = bus.publisher(model_key(station.name))

@@ -71,9 +71,19 @@ class Quarantine:
         return len(self._crashes_ns(station)) >= self._tries
 
     def release(self, station: str) -> None:
-        """Let a station be judged again from the next start on."""
-        if self._folder is not None:
-            self._path(station).unlink(missing_ok=True)
+        """Let a station be judged again from the next start on.
+
+        Raises
+        ------
+        ConfigError
+            If no crash of it is kept.
+        """
+        if self._folder is None:
+            raise ConfigError("detector.state_dir: not set, must name the folder in which the detector keeps crashes")
+        try:
+            self._path(station).unlink()
+        except FileNotFoundError:
+            raise ConfigError(f"{self._folder}: keeps no crash of station '{station}', nothing to release") from None
 
     def enter(self, station: str) -> None:
         """Leave the trace that a station is being judged."""

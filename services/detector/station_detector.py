@@ -11,7 +11,7 @@ import numpy as np
 
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import Block
-from wetwell.protocols.bus.interface import Bus
+from wetwell.protocols.bus.interface import Outlet
 from wetwell.protocols.bus.keys import maintenance_key, verdict_key
 from wetwell.protocols.messages.decoding import SampleMessage, decoded
 from wetwell.protocols.messages.maintenance import MaintenanceAct, MaintenanceRecord
@@ -40,7 +40,7 @@ class StationDetector:
 
     Parameters
     ----------
-    bus : Bus
+    bus : Outlet
         Where verdicts and models go to.
     station : Station
         What is judged.
@@ -54,7 +54,7 @@ class StationDetector:
 
     def __init__(
         self,
-        bus: Bus,
+        bus: Outlet,
         station: Station,
         costs: Costs | None = None,
         checkpoint: Checkpoint | None = None,

@@ -11,6 +11,7 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.doctor.checks import LEAST_FREE_BYTES, findings_of
 from wetwell.services.doctor.finding import Finding
+from wetwell.services.doctor.leases import lease_findings
 from wetwell.services.doctor.survey import listen
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.settings import ModbusSettings, Settings, load_settings
@@ -43,6 +44,7 @@ async def examine(config: Path | None, zenoh: str | None, stations: Sequence[str
     known = [found for name in stations for found in [_station(name, findings)] if found is not None]
     findings += _disks(settings)
     findings.append(await _modbus(settings.modbus))
+    findings += await lease_findings(settings.lease)
     try:
         async with asyncio.timeout(ROUTER_S):
             bus = await connect(settings)

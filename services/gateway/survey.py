@@ -67,7 +67,7 @@ async def _read(plc: Plc) -> dict[str, object]:
     rows = [
         {
             "signal": name,
-            "value": poll.values[name],
+            "value": _short(poll.values[name]),
             "unit": house_unit(name),
             "words": " ".join(f"{word:04X}" for word in poll.words.get(name, ())),
             "table": signal.table,
@@ -77,3 +77,8 @@ async def _read(plc: Plc) -> dict[str, object]:
         for name, signal in plc.signals.items()
     ]
     return where | {"signals": rows}
+
+
+def _short(value: float | None) -> float | None:
+    """Without the digits that only binary numbers have."""
+    return None if value is None else float(f"{value:.10g}")

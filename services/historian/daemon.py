@@ -16,7 +16,7 @@ from wetwell.protocols.bus.keys import (
     sample_key,
     verdict_key,
 )
-from wetwell.protocols.errors import WetwellError
+from wetwell.protocols.errors import ConfigError, WetwellError
 from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
@@ -46,6 +46,8 @@ async def serve_historian(settings: Settings) -> None:
 
 
 async def _run(settings: Settings) -> None:
+    if settings.lease.url is not None:
+        await _keep_in_turn(settings)
     periods_s = settings.historian.commit_s, settings.historian.maintain_s, settings.health.period_s
     with open_store(settings.historian) as store:
         historian = Historian(store, spool_rows=settings.historian.spool_rows)
@@ -55,6 +57,51 @@ async def _run(settings: Settings) -> None:
                     await keep(bus, historian, *periods_s)
         finally:
             _finish(historian)
+
+
+async def _keep_in_turn(settings: Settings) -> None:
+    """Keep history for ever while this process owns the role; stand by while it does not.
+
+    What comes between two owners is with the publishers.
+
+    Raises
+    ------
+    ConfigError
+        If the history is not in the database of the lease: only there one transaction sees both.
+    """
+    from wetwell.services.historian.store.postgres_store import PostgresStore  # noqa: PLC0415 - each site has one
+    from wetwell.services.lease.membership import Membership  # noqa: PLC0415 - only pairs need it
+
+    kept, url = settings.historian, settings.historian.url
+    if url is None or url != settings.lease.url:
+        raise ConfigError("historian.url: must be the same as lease.url, where that is set")
+    with contextlib.closing(Membership(settings.lease, "historian")) as role:
+        while True:
+            with await connect(settings) as bus:
+                await role.take(bus)
+
+                async def work(_: object, bus: Bus = bus) -> None:
+                    fence = role.fence()
+                    store = PostgresStore(
+                        url.get_secret_value(),
+                        password_file=kept.password_file,
+                        is_alone=False,
+                        fence=fence,
+                        keep_live_days=kept.keep_live_days,
+                        downsample_after_days=kept.downsample_after_days,
+                        keep_days=kept.keep_days,
+                    )
+                    with contextlib.closing(store):
+                        historian = Historian(store, spool_rows=kept.spool_rows)
+                        try:
+                            await keep(bus, historian, kept.commit_s, kept.maintain_s, settings.health.period_s)
+                        finally:
+                            if role.is_owner:
+                                _finish(historian)
+                            else:
+                                store.hang_up()
+
+                await role.act(bus, work)
 
 
 @contextlib.contextmanager

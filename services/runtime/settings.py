@@ -14,7 +14,7 @@ from wetwell.protocols.messages.alarm import Priority, RuleName
 from wetwell.protocols.modbus.registers import WordOrder
 from wetwell.protocols.modbus.write_permission import LOOPBACK_WRITES
 from wetwell.protocols.station.costs import Costs
-from wetwell.protocols.station.station_file import load_toml
+from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
 from wetwell.protocols.station.table import Finite, NonNegative, Positive, Table
 
 Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d+$")]
@@ -168,6 +168,31 @@ class HealthSettings(Table):
     period_s: Positive = 10.0
     http: Annotated[str, Field(pattern=r"^.+:\d{1,5}$")] | None = None
     max_sample_age_s: Positive = 60.0
+
+
+class LeaseSettings(Table):
+    """Daemons in pairs: one owner at a time, by a lease in PostgreSQL.
+
+    Parameters
+    ----------
+    url : str, optional
+        PostgreSQL database of leases, and of what their owners tell and keep, such as `postgresql://user@host/name`.
+        Without it each daemon works alone.
+    password_file : Path, optional
+        File with the password of the database alone.
+    group : str
+        Name that the members of a pair share; pairs with other stations have another.
+    member : str, optional
+        Name of this member, for people; without it that of the machine.
+    ttl_s : float
+        Time of a lease, renewed five times in it: so long after its end at most another takes over. [s]
+    """
+
+    url: SecretStr | None = None
+    password_file: Path | None = None
+    group: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)] = "site"
+    member: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)] | None = None
+    ttl_s: Annotated[float, Field(ge=0.5, le=60.0)] = 1.5
 
 
 class DetectorSettings(Table):
@@ -399,6 +424,7 @@ class Settings(BaseSettings):
     modbus: ModbusSettings = ModbusSettings()
     log: LogSettings = LogSettings()
     health: HealthSettings = HealthSettings()
+    lease: LeaseSettings = LeaseSettings()
     detector: DetectorSettings = DetectorSettings()
     alarms: AlarmSettings = AlarmSettings()
     watch: WatchSettings = WatchSettings()

@@ -116,12 +116,14 @@ async def _run(settings: Settings, bus: Bus, plan: UpPlan, screen: Screen, story
             for name, process in children.items():
                 group.create_task(watch(name, process), name=f"up.{name}")
             teller = _Teller(plan, screen, story, control, group)
-            group.create_task(teller.show_verdicts(verdicts), name="up.verdicts")
             group.create_task(
                 show_health(statuses, BOARD, settings.health.period_s, teller.note_end), name="up.health"
             )
             await _wait_for_all(presences, plan, screen)
             screen.show_begin(has_keys=keys is not None)
+            group.create_task(
+                teller.show_verdicts(verdicts), name="up.verdicts"
+            )  # a kept detector tells its last before
             await control.release()
             teller.has_begun = True
             if keys is not None:

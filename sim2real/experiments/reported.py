@@ -1,12 +1,14 @@
 """What of a proposed act stands in reports and files: plain values, steps that a program can play."""
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from wetwell.protocols.orders import Step
-from wetwell.sim2real.experiments.proposals import Proposal, Proposals
+
+if TYPE_CHECKING:  # a reader of reports needs nothing of what weighs acts
+    from wetwell.sim2real.experiments.proposals import Proposal, Proposals
 
 Short = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
 
@@ -111,17 +113,17 @@ class RefusedAct(_Part):
     reason: str
 
 
-def proposed_acts(proposals: Proposals) -> tuple[ProposedAct, ...]:
+def proposed_acts(proposals: "Proposals") -> tuple[ProposedAct, ...]:
     """Acts of proposals, the best first."""
     return tuple(_act(one) for one in proposals.best)
 
 
-def refused_acts(proposals: Proposals) -> tuple[RefusedAct, ...]:
+def refused_acts(proposals: "Proposals") -> tuple[RefusedAct, ...]:
     """Acts that are ruled out."""
     return tuple(RefusedAct(act=one.act.name, reason=one.reason) for one in proposals.refused)
 
 
-def _act(proposal: Proposal) -> ProposedAct:
+def _act(proposal: "Proposal") -> ProposedAct:
     return ProposedAct(
         act=proposal.act.name,
         sentence=proposal.act.sentence,

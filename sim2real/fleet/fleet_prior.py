@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import candidates_of
@@ -132,5 +132,5 @@ def _spread(values: Floats, errors: Floats) -> tuple[float, float]:
     tau2 = max(0.0, (q - (n - 1)) / c) + np.sqrt(2.0 * (n - 1)) / c
     joint = 1.0 / (errors**2 + tau2)
     centre = float(np.sum(joint * values) / joint.sum())
-    widened = float(student_t.isf(0.025, n - 1)) / TWO_SIDED
+    widened = -float(stdtrit(n - 1, 0.025)) / TWO_SIDED
     return centre, widened * float(np.sqrt(tau2 + 1.0 / joint.sum()))

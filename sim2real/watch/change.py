@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.covariance import CHANGING
@@ -35,7 +35,7 @@ def changed_groups(
     for name, shift in now.items():
         known = before.get(name)
         mean, error, cycles = (0.0, 0.0, shift.cycles) if known is None else (known.mean, known.error, known.cycles)
-        quantile = student_t.isf(false / (2.0 * len(now)), min(shift.cycles, cycles) - 1)
+        quantile = -stdtrit(min(shift.cycles, cycles) - 1, false / (2.0 * len(now)))
         if abs(shift.mean - mean) - quantile * np.hypot(shift.error, error) > least:
             found[name] = shift.mean - mean
     return dict(sorted(found.items(), key=lambda pair: -abs(pair[1])))

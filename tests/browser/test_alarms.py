@@ -41,7 +41,10 @@ def test_shelved_alarms_are_listed_apart_and_filters_and_order_are_in_the_addres
     page.get_by_role("button", name="shelved and out of service").click()
     expect(row).to_contain_text("shelved by Ada until")
     expect(row).to_contain_text("tank is cleaned")
+    row.get_by_role("button", name="unshelve").click()
+    page.get_by_role("dialog").get_by_role("button", name="unshelve").click()
     page.get_by_role("button", name="standing").click()
+    expect(row).to_contain_text("unacknowledged")  # it calls anew, even if it was acknowledged before
     page.get_by_label("Priority").select_option("urgent")
     expect(page).to_have_url(re.compile("priority=urgent"))
     expect(page.get_by_text("No alarm.")).to_be_visible()

@@ -25,16 +25,6 @@ HAS_RED = """() => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def faulty(site, browser):
-    """The site, once pump 2 is told as blocked."""
-    page = browser.new_page()
-    page.goto(f"{site.url}/station/alpha?pump=2")
-    expect(page.locator('.pump[data-state="pump_fault"]')).to_be_visible(timeout=150_000)
-    page.close()
-    return site
-
-
 def drag(page, first, last):
     over = page.locator(".is-trends .u-over").nth(1)
     over.scroll_into_view_if_needed()
@@ -45,8 +35,8 @@ def drag(page, first, last):
     page.mouse.up()
 
 
-def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(faulty, open_page, tmp_path) -> None:
-    page = open_page(f"{faulty.url}/station/alpha?pump=2")
+def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(site, open_page, tmp_path) -> None:
+    page = open_page(f"{site.url}/station/alpha?pump=2")
     expect(page.locator("#station-time")).to_have_text(re.compile("[0-9]{4}-"))
     page.get_by_role("button", name="24 h").click()
     note = page.locator("#trend-note")
@@ -77,11 +67,11 @@ def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(faulty, 
     expect(page.get_by_role("button", name="24 h")).to_have_attribute("aria-pressed", "true")
 
 
-def test_a_moment_of_the_past_shows_plane_well_and_evidence_of_that_time(faulty, open_page) -> None:
-    page = open_page(f"{faulty.url}/station/alpha?pump=2")
+def test_a_moment_of_the_past_shows_plane_well_and_evidence_of_that_time(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha?pump=2")
     expect(page.locator(".curve.now.fault")).to_have_count(1)
     healthy = "2025-01-01T06:55:00.000Z"  # five minutes before the blockage begins
-    page.goto(f"{faulty.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T08:00:00Z&at={healthy}")
+    page.goto(f"{site.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T08:00:00Z&at={healthy}")
     expect(page.locator("#plane-words")).to_contain_text("At 2025-01-01 06:55:00")
     expect(page.locator(".trail path").first).to_have_attribute("d", re.compile("^M"))
     expect(page.locator(".curve.now.fault")).to_have_count(0)
@@ -94,8 +84,8 @@ def test_a_moment_of_the_past_shows_plane_well_and_evidence_of_that_time(faulty,
     expect(page.locator(".curve.now.fault")).to_have_count(1)
 
 
-def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(faulty, open_page) -> None:
-    page = open_page(f"{faulty.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T09:00:00Z")
+def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T09:00:00Z")
     expect(page.locator("#trend-note")).to_have_text(POINTS)
     page.wait_for_function(HAS_RED)
     page.get_by_text("Changes of state", exact=True).click()
@@ -103,7 +93,7 @@ def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(faulty
     changes.get_by_role("button", name="Pump 2 pump fault").last.click()
     expect(page).to_have_url(re.compile("at=2025-01-01T07"))
     expect(page.locator(".sentence")).to_contain_text("Pump 2 is at fault since 2025-01-01 07:")
-    page.goto(f"{faulty.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T06:55:00Z")
+    page.goto(f"{site.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T06:55:00Z")
     expect(page.locator("#trend-note")).to_have_text(POINTS)
     expect(page.locator(".is-alarms table caption")).to_have_text(
         "Alarms of the range"
@@ -111,8 +101,8 @@ def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(faulty
     assert page.locator(".is-alarms table").nth(1).locator("tbody tr").count() == 1
 
 
-def test_dates_give_a_range_and_a_wrong_order_is_refused(faulty, open_page) -> None:
-    page = open_page(f"{faulty.url}/station/alpha", timezone_id="Europe/Berlin")
+def test_dates_give_a_range_and_a_wrong_order_is_refused(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha", timezone_id="Europe/Berlin")
     expect(page.locator("#station-time")).to_have_text(re.compile(r"(MEZ|CET|GMT\+1)"))
     page.get_by_label("from", exact=True).fill("2025-01-01T06:00:00")
     page.get_by_label("to", exact=True).fill("2025-01-01T05:00:00")
@@ -126,8 +116,8 @@ def test_dates_give_a_range_and_a_wrong_order_is_refused(faulty, open_page) -> N
     expect(page.locator("#trend-note")).to_contain_text("2025-01-01 05:00:00 to 2025-01-01 06:00:00 UTC")
 
 
-def test_the_page_speaks_german_where_the_browser_does(faulty, open_page) -> None:
-    page = open_page(f"{faulty.url}/station/alpha?pump=2", locale="de-DE")
+def test_the_page_speaks_german_where_the_browser_does(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha?pump=2", locale="de-DE")
     expect(page.locator("#station-state")).to_have_text("Pumpenfehler")
     expect(page.locator(".sentence")).to_contain_text("Pumpe 2 ist fehlerhaft seit")
     expect(page.locator(".sentence")).to_contain_text(re.compile(r"\d+,\d %"))

@@ -12,6 +12,7 @@ import typer
 from wetwell.services.cli import app
 
 ROOT = Path(__file__).parents[2]
+WETWELL = typer.main.get_command(app)
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -28,7 +29,7 @@ def named_commands(text: str) -> Iterator[list[str]]:
 
 def command_of(words: list[str]) -> tuple[Any, list[str]]:
     """Command that the words lead to, and the words that are left."""
-    command = typer.main.get_command(app)
+    command: Any = WETWELL
     while words and words[0] in getattr(command, "commands", {}):
         command, words = command.commands[words[0]], words[1:]
     return command, words

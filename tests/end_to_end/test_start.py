@@ -19,6 +19,7 @@ from wetwell.services.historian.store.folder_store import FolderStore
 LEAST_SAMPLES = 6_000
 """Ten seconds at 600 times life."""
 PATIENCE_S = 400.0
+PARTS = ("alarms", "dashboard", "detector", "historian", "simulator", "watch")
 STARTS = 20
 COLD = (0, 7, 14)
 """Of these starts the kernels are compiled; in the others they are loaded."""
@@ -39,13 +40,16 @@ def kept(folder: Path) -> list[int]:
 
 
 def start_and_stop(folder: Path, environment: dict[str, str]) -> tuple[int, str]:
-    """Exit code and standard error of a site that lives until it has kept some more samples."""
+    """Exit code and standard error of a site that lives until it has kept some more samples.
+
+    The parts name themselves in one line, before any verdict is shown.
+    """
     wanted = len(kept(folder)) + LEAST_SAMPLES
     flags = ["--zenoh", f"tcp/127.0.0.1:{free_port()}", "--modbus", f"127.0.0.1:{free_port()}"]
     flags += ["--page", f"127.0.0.1:{free_port()}", "--data", str(folder), "--scenario", "nominal", "--speed", "600"]
     process = subprocess.Popen(
         [sys.executable, "-m", "wetwell.services", "up", *flags],
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ | environment,
@@ -57,7 +61,10 @@ def start_and_stop(folder: Path, environment: dict[str, str]) -> tuple[int, str]
             assert time.monotonic() < end, "it did not begin"
             time.sleep(0.5)  # real processes: there is no virtual time here
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=120)
+        shown, said = process.communicate(timeout=120)
+        before, begins, _ = shown.partition("\nAll parts are ready")
+        assert begins, shown
+        assert all(f" {part} " in before.splitlines()[-1] for part in PARTS), before
         return process.returncode, said
     finally:
         process.kill()

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Self
 
-from wetwell.protocols.bus.interface import PACE_S, Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, KeptStream, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 
 REQUESTS = 1_000
@@ -74,7 +74,13 @@ class MemoryBus:
             self.alive.discard(key)
             self._tell(Presence(key, is_alive=False))
 
-    def publisher(self, key: str, *, history: int = 1) -> "MemoryPublisher":
+    def publisher(
+        self,
+        key: str,
+        *,
+        history: int = 1,
+        goes_on: KeptStream | None = None,  # noqa: ARG002 - what is kept here outlives its publisher
+    ) -> "MemoryPublisher":
         """Publisher on a key that keeps the last `history` messages for late joiners.
 
         Raises

@@ -11,8 +11,9 @@ from typing import Any, Self
 
 import zenoh
 
-from wetwell.protocols.bus.interface import PACE_S, Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, KeptStream, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
+from wetwell.protocols.bus.publisher_cache import PublisherCache
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
 from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.publisher import ZenohPublisher, at_once
@@ -94,8 +95,10 @@ class ZenohBus:
         with self._lock:
             self._exit.close()
 
-    def publisher(self, key: str, *, history: int = 1) -> ZenohPublisher:
+    def publisher(self, key: str, *, history: int = 1, goes_on: KeptStream | None = None) -> ZenohPublisher:
         """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss.
+
+        With `goes_on` it continues the stream of others before it: their source, their numbers, what they kept.
 
         Raises
         ------
@@ -105,7 +108,8 @@ class ZenohBus:
         if history < 1:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
-            publisher = ZenohPublisher(self._session, key, history, self._worker.queries, self._names)
+            cache = PublisherCache(history, goes_on)
+            publisher = ZenohPublisher(self._session, key, cache, self._worker.queries, self._names)
         self._worker.add_publisher(publisher)
         return publisher
 

@@ -70,12 +70,12 @@ class ZenohPublisher:
         self,
         session: zenoh.Session,
         key: str,
-        history: int,
+        cache: PublisherCache,
         queries: "deque[tuple[ZenohPublisher, zenoh.Query]]",
         names: DeclaredNames,
     ) -> None:
         self.key = key
-        self.cache = PublisherCache(history)
+        self.cache = cache
         self.rests_until_s = 0.0
         self._silent_s = 0.0
         self._told_s = 0.0

@@ -11,6 +11,7 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.runtime.postgres import Fence, hang_up
 
 POSTGRES_CONNECT_S = 5
 LOCK = 0x77657477656C6C
@@ -61,6 +62,8 @@ class PostgresConnection:
         File with the password.
     is_alone : bool
         Whether to be the one historian of this database.
+    fence : Fence, optional
+        Of one of a pair.
 
     Raises
     ------
@@ -70,7 +73,7 @@ class PostgresConnection:
         From every method, if the database cannot be used now.
     """
 
-    def __init__(self, url: str, password_file: Path | None, *, is_alone: bool) -> None:
+    def __init__(self, url: str, password_file: Path | None, *, is_alone: bool, fence: Fence | None = None) -> None:
         try:
             parts = conninfo_to_dict(url)
         except psycopg.ProgrammingError:
@@ -81,6 +84,7 @@ class PostgresConnection:
         self._url = url
         self._password_file = password_file
         self._is_alone = is_alone
+        self._fence = fence
         self._lock = threading.Lock()
         self._has_tables = False
         self._writer: psycopg.Connection[Any] | None = None
@@ -89,6 +93,11 @@ class PostgresConnection:
     def is_connected(self) -> bool:
         """Whether the connection that writes is there."""
         return self._writer is not None
+
+    def hang_up(self) -> None:
+        """End what waits for the database in another thread, which may be cut off."""
+        if self._writer is not None and self._lock.locked():
+            hang_up(self._writer)
 
     def close(self) -> None:
         """Close the connection that writes; twice is fine."""
@@ -104,6 +113,8 @@ class PostgresConnection:
                     self._writer = self._connect_writer()
                 with self._writer.transaction():
                     yield self._writer
+                    if self._fence is not None:
+                        self._fence.check(self._writer)
             except (psycopg.Error, OSError):
                 self._drop()
                 raise
@@ -119,7 +130,10 @@ class PostgresConnection:
 
     def _connect(self) -> psycopg.Connection[Any]:
         password = None if self._password_file is None else self._password_file.read_text().strip()
-        return psycopg.connect(make_conninfo(self._url, password=password), connect_timeout=POSTGRES_CONNECT_S)
+        options = None if self._fence is None else self._fence.options
+        return psycopg.connect(
+            make_conninfo(self._url, password=password), connect_timeout=POSTGRES_CONNECT_S, options=options
+        )
 
     def _connect_writer(self) -> psycopg.Connection[Any]:
         database = self._connect()

@@ -24,6 +24,7 @@ from wetwell.services.historian.store.interface import (
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.store.postgres_connection import PostgresConnection
 from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
+from wetwell.services.runtime.postgres import Fence
 
 
 class PostgresStore:
@@ -37,6 +38,8 @@ class PostgresStore:
         File with the password.
     is_alone : bool
         Whether to be the one historian of this database.
+    fence : Fence, optional
+        Of one of a pair of historians.
     downsample_after_days, keep_days : int, optional
         As for a folder.
 
@@ -52,11 +55,12 @@ class PostgresStore:
         *,
         password_file: Path | None = None,
         is_alone: bool = True,
+        fence: Fence | None = None,
         keep_live_days: int = 1,
         downsample_after_days: int | None = None,
         keep_days: int | None = None,
     ) -> None:
-        self._connection = PostgresConnection(url, password_file, is_alone=is_alone)
+        self._connection = PostgresConnection(url, password_file, is_alone=is_alone, fence=fence)
         self._keep_live_days = keep_live_days
         self._downsample_after_days = downsample_after_days
         self._keep_days = keep_days
@@ -65,6 +69,10 @@ class PostgresStore:
     def damages(self) -> int:
         """None: pages are checked by the database, if its `data_checksums` are on."""
         return 0
+
+    def hang_up(self) -> None:
+        """End what waits for the database, which may be cut off."""
+        self._connection.hang_up()
 
     def close(self) -> None:
         """Close the connection; twice is fine."""

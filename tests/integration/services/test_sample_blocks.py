@@ -14,7 +14,8 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.dashboard.view.site_view import SiteView
-from wetwell.services.detector.intake import Intake, Room, Waiting
+from wetwell.services.detector.follower import Room, Waiting
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.daemon import keep
 from wetwell.services.historian.service import Historian

@@ -12,7 +12,7 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.audit import Audit, broken_lines, end_of, is_cut_off
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
-from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.checkpoint import checkpoint_in
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.doctor.finding import Finding
 from wetwell.services.doctor.verify import verify_kept
@@ -45,7 +45,7 @@ def kept(alpha, tmp_path_factory):
         pass
     store.close()
     with MemoryBus() as bus:
-        StationDetector(bus, alpha, checkpoint=Checkpoint(folder / "detector", "alpha")).keep()
+        StationDetector(bus, alpha, checkpoint=checkpoint_in(folder / "detector", "alpha")).keep()
         settings = AlarmSettings(state_dir=folder / "alarms")
         service = AlarmService(bus, settings, [alpha], lambda: Now(NOW_NS, 0.0))
         service.handle_verdict(verdict.encode())

@@ -8,7 +8,7 @@ from memory_bus import MemoryBus
 from wetwell.protocols.bus.keys import maintenance_key
 from wetwell.protocols.messages.maintenance import MaintenanceAct, MaintenanceRecord
 from wetwell.protocols.messages.sample import Sample
-from wetwell.services.detector.checkpoint import Checkpoint
+from wetwell.services.detector.checkpoint import checkpoint_in
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.maintenance import entered
@@ -36,13 +36,13 @@ def act(asset: str, what: str, name: str) -> MaintenanceAct:
 def test_a_pump_that_was_pulled_is_back_and_the_log_outlives_a_restart(samples: list[Sample], tmp_path) -> None:
     bus = MemoryBus()
     told = bus.subscribe(maintenance_key("alpha"))
-    judge = StationDetector(bus, ALPHA, checkpoint=Checkpoint(tmp_path, "alpha"))
+    judge = StationDetector(bus, ALPHA, checkpoint=checkpoint_in(tmp_path, "alpha"))
     judge.judge(samples[:PULLED_S])
     judge.handle_maintenance(act("pump:2", "pulled", "one").encode())
     judge.handle_maintenance(b"{}")
     judge.handle_maintenance(act("pump:9", "pulled", "two").encode())
     judge.handle_maintenance(act("pump:2", "pulled", "three").model_copy(update={"station": "beta"}).encode())
-    again = StationDetector(bus, ALPHA, checkpoint=Checkpoint(tmp_path, "alpha"))
+    again = StationDetector(bus, ALPHA, checkpoint=checkpoint_in(tmp_path, "alpha"))
     again.judge(samples[PULLED_S:])
 
     async def heard() -> list[MaintenanceRecord]:

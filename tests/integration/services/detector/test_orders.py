@@ -10,7 +10,7 @@ from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import LEARNING_S
-from wetwell.services.detector.checkpoint import Checkpoint, Told
+from wetwell.services.detector.checkpoint import Told, checkpoint_in
 from wetwell.services.detector.client import ordered
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
@@ -63,7 +63,7 @@ def test_a_rebaseline_is_carried_out_once_answered_and_can_be_taken_back(alpha, 
 
 def test_a_checkpoint_is_taken_up_and_a_damaged_one_is_put_aside(alpha, tmp_path, caplog):
     with MemoryBus() as bus:
-        checkpoint = Checkpoint(tmp_path / "state", "alpha")
+        checkpoint = checkpoint_in(tmp_path / "state", "alpha")
         judge = StationDetector(bus, alpha, checkpoint=checkpoint)
         assert not judge.is_restored
         judge.keep()
@@ -82,7 +82,7 @@ def test_a_checkpoint_is_taken_up_and_a_damaged_one_is_put_aside(alpha, tmp_path
 
 def test_a_late_writer_does_not_put_an_older_state_over_a_newer_one(alpha, payloads, tmp_path):
     with MemoryBus() as bus:
-        checkpoint = Checkpoint(tmp_path, "alpha")
+        checkpoint = checkpoint_in(tmp_path, "alpha")
         judge = StationDetector(bus, alpha, checkpoint=checkpoint)
         older = checkpoint.encode(judge.detector, Told({}))
         judge.handle_payloads(payloads)
@@ -95,19 +95,19 @@ def test_a_checkpoint_of_version_0_1_which_is_a_bare_snapshot_is_taken_up(alpha,
     with MemoryBus() as bus:
         judge = StationDetector(bus, alpha)
         (tmp_path / "alpha.detector.json").write_bytes(judge.detector.snapshot())
-        assert StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha")).is_restored
+        assert StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha")).is_restored
 
 
 def test_an_order_that_was_answered_is_known_after_a_kill(alpha, payloads, tmp_path):
     async def orders_before_and_after_a_kill() -> tuple[Verdict, Verdict, int]:
         with MemoryBus() as bus:
-            first = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            first = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
             await first.judge_in_turns(Sample.decode(payload) for payload in payloads)
             obeying = asyncio.create_task(Intake(bus, [first]).run())
             answer = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()
         with MemoryBus() as bus:  # nothing of the first one is left but its checkpoint
-            second = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            second = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
             obeying = asyncio.create_task(Intake(bus, [second]).run())
             again = await asyncio.wait_for(ordered(bus, order("rebaseline", 7)), 30.0)
             obeying.cancel()

@@ -16,8 +16,9 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.detector.checkpoint import Checkpoint
-from wetwell.services.detector.intake import Intake, Room, Waiting
+from wetwell.services.detector.checkpoint import checkpoint_in
+from wetwell.services.detector.follower import Room, Waiting
+from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
@@ -85,7 +86,7 @@ async def verdicts_of_killed(
         send = source(bus, historian, samples, gather)
         position = 0
         for cut in [*cuts, len(samples)]:
-            judge = StationDetector(bus, alpha, checkpoint=Checkpoint(folder, "alpha"))
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(folder, "alpha"))
             running = asyncio.create_task(Intake(bus, [judge]).run())
             checkpoint_at = cut - (cut * 7919) % 900  # some time before the kill
             for number in range(position, cut):
@@ -146,12 +147,12 @@ def test_a_historian_that_comes_back_later_than_the_detector_is_waited_for(
             store = FolderStore(tmp_path / "history", keep_live_days=1)
             historian = Historian(store)
             send = source(bus, historian, samples, 1)
-            judge = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
             judge.judge(samples[:cut])
             judge.keep()
             for number in range(back):
                 send(number)
-            judge = StationDetector(bus, alpha, checkpoint=Checkpoint(tmp_path, "alpha"))
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
             running = asyncio.create_task(Intake(bus, [judge]).run())
             await asyncio.sleep(0.05)
             assert judge.detector.seen_until_ns == samples[cut - 1].time, "nothing is passed over meanwhile"

@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import runpy
 import subprocess
 import sys
 from importlib.metadata import version
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 from wetwell.services.cli import app
 from wetwell.services.commands.inputs import named_words
 
+ROOT = Path(__file__).parents[4]
 RECORDING = """time,level_m,pump1_frequency_hz,pump1_flow_m3h,pump1_head_m,pump1_running
 2025-01-01T00:00:00Z,1.0,50,100,20,1
 2025-01-01T00:00:01Z,1.0,50,100,20,1
@@ -30,6 +33,8 @@ def commands(command=None, name="wetwell"):
     for child, inner in children.items():
         yield from commands(inner, f"{name} {child}")
 
+
+COMMANDS = dict(commands())
 
 WORDS = st.text(alphabet="abc.=/1", min_size=1, max_size=5)
 
@@ -86,13 +91,14 @@ def test_a_station_on_the_bus_may_be_named_by_its_file(run_wetwell, tmp_path, ca
 SILENT = {
     "wetwell simulator", "wetwell plc", "wetwell replay", "wetwell router", "wetwell detector", "wetwell gateway",
     "wetwell alarms", "wetwell historian", "wetwell dashboard", "wetwell fleet",
-    "wetwell detector release", "wetwell token revoke",
 }  # fmt: skip
-"""Daemons, whose logs are on standard error, and two commands that print nothing."""
+"""Daemons, whose logs are on standard error."""
 
 
 def test_whatever_prints_a_result_prints_it_as_json():
-    plain = {name for name, command in commands() if not any("--json" in option.opts for option in command.params)}
+    plain = {
+        name for name, command in COMMANDS.items() if not any("--json" in option.opts for option in command.params)
+    }
     assert plain == SILENT
 
 
@@ -111,17 +117,30 @@ def test_an_input_has_one_name_everywhere():
         "--diagnosis",
         "--diagnoses",
     }
-    arguments = [(name, p.name) for name, c in commands() for p in c.params if p.param_type_name == "argument"]
+    arguments = [(name, p.name) for name, c in COMMANDS.items() for p in c.params if p.param_type_name == "argument"]
     assert arguments == []
-    subjects = {command.option for _, command in commands() if hasattr(command, "option")}
+    subjects = {command.option for _, command in COMMANDS.items() if hasattr(command, "option")}
     assert subjects <= meanings
 
 
-def test_help_shows_the_groups_in_order(run_wetwell, capsys):
+def test_help_shows_the_groups_in_order_and_all_that_is_said_of_a_command(run_wetwell, capsys):
     assert run_wetwell("--help") == 0
-    lines = capsys.readouterr().out.splitlines()
-    titles = [line.strip("╭─╮ ") for line in lines if line.startswith("╭")]
+    said = capsys.readouterr().out
+    titles = [line.removesuffix(":") for line in said.splitlines() if line.endswith(":") and line[0] != " "]
     assert titles == ["Options", "Run", "Record", "Judge", "Gap", "Operate", "Administer"]
+    assert "..." not in said.partition("\n")[2]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_fits_100_columns_and_says_what_each_value_is(name, run_wetwell, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "250")
+    assert run_wetwell(*name.split()[1:], "--help") == 0
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= 100
+    assert not re.search(r"<\w+( range)?>", said), said
+    command = COMMANDS[name]
+    silent = [option.opts for option in command.params if not (option.help or option.name == "help")]
+    assert silent == []
 
 
 def test_the_version_is_that_of_the_package(run_wetwell, capsys):
@@ -130,7 +149,7 @@ def test_the_version_is_that_of_the_package(run_wetwell, capsys):
 
 
 def test_the_command_line_loads_nothing_that_help_does_not_need():
-    heavy = ("asyncio", "numba", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "zenoh")
+    heavy = ("asyncio", "numba", "numpy", "pandas", "pyarrow", "pydantic", "rich", "scipy", "zenoh")
     code = f"import sys, wetwell.services.cli; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert done.stdout == "[]\n"
@@ -154,3 +173,11 @@ def test_shells_complete_names_of_stations(environment):
     done = subprocess.run([program], env=os.environ | environment, capture_output=True, text=True, check=False)
     assert "alpha" in done.stdout
     assert "twin" in done.stdout
+
+
+def test_the_start_of_each_command_is_measured():
+    starts = runpy.run_path(str(ROOT / "benchmarks" / "startup.py"))["COMMANDS"]
+    names = {name.removeprefix("wetwell ") for name in COMMANDS}
+    assert {
+        name for name in names if not any(start == name or start.startswith(f"{name} ") for start in starts)
+    } == set()

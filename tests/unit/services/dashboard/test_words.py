@@ -29,7 +29,8 @@ def modules(folder):
 def page_texts():
     found = {text for module in modules(STATIC / "js") for text in re.findall(r'\bt\("((?:[^"\\]|\\.)*)"', module)}
     shell = (STATIC / "index.html").read_text(encoding="utf-8")
-    return found | set(re.findall(r"data-t>([^<]+)<", shell))
+    labels = re.findall(r'aria-label="([^"]+)"', shell)
+    return found | set(re.findall(r"data-t>([^<]+)<", shell)) | set(labels)
 
 
 def catalogue(language):

@@ -4,18 +4,18 @@ import random
 
 from wetwell.detector.detector import Detector
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.services.detector.checkpoint import Checkpoint, Told, is_intact
+from wetwell.services.detector.checkpoint import Told, checkpoint_in, is_intact
 
 
 def test_no_bit_of_a_checkpoint_can_flip_unseen(alpha, tmp_path, caplog):
     verdict = Verdict(
         time=5, station="alpha", pump=1, state="normal", probability={}, evidence={"steady": 123456}, window=(1, 5)
     )
-    Checkpoint(tmp_path, "alpha").save(Detector.of(alpha), Told({"order-1": verdict}, [verdict]))
+    checkpoint_in(tmp_path, "alpha").save(Detector.of(alpha), Told({"order-1": verdict}, [verdict]))
     path = tmp_path / "alpha.detector.json"
     content = path.read_bytes()
     assert is_intact(content)
-    assert Checkpoint(tmp_path, "alpha").restore(Detector.of(alpha)).verdicts == [verdict]
+    assert checkpoint_in(tmp_path, "alpha").restore(Detector.of(alpha)).verdicts == [verdict]
     dice = random.Random(1)
     head = content.index(b"\n")
     for place in [dice.randrange(head) for _ in range(150)] + [
@@ -25,5 +25,5 @@ def test_no_bit_of_a_checkpoint_can_flip_unseen(alpha, tmp_path, caplog):
         changed[place] ^= 1 << dice.randrange(7)
         path.write_bytes(changed)
         assert not is_intact(bytes(changed)), place
-        assert Checkpoint(tmp_path, "alpha").restore(Detector.of(alpha)) is None, place
+        assert checkpoint_in(tmp_path, "alpha").restore(Detector.of(alpha)) is None, place
     assert "kept as alpha.detector.refused" in caplog.text

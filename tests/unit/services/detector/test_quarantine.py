@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.detector import quarantine as quarantine_module
 from wetwell.services.detector.quarantine import Quarantine
@@ -33,6 +34,8 @@ def test_the_station_at_which_a_process_died_is_left_out_after_its_tries(tmp_pat
     assert "station 'beta': the process died while it was judged (2 of 2)" in caplog.text
     quarantine.release("beta")
     assert not quarantine.holds("beta")
+    with pytest.raises(ConfigError, match="keeps no crash of station 'beta', nothing to release"):
+        quarantine.release("beta")
 
 
 @pytest.mark.parametrize(
@@ -68,3 +71,5 @@ def test_without_a_folder_nothing_is_kept():
     quarantine = Quarantine(None, "detector", 1, DAY_S)
     quarantine.enter("alpha")
     assert not quarantine.holds("alpha")
+    with pytest.raises(ConfigError, match="state_dir: not set"):
+        quarantine.release("alpha")

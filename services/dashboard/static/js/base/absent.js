@@ -1,6 +1,7 @@
 // A service that is not there is said where its content would be.
 
 import { html } from "./dom.js";
+import { words } from "./format.js";
 import { t } from "./words.js";
 
 const SAYS = {
@@ -10,6 +11,14 @@ const SAYS = {
   watch: t("The watch of the gap is not running: nobody compares this station with its simulator now."),
   source: t("No samples come: what stands here is old. See the alarms, and check PLC, gateway and network."),
 };
+
+const NAMES = {
+  alarms: t("alarm service"), dashboard: t("dashboard"), detector: t("detector"), fleet: t("fleet"), gateway: t("gateway"), historian: t("historian"),
+  router: t("router"), simulator: t("simulator"), watch: t("watch of the gap"),
+};
+
+/** What people call a service. */
+export const serviceWord = (name) => NAMES[name] ?? words(name);
 
 /** A line that is seen only while a service is away. */
 export function absence(service) {

@@ -14,6 +14,7 @@ export const t = (text, values = {}) => (catalogue[text] ?? text).replace(/\{(\w
 /** Texts of the shell, which come with the page. */
 export function translateShell() {
   for (const node of document.querySelectorAll("[data-t]")) node.textContent = t(node.textContent);
+  for (const node of document.querySelectorAll("[data-t-label]")) node.ariaLabel = t(node.ariaLabel);
 }
 
 export function startLanguage() {

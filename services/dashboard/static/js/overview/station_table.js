@@ -44,8 +44,9 @@ export function stationTable(order, choose) {
 
   function update() {
     const height = lineHeight();
-    const first = Math.max(0, Math.floor(window_.scrollTop / height) - SPARE);
-    const last = Math.min(stations.length, Math.ceil((window_.scrollTop + window_.clientHeight) / height) + SPARE);
+    const { top } = window_.getBoundingClientRect(); // on a phone the page scrolls, else the table
+    const first = Math.max(0, Math.floor((window_.scrollTop + Math.max(0, -top)) / height) - SPARE);
+    const last = Math.min(stations.length, Math.ceil((window_.scrollTop + Math.min(window_.clientHeight, innerHeight - top)) / height) + SPARE);
     const wanted = Math.max(0, last - first);
     while (lines.length < wanted) {
       lines.push(stationLine());
@@ -74,14 +75,16 @@ export function stationTable(order, choose) {
   }
 
   let isDue = false;
-  window_.addEventListener("scroll", () => {
+  function moved() {
     if (isDue) return;
     isDue = true;
     requestAnimationFrame(() => {
       isDue = false;
       update();
     });
-  });
+  }
+  window_.addEventListener("scroll", moved);
+  document.addEventListener("scroll", moved);
   const size = new ResizeObserver(update);
   size.observe(window_);
   PHONE.addEventListener("change", update);
@@ -95,6 +98,7 @@ export function stationTable(order, choose) {
     },
     end() {
       size.disconnect();
+      document.removeEventListener("scroll", moved);
       PHONE.removeEventListener("change", update);
     },
   };

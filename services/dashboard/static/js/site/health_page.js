@@ -1,7 +1,8 @@
 // Services of the site: who is there, and with which figures.
 
+import { serviceWord } from "../base/absent.js";
 import { html, say } from "../base/dom.js";
-import { ago, measure, words } from "../base/format.js";
+import { ago, measure } from "../base/format.js";
 import { t } from "../base/words.js";
 
 const AGAIN_MS = 2000;
@@ -27,7 +28,7 @@ export function healthPage(main, showLink) {
 
   function line({ station, service, is_alive: isAlive, status, age_s: age }) {
     const figures = Object.entries(status?.figures ?? {}).map(([name, value]) => measure(name, value));
-    return html("tr", {}, html("td", {}, station === "_site" ? t("all") : station), html("th", { scope: "row" }, words(service)),
+    return html("tr", {}, html("td", {}, station === "_site" ? t("all") : station), html("th", { scope: "row" }, serviceWord(service)),
       html("td", { class: isAlive ? "" : "is-gone" }, isAlive ? t("yes") : t("gone")), html("td", {}, ago(age)), html("td", { class: "note" }, figures.join(", ")));
   }
 

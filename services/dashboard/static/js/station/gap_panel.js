@@ -16,9 +16,9 @@ export function gapPanel({ station }) {
   const names = html("ul", { class: "names" });
   let signals = [];
   const matters = chart(t("Gap that matters, day by day"), () => [{ label: t("times what matters"), pen: "pen1", width: 2, points: { show: true } }],
-    { unit: t("times what matters"), height: 110, ofDays: true, range: (_, low, high) => [0, Math.max(1.2, high || 0) * 1.1], limits: () => [{ value: 1, word: t("what matters") }] });
+    { unit: t("times what matters"), height: 140, ofDays: true, range: (_, low, high) => [0, Math.max(1.2, high || 0) * 1.1], limits: () => [{ value: 1, word: t("what matters") }] });
   const noise = chart(t("Gap of each signal, day by day"), () => signals.map((name, place) => ({ label: signalWords(name), pen: `pen${(place % 4) + 1}`, width: 1.5, points: { show: true } })),
-    { unit: t("in units of noise"), height: 110, ofDays: true, legend: true, range: (_, low, high) => [0.9, Math.max(2, high || 0) * 1.1] });
+    { unit: t("in units of noise"), height: 140, ofDays: true, legend: true, range: (_, low, high) => [0.9, Math.max(2, high || 0) * 1.1] });
   const charts = html("div", { class: "pair", hidden: true }, matters.element, noise.element);
   const element = panel(t("Gap to the simulator"), away.element, note, lead, names, charts);
   element.classList.add("is-gap");

@@ -1,7 +1,8 @@
 // Data quality: which values are missing, and how the services of this station fare.
 
+import { serviceWord } from "../base/absent.js";
 import { html, panel, say } from "../base/dom.js";
-import { figure, words } from "../base/format.js";
+import { figure } from "../base/format.js";
 import { grade } from "../base/quality.js";
 import { t } from "../base/words.js";
 
@@ -42,7 +43,7 @@ export function qualityPanel({ station }) {
       const figures = station.statuses.get(name)?.figures ?? {};
       const counts = Object.entries(figures).filter(([key, value]) => key in TOLD && value > 0).map(([key, value]) => `${TOLD[key]} ${value}`);
       const isThere = station.has(name);
-      return html("tr", {}, html("th", { scope: "row" }, words(name)), html("td", { class: isThere ? "" : "is-gone" }, isThere ? t("yes") : t("gone")), html("td", {}, counts.join(", ") || (isThere ? t("nothing wrong") : "")));
+      return html("tr", {}, html("th", { scope: "row" }, serviceWord(name)), html("td", { class: isThere ? "" : "is-gone" }, isThere ? t("yes") : t("gone")), html("td", {}, counts.join(", ") || (isThere ? t("nothing wrong") : "")));
     }));
   }
 
