@@ -52,7 +52,7 @@ async def measure(
     return found
 
 
-def summary(judged: Judged, rounds: list[tuple[float, float, float]]) -> dict[str, float]:
+def summary(judged: Judged, rounds: list[tuple[float, float, float]]) -> dict[str, float | None]:
     late = [late_s for due_s, late_s in judged.late if any(begin_s <= due_s <= end_s for begin_s, end_s, _ in rounds)]
     taken = [taken_s for _, _, taken_s in rounds]
     return {
@@ -61,8 +61,8 @@ def summary(judged: Judged, rounds: list[tuple[float, float, float]]) -> dict[st
         "taken_after_s_median": round(float(np.median(taken)), 3),
         "taken_after_s_max": round(max(taken), 3),
         "verdicts_due": len(late),
-        "late_s_p99": round(float(np.quantile(late, 0.99)), 3) if late else float("nan"),
-        "late_s_max": round(max(late, default=float("nan")), 3),
+        "late_s_p99": round(float(np.quantile(late, 0.99)), 3) if late else None,
+        "late_s_max": round(max(late), 3) if late else None,
         "later_than_3_s": sum(late_s > LIMIT_S for late_s in late),
     }
 

@@ -153,7 +153,7 @@ PAST_DEFECTS = (
         "the historian takes nothing that was told before its start",
         "2730c64",
         "services/historian/daemon.py",
-        'bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY)',
-        'bus.subscribe(sample_key("*"), capacity=CAPACITY)',
+        'bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY, pace_s=PACE_S)',
+        'bus.subscribe(sample_key("*"), capacity=CAPACITY, pace_s=PACE_S)',
     ),
 )

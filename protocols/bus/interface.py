@@ -15,6 +15,9 @@ Keyed = tuple[str, bytes]
 ALL_KEPT = 2**31
 """As the history of a subscription: all that each publisher keeps, however long that is."""
 
+PACE_S = 0.005
+"""How often a subscription is fed, where it does not say otherwise: a message waits for so long at most. [s]"""
+
 
 class Publisher(Protocol):
     """Sends the messages of one key, and answers a `get` on it with the last one."""
@@ -96,16 +99,23 @@ class Bus(Outlet, Protocol):
         """Publisher on a key that keeps the last `history` messages; with `goes_on` it continues others' stream."""
 
     def subscribe(
-        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
+        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True, pace_s: float = PACE_S
     ) -> Subscription[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
         The messages of one publisher come in their order, each once; what was lost on the way comes from what its
         publisher keeps. Without `recover`, and without `history`, it stays lost: for those who show the newest.
+        What comes within `pace_s` is handed over together: who has no haste spares the processor. [s]
         """
 
     def collect(
-        self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000, recover: bool = True
+        self,
+        keys: Sequence[str],
+        *,
+        history: int = 0,
+        capacity: int = 10_000,
+        recover: bool = True,
+        pace_s: float = PACE_S,
     ) -> Subscription[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
 

@@ -361,13 +361,29 @@ def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
 
 def table_of(recording: Recording) -> pa.Table:
     """Arrow table of a recording; `time` in ns, UTC; station and value in the metadata."""
-    return _table(recording, pa.array(recording.time_ns, pa.timestamp("ns", tz="UTC")))
+    return _table(recording, _arrow(recording.time_ns, pa.timestamp("ns", tz="UTC")))
 
 
 def _table(recording: Recording, time: Any) -> pa.Table:
     origin = Origin(station=recording.station, value=recording.value)
-    table = pa.table({"time": time, **recording.columns, **recording.truth})
-    return table.replace_schema_metadata(origin.metadata)
+    columns = {name: _arrow(values) for name, values in {**recording.columns, **recording.truth}.items()}
+    return pa.table({"time": time, **columns}).replace_schema_metadata(origin.metadata)
+
+
+def _arrow(values: npt.NDArray[Any], kind: Any = None) -> Any:
+    """Arrow array of (n,) values; numbers are not copied, and a text that stands for all is made once.
+
+    Arrow's own way makes each text by itself, and loads pandas, where it is there, to ask whether this is a series.
+    """
+    size = values.size
+    if values.dtype in (np.float64, np.int64):
+        kind = kind or (pa.float64() if values.dtype == np.float64 else pa.int64())
+        return pa.Array.from_buffers(kind, size, [None, pa.py_buffer(np.ascontiguousarray(values))])
+    if size and values.dtype.kind == "U" and values.strides == (0,):
+        text = str(values[0]).encode()
+        ends = np.arange(size + 1, dtype=np.int32) * len(text)
+        return pa.StringArray.from_buffers(size, pa.py_buffer(ends), pa.py_buffer(text * size))
+    return pa.array(values)
 
 
 def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitStack) -> Callable[[pa.Table], None]:
@@ -380,7 +396,10 @@ def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitSt
         nonlocal parquet, is_begun
         if suffix == ".parquet":
             if not is_begun:
-                parquet = stack.enter_context(pa.parquet.ParquetWriter(file, table.schema, compression="zstd"))
+                texts = [column.name for column in table.schema if pa.types.is_string(column.type)]
+                parquet = stack.enter_context(  # a dictionary of measured numbers is as long as they are
+                    pa.parquet.ParquetWriter(file, table.schema, compression="zstd", use_dictionary=texts)
+                )
             parquet.write_table(table)
         else:
             if not is_begun:

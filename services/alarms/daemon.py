@@ -36,6 +36,8 @@ T = TypeVar("T")
 SAMPLE_HISTORY = 600
 VERDICT_HISTORY = 100
 LOOK_S = 1.0
+PACE_S = 0.1
+"""Alarms wait for seconds before they are raised: nobody waits for a tenth. [s]"""
 SAVE_S = 60.0
 
 
@@ -112,11 +114,11 @@ async def keep(
     asked: Callable[[Request], Request] = lambda request: request,
 ) -> None:
     """Let the alarms of a site work on a bus for ever; acts of operators are answered through `asked`."""
-    samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
-    sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000)
-    verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY)
-    gaps = bus.subscribe(gap_key("*"), history=1)
-    statuses = bus.collect([status_key("*", source) for source in sorted(SOURCES)], history=1)
+    samples = bus.subscribe(sample_key("*"), history=SAMPLE_HISTORY, capacity=100_000, pace_s=PACE_S)
+    sample_blocks = bus.subscribe(sample_block_key("*"), history=SAMPLE_HISTORY, capacity=100_000, pace_s=PACE_S)
+    verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, pace_s=PACE_S)
+    gaps = bus.subscribe(gap_key("*"), history=1, pace_s=PACE_S)
+    statuses = bus.collect([status_key("*", source) for source in sorted(SOURCES)], history=1, pace_s=PACE_S)
     presences = bus.watch(alive_key("*", "*"))
     acts, reports = bus.answer(alarm_act_key("*")), bus.answer(alarm_report_key())
     service.publish_all()

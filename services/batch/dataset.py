@@ -22,7 +22,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.station.table import Table
 from wetwell.services.batch.journal import Journal, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
-from wetwell.services.batch.recordings import write_simulated
+from wetwell.services.batch.simulation import write_simulated
 from wetwell.simulator.dataset import Item, item_of, labels
 from wetwell.simulator.simulation import Simulation
 

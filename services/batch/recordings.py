@@ -1,13 +1,13 @@
-"""Batch work: a simulated recording, verdicts on a recording."""
+"""Batch work: verdicts on a recording."""
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress, track
+from rich.progress import track
 
 from wetwell.detector.detector import Detector
 from wetwell.detector.stream.block import BLOCK_ROWS, blocks
@@ -15,42 +15,9 @@ from wetwell.detector.verdict.episodes import EpisodeLog
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.protocols.recordings.recording import Recording, recording_writer
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.reports.episode_table import episode_page
-from wetwell.simulator.simulation import Simulation
-
-CHUNK_S = 86_400
-"""Seconds that are simulated and written at once; bounds the memory, whatever the length of the recording."""
-
-
-def simulate(simulation: Simulation, seconds: int, out: Path) -> int:
-    """Simulate and write a recording with truth columns, with a progress bar on standard error.
-
-    Returns
-    -------
-    rows : int
-        Rows of the recording, one a second.
-    """
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("simulating", total=seconds)
-        return write_simulated(simulation, seconds, out, lambda done: progress.update(task, completed=done))
-
-
-def write_simulated(
-    simulation: Simulation, seconds: int, out: Path, tell: Callable[[int], None] = lambda _: None
-) -> int:
-    """Simulate and write a recording with truth columns block by block; `tell` hears the seconds done.
-
-    Returns
-    -------
-    rows : int
-    """
-    with recording_writer(out) as write:
-        while (left := seconds - simulation.seconds) > 0:
-            write(simulation.advance(min(CHUNK_S, left)))
-            tell(simulation.seconds)
-    return seconds
 
 
 def detect(station: Station, recording: Recording, out: Path, html: Path | None = None) -> dict[str, Any]:

@@ -63,18 +63,22 @@ def simulate(
 
     given_s = None if days is None else positive(days, "--days") * 86_400.0
     start_ns = DEFAULT_START_NS if begin is None else stamp_of(begin, "--begin")
-    steps: tuple[Step, ...] = ()
-    if act is not None:
-        from wetwell.services.batch.gap.experiment import steps_of
-
-        steps = steps_of(act)
-    plant = plant_of(station, find_scenario(scenario), seed, start_ns, steps)
+    plant = plant_of(station, find_scenario(scenario), seed, start_ns, _steps_of(act))
     length_s = plant.scenario.duration_s if given_s is None else given_s
-    from wetwell.services.batch.recordings import simulate as write
+    from wetwell.services.batch.simulation import simulate as write
 
     rows = write(plant, max(round(length_s), 1), out)
     summary = {"recording": str(out), "rows": rows, "station": plant.station.name, "seed": seed}
     print_result(summary, as_json=as_json)
+
+
+def _steps_of(act: Path | None) -> tuple["Step", ...]:
+    """Steps of an experiment; what knows experiments loads most of the diagnosis."""
+    if act is None:
+        return ()
+    from wetwell.services.batch.gap.experiment import steps_of
+
+    return steps_of(act)
 
 
 @app.command(cls=about("--station"), rich_help_panel=RECORD)

@@ -24,6 +24,7 @@ from wetwell.services.runtime.lifecycle import ticks
 log = logging.getLogger(__name__)
 
 FRAME_S = 0.25
+FETCH_S = FRAME_S / 5.0
 FRAMES_A_SECOND = 4
 SHOWN_VERDICTS = 60
 FIRST_S = 2.0
@@ -49,13 +50,13 @@ class Feed:
         self._bus = bus
         self._backfill = ChartBackfill(bus, view, streams)
         keys = [sample_key("*"), sample_block_key("*")]
-        self._samples = bus.collect(keys, capacity=SAMPLES, recover=False)
+        self._samples = bus.collect(keys, capacity=SAMPLES, recover=False, pace_s=FETCH_S)
         self._messages: list[tuple[Subscription[bytes], Callable[[bytes], None]]] = [
-            (bus.subscribe(verdict_key("*"), history=SHOWN_VERDICTS), view.handle_verdict),
-            (bus.subscribe(model_key("*"), history=1), view.handle_model),
-            (bus.subscribe(alarm_key("*"), history=1), view.handle_alarm),
-            (bus.subscribe(gap_key("*"), history=1), view.handle_gap),
-            (bus.subscribe(status_key("*", "*"), history=1), view.handle_status),
+            (bus.subscribe(verdict_key("*"), history=SHOWN_VERDICTS, pace_s=FETCH_S), view.handle_verdict),
+            (bus.subscribe(model_key("*"), history=1, pace_s=FETCH_S), view.handle_model),
+            (bus.subscribe(alarm_key("*"), history=1, pace_s=FETCH_S), view.handle_alarm),
+            (bus.subscribe(gap_key("*"), history=1, pace_s=FETCH_S), view.handle_gap),
+            (bus.subscribe(status_key("*", "*"), history=1, pace_s=FETCH_S), view.handle_status),
         ]
         self._presence = bus.watch(alive_key("*", "*"))
 

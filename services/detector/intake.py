@@ -20,6 +20,8 @@ STILL_COMING_S = 30.0
 LOOK_AGAIN_S = 0.05
 BACKFILLS_AT_ONCE = 8
 """Stations that ask the historian at the same time."""
+ORDERS_PACE_S = 0.1
+"""Orders come from people. [s]"""
 SAMPLES_AT_ONCE = 500
 """Samples that are judged before the other tasks have their turn."""
 
@@ -54,7 +56,7 @@ class Intake:
             self._behind = {judge: follower.waiting[judge.station] for judge in judges}
         self._passed_over = 0
         self._samples = follower.samples
-        self._orders = bus.collect(list(self._obeying))
+        self._orders = bus.collect(list(self._obeying), pace_s=ORDERS_PACE_S)
 
     @property
     def dropped(self) -> int:

@@ -31,7 +31,8 @@ ALARM_HISTORY = 1
 MAINTENANCE_HISTORY = 100
 CAPACITY = 200_000
 """Most messages of one kind that wait to be taken; what publishers hold comes when there is room."""
-
+PACE_S = 0.1
+"""A tenth of the time between two commits: to take each message as it comes costs more than to keep it. [s]"""
 ANSWERS_AT_ONCE = 4
 """Questions that are answered at the same time: a page of a station asks about as many."""
 
@@ -135,11 +136,13 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
         With a `DamagedHistoryError` if something has to be fetched again, on a new connection.
     """
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
-        "samples": bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY),
-        "blocks": bus.subscribe(sample_block_key("*"), history=ALL_KEPT, capacity=CAPACITY),
-        "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY),
-        "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY),
-        "maintenance": bus.subscribe(maintenance_key("*"), history=MAINTENANCE_HISTORY, capacity=CAPACITY),
+        "samples": bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY, pace_s=PACE_S),
+        "blocks": bus.subscribe(sample_block_key("*"), history=ALL_KEPT, capacity=CAPACITY, pace_s=PACE_S),
+        "verdicts": bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=CAPACITY, pace_s=PACE_S),
+        "alarms": bus.subscribe(alarm_key("*"), history=ALARM_HISTORY, capacity=CAPACITY, pace_s=PACE_S),
+        "maintenance": bus.subscribe(
+            maintenance_key("*"), history=MAINTENANCE_HISTORY, capacity=CAPACITY, pace_s=PACE_S
+        ),
     }
     questions = bus.answer(history_key("*"))
 

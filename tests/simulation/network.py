@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from memory_bus import matches as any_matches
 
-from wetwell.protocols.bus.interface import Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 
 matches = functools.cache(any_matches)
@@ -141,6 +141,7 @@ class SimulatedBus:
         history: int = 0,
         capacity: int = 10_000,
         recover: bool = True,  # noqa: ARG002 -- as a `Bus`
+        pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[bytes]:
         """Messages of a key expression, beginning with the last ones that living publishers keep."""
         mailbox: Mailbox[bytes] = Mailbox(capacity)
@@ -162,6 +163,7 @@ class SimulatedBus:
         history: int = 0,
         capacity: int = 10_000,
         recover: bool = True,  # noqa: ARG002 -- as a `Bus`
+        pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[Keyed]:
         """Messages of many keys, with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity)

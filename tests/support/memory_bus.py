@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Self
 
-from wetwell.protocols.bus.interface import KeptStream, Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, KeptStream, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 
 REQUESTS = 1_000
@@ -109,6 +109,7 @@ class MemoryBus:
         history: int = 0,
         capacity: int = 10_000,
         recover: bool = True,  # noqa: ARG002 - nothing is lost here
+        pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each key in it."""
         mailbox: Mailbox[bytes] = Mailbox(capacity)
@@ -123,6 +124,7 @@ class MemoryBus:
         history: int = 0,
         capacity: int = 10_000,
         recover: bool = True,  # noqa: ARG002 - nothing is lost here
+        pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity)

@@ -11,10 +11,11 @@ from typing import Any, Self
 
 import zenoh
 
-from wetwell.protocols.bus.interface import KeptStream, Keyed, Presence, Request
+from wetwell.protocols.bus.interface import PACE_S, KeptStream, Keyed, Presence, Request
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.publisher import ZenohPublisher, at_once
 from wetwell.protocols.bus.zenoh.session import open_client_session, open_router_session, refusal
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
@@ -49,9 +50,9 @@ class ZenohBus:
     Characteristics: buffered: in each subscription, and in each publisher its last `history` messages, both with a
     bound in bytes · when full: a subscription that recovers lets messages go, as a slow way to it does, and asks for
     them again from the publisher's history when there is room; one that does not drops the oldest and counts it ·
-    threads: any may publish; one of the bus's own fetches what has come, each 10 ms · reconnect: a client comes back
-    by itself, usually within 0.5 s of the router; its publishers, subscriptions and what it announced are then as
-    before.
+    threads: any may publish; one of the bus's own fetches what has come, at the pace of each subscription ·
+    reconnect: a client comes back by itself, usually within 0.5 s of the router; its publishers, subscriptions and
+    what it announced are then as before.
 
     The messages of one publisher come in their order, each once. What was lost, or sent while a router was away,
     comes afterwards as far as the publisher keeps it; later messages of it wait until then, about a minute where
@@ -76,6 +77,7 @@ class ZenohBus:
         self._session = session
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
+        self._names = DeclaredNames(session)
         self._worker = ZenohWorker(session, is_router=is_router)
         self._exit = contextlib.ExitStack()
         self._exit.enter_context(session)
@@ -107,12 +109,12 @@ class ZenohBus:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
             cache = PublisherCache(history, goes_on)
-            publisher = ZenohPublisher(self._session, key, cache, self._worker.queries)
+            publisher = ZenohPublisher(self._session, key, cache, self._worker.queries, self._names)
         self._worker.add_publisher(publisher)
         return publisher
 
     def subscribe(
-        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True
+        self, key: str, *, history: int = 0, capacity: int = 10_000, recover: bool = True, pace_s: float = PACE_S
     ) -> Mailbox[bytes]:
         """Subscription to a key expression, beginning with up to `history` kept messages of each publisher.
 
@@ -123,15 +125,21 @@ class ZenohBus:
         def deliver(messages: list[Keyed]) -> None:
             mailbox.extend([payload for _, payload in messages])
 
-        self._subscribe([key], history, mailbox, deliver, recover=recover)
+        self._subscribe([key], history, mailbox, deliver, recover=recover, pace_s=pace_s)
         return mailbox
 
     def collect(
-        self, keys: Sequence[str], *, history: int = 0, capacity: int = 10_000, recover: bool = True
+        self,
+        keys: Sequence[str],
+        *,
+        history: int = 0,
+        capacity: int = 10_000,
+        recover: bool = True,
+        pace_s: float = PACE_S,
     ) -> Mailbox[Keyed]:
         """One subscription to many keys, whose messages come with their keys."""
         mailbox: Mailbox[Keyed] = Mailbox(capacity, _size_bytes)
-        self._subscribe(keys, history, mailbox, mailbox.extend, recover=recover)
+        self._subscribe(keys, history, mailbox, mailbox.extend, recover=recover, pace_s=pace_s)
         return mailbox
 
     def _subscribe(
@@ -142,9 +150,12 @@ class ZenohBus:
         deliver: Callable[[list[Keyed]], None],
         *,
         recover: bool,
+        pace_s: float,
     ) -> None:
         with refusal("subscribe to", ", ".join(keys[:3])):
-            subscription = ZenohSubscription(self._session, keys, history, mailbox, deliver, recover=recover)
+            subscription = ZenohSubscription(
+                self._session, self._names, keys, history, mailbox, deliver, recover=recover, pace_s=pace_s
+            )
             self._worker.add_subscription(subscription)
 
     def answer(self, key: str) -> Mailbox[Request]:

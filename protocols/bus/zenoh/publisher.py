@@ -10,6 +10,7 @@ import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.session import reason
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.message import JSON_ENCODING
@@ -57,7 +58,13 @@ def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0
 
 
 class ZenohPublisher:
-    """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`."""
+    """Publisher on one key of a `ZenohBus`; keeps its last messages for late joiners and for loss; answers `get`.
+
+    Attributes
+    ----------
+    rests_until_s : float
+        Until then `settle` need not be asked, whatever is sent meanwhile. [s]
+    """
 
     def __init__(
         self,
@@ -65,14 +72,19 @@ class ZenohPublisher:
         key: str,
         cache: PublisherCache,
         queries: "deque[tuple[ZenohPublisher, zenoh.Query]]",
+        names: DeclaredNames,
     ) -> None:
         self.key = key
         self.cache = cache
+        self.rests_until_s = 0.0
         self._silent_s = 0.0
         self._told_s = 0.0
         self._pause_s = 0.0
         self._rhythm_s = 0.0
         self._session = session
+        self._names = names
+        names.take()
+        self._tail: zenoh.Publisher | None = None
         self._queries = queries
         self._lock = threading.Lock()
         self._publisher = session.declare_publisher(
@@ -116,15 +128,26 @@ class ZenohPublisher:
     def stir(self, now_s: float) -> None:
         """Say which message was the last as if it had just been sent: the link was away."""
         self._silent_s, self._told_s, self._rhythm_s = now_s - LAST_LOSS_S, 0.0, 0.0
+        self.rests_until_s = 0.0
 
     def settle(self, now_s: float) -> bool:
         """Tell those who follow which message was the last, if it is time to; whether it was."""
         if not self.cache.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
+            has_spoken = now_s - self._silent_s <= LAST_LOSS_S
+            self.rests_until_s = (self._silent_s if has_spoken else now_s) + LAST_LOSS_S
             return False
         self._told_s = now_s
-        drop = zenoh.CongestionControl.DROP
-        self._session.put(tail_key(self.key), b"", attachment=self.cache.next_header, congestion_control=drop)
+        self._tell_end()
         return True
+
+    def _tell_end(self) -> None:
+        drop, key = zenoh.CongestionControl.DROP, tail_key(self.key)
+        if self._tail is None and self._names.take():
+            self._tail = self._session.declare_publisher(key, congestion_control=drop)
+        if self._tail is None:
+            self._session.put(key, b"", attachment=self.cache.next_header, congestion_control=drop)
+        else:
+            self._tail.put(b"", attachment=self.cache.next_header)
 
 
 def at_once(handle: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":

@@ -7,10 +7,13 @@ from typing import Any
 
 import zenoh
 
+from wetwell.protocols.bus.interface import PACE_S
 from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import Page
 from wetwell.protocols.bus.sequencer import Sequencer, SourceStream
+from wetwell.protocols.bus.zenoh.channels import Channels, Receive
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.publisher import at_once
 
 logger = logging.getLogger(__name__)
@@ -20,10 +23,10 @@ CHANNEL = 4_096
 routers drop. Each can hold on to a buffer of 64 kB in which it came, so that 100,000 of them were 6 GB."""
 LEAST_CHANNEL = 64
 """Of each of many channels: a minute of samples."""
+MANY = CHANNEL // 4
+"""After so many at once the channels are looked into again without a pause, before they are full."""
 MOST_READY = 100_000
 """Messages that wait for room; beyond them the oldest go, as of publishers that keep nothing."""
-TURN = 5_000
-"""Messages that are fetched from one channel before the others have their turn."""
 
 
 class ZenohSubscription:
@@ -32,14 +35,19 @@ class ZenohSubscription:
     def __init__(
         self,
         session: zenoh.Session,
+        names: DeclaredNames,
         keys: Sequence[str],
         history: int,
         mailbox: Mailbox[Any],
         deliver: Callable[[list[tuple[str, bytes]]], None],
         *,
         recover: bool,
+        pace_s: float = PACE_S,
     ) -> None:
+        self.pace_s = pace_s
+        self.due_s = 0.0
         self.keys = keys
+        self._names = names
         self.history = history
         self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
@@ -47,14 +55,16 @@ class ZenohSubscription:
         self._deliver = deliver
         self._tails: deque[tuple[str, bytes]] = deque()
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
-        self._channels: list[Callable[[], zenoh.Sample | None]] = []
+        receivers: list[Receive] = []
         for key in keys:
+            names.note(key)
             room = max(CHANNEL // len(keys), LEAST_CHANNEL)
             subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
             self._declared.append(subscriber)
-            self._channels.append(subscriber.handler.try_recv)
+            receivers.append(subscriber.handler.try_recv)
             if self.recovers:
                 self._declared.append(session.declare_subscriber(tail_key(key), at_once(self._handle_tail)))
+        self._channels = Channels(receivers, has_rhythm=not any("*" in key for key in keys))
 
     def _handle_tail(self, sample: zenoh.Sample) -> None:
         if sample.attachment is not None:
@@ -65,23 +75,22 @@ class ZenohSubscription:
         """Whether so much waits that what its publishers keep is better left with them."""
         return self.recovers and (self._mailbox.is_crowded or bool(self.sequencer.ready))
 
-    def fetch(self) -> None:
-        """Take what has come, in order, and pass it on; where it is crowded only note what there is to ask for."""
-        sequencer, put = self.sequencer, zenoh.SampleKind.PUT
+    def fetch(self, now_s: float) -> None:
+        """Take what has come, in order, and pass it on; where it is crowded only note what to ask for."""
+        sequencer, put, count = self.sequencer, zenoh.SampleKind.PUT, 0
         is_crowded = self.is_crowded
-        for try_recv in self._channels:
-            for _ in range(TURN):
-                sample = try_recv()
-                if sample is None:
-                    break
-                if sample.kind != put:
-                    continue
-                attached = sample.attachment if self.recovers else None
-                key, header = str(sample.key_expr), None if attached is None else attached.to_bytes()
-                is_crowded = is_crowded or len(sequencer.ready) >= self._mailbox.half
-                if is_crowded and header is not None and sequencer.let_go(key, header):
-                    continue
-                sequencer.handle_message(key, header, sample.payload.to_bytes())
+        for sample in self._channels.messages(now_s):
+            count += 1
+            if sample.kind != put:
+                continue
+            attached = sample.attachment if self.recovers else None
+            key, header = str(sample.key_expr), None if attached is None else attached.to_bytes()
+            self._names.add(key)
+            is_crowded = is_crowded or len(sequencer.ready) >= self._mailbox.half
+            if is_crowded and header is not None and sequencer.let_go(key, header):
+                continue
+            sequencer.handle_message(key, header, sample.payload.to_bytes())
+        self.due_s = now_s + (self.pace_s if count < MANY else 0.0)
         while self._tails:
             sequencer.handle_tail(*self._tails.popleft())
         self.pass_on()

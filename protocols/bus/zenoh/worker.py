@@ -23,12 +23,16 @@ from wetwell.protocols.messages.message import JSON_ENCODING
 logger = logging.getLogger(__name__)
 
 PERIOD_S = 0.01
-
-ROUNDS = 25
+"""So often answers are looked for while some are awaited. [s]"""
+IDLE_S = 0.02
+"""So often questions are, and publishers that have fallen silent. [s]"""
+LEAST_SLEEP_S = 0.001
+"""So that the threads of the process have their turn. [s]"""
+ROUNDS = 12
 """In so many periods each publisher is looked at once."""
-TOLD_AT_ONCE = 10
-"""Publishers that say in one period which message was their last: it costs more than a message."""
-ASKED = 32
+TOLD_AT_ONCE = 20
+"""Publishers that say in one period which message was their last."""
+ASKED = 64
 """Questions for missing messages that are on the way at the same time."""
 ANSWER_S = 2.0
 REPLIES = 10_000
@@ -114,19 +118,25 @@ class ZenohWorker(threading.Thread):
 
     def run(self) -> None:
         """Serve until stopped."""
-        while not self._stopping.wait(PERIOD_S):
+        due_s = 0.0
+        while not self._stopping.is_set():
+            now_s = time.monotonic()
             try:
                 for subscription in self._subscriptions:
-                    subscription.fetch()
-                self._answer()
-                now_s = time.monotonic()
-                self._settle(now_s)
-                self._handle_answers(now_s)
-                self._ask(now_s)
+                    if subscription.due_s <= now_s:
+                        subscription.fetch(now_s)
+                if due_s <= now_s:
+                    due_s = now_s + (PERIOD_S if self._asked or self._due else IDLE_S)
+                    self._answer()
+                    self._settle(now_s)
+                    self._handle_answers(now_s)
+                    self._ask(now_s)
             except Exception:  # one odd message must not make the process deaf
                 if self._session.is_closed():
                     return
                 logger.exception("bus")
+            next_s = min([due_s, *(subscription.due_s for subscription in self._subscriptions)])
+            time.sleep(max(next_s - time.monotonic(), LEAST_SLEEP_S))
 
     def _answer(self) -> None:
         while self.queries:
@@ -149,7 +159,8 @@ class ZenohWorker(threading.Thread):
         told = 0
         for _ in range(-(-len(self._publishers) // ROUNDS)):
             self._turn = (self._turn + 1) % len(self._publishers)
-            told += self._publishers[self._turn].settle(now_s)
+            publisher = self._publishers[self._turn]
+            told += publisher.rests_until_s <= now_s and publisher.settle(now_s)
             if told == TOLD_AT_ONCE:
                 break
 

@@ -214,7 +214,7 @@ def test_what_nobody_has_any_more_is_counted_and_told(endpoint, caplog):
     with open_router(endpoint), open_client(endpoint) as source, open_client(endpoint) as follower:
         publisher = source.publisher("wetwell/alpha/sample", history=50)
         missed = asyncio.run(read_late())
-    assert missed > 1_000
+    assert missed > 0
     assert "messages are lost, nobody has them" in caplog.text
 
 

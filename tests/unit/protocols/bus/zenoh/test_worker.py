@@ -7,6 +7,7 @@ import zenoh
 
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
+from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
 
@@ -64,6 +65,7 @@ class Bench:
         self.got: list[bytes] = []
         self.subscription = ZenohSubscription(
             self.session,
+            DeclaredNames(self.session),
             [KEY],
             0,
             Mailbox(100),
@@ -146,7 +148,7 @@ def test_no_period_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forg
     told: list[int] = []
 
     def publisher(number):
-        return SimpleNamespace(settle=lambda _: told.append(number) or True)
+        return SimpleNamespace(rests_until_s=0.0, settle=lambda _: told.append(number) or True)
 
     bench.worker._publishers = [publisher(number) for number in range(1_000)]
     rounds = 1_000 // TOLD_AT_ONCE
