@@ -111,7 +111,7 @@ def attribute(
     hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
-    search(fitter, trials, hypotheses, [fit.candidates[0] for fit in singles])
+    search(fitter, trials, hypotheses)
     hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     tested_names = [fit.names[0] for fit in singles]
     posterior = posterior_of(hypotheses.weights(), len(singles), partial(priors.log_share, tested=tested_names))

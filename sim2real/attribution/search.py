@@ -1,8 +1,5 @@
 """The search for sets of effects: the best one with one more, and each of its members exchanged."""
 
-from collections.abc import Sequence
-
-from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.trials import Trials
@@ -10,7 +7,7 @@ from wetwell.sim2real.attribution.trials import Trials
 MOST_EFFECTS = 3
 
 
-def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses, library: Sequence[Candidate]) -> None:
+def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
     """Weigh sets of effects until no neighbour of the most probable one is left to try.
 
     Greedy choices are taken back: each effect of a set makes room for every other, the rest kept.
@@ -21,8 +18,6 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses, library: Sequ
     trials : Trials
     hypotheses : Hypotheses
         Holds the single effects; those with several are added.
-    library : sequence of Candidate
-        One for each effect.
     """
     tried: set[frozenset[str]] = {frozenset()}
     while True:
@@ -35,7 +30,7 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses, library: Sequ
             return
         for base in bases:
             tried.add(frozenset(base.names))
-            hypotheses.add(trials.with_one_more(base, library))
+            hypotheses.add(trials.with_one_more(base))
 
 
 def in_order(fitter: Fitter, fit: Fit) -> Fit:

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
@@ -70,13 +68,16 @@ class Trials:
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
         return sorted(best.values(), key=fitter.cost)
 
-    def with_one_more(self, current: Fit, library: Sequence[Candidate]) -> list[Fit]:
-        """Fits of the current effects with one more, the most promising ones."""
+    def with_one_more(self, current: Fit) -> list[Fit]:
+        """Fits of the current effects with one more, the most promising ones, each as the pump or channel it fits."""
         fitter = self._fitter
-        free = [c for c in library if c.name not in current.names]
+        free = [c for c in self._guesses if c.name not in current.names]
         promises = list(self._each(lambda candidate: self._promise(candidate, current), free))
-        order = np.argsort(-np.array(promises), kind="stable")[:MOST_FITTED]
-        likely = [free[k] for k in order if promises[k] > LEAST_PROMISED]
+        promising: dict[str, tuple[float, Candidate]] = {}
+        for promise, candidate in zip(promises, free, strict=True):
+            if promise > max(LEAST_PROMISED, promising.get(candidate.name, (0.0, candidate))[0]):
+                promising[candidate.name] = (promise, candidate)
+        likely = [one for _, one in sorted(promising.values(), key=lambda pair: -pair[0])][:MOST_FITTED]
         tried = self._each(
             lambda candidate: fitter.first(candidate, self._start_grids(candidate), others=current), likely
         )

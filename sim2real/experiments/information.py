@@ -63,7 +63,7 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form)
     columns = np.column_stack([residuals, moved])
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
-        likelier, products, _ = weighed(block, columns[block.rows], form.chosen(block.rows))
+        likelier, products, _ = weighed(block, columns[block.rows], residuals[block.rows], form.chosen(block.rows))
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]

@@ -10,7 +10,7 @@ from wetwell.sim2real.likelihood.cells import Block, Cells
 
 OFFSET = 0.3
 """Standard deviation of the error of a good model, over what is allowed: in a block, and in a span of time. [1]"""
-FORM = 0.04
+GOOD_FORM = 0.04
 """The same of the error of form of a good effect, as a share of what it explains. [1]"""
 POOR_FORM = 0.35
 """The same of a poor one, as in seconds of starts; an error of the model is then as large as is allowed. [1]"""
@@ -38,9 +38,9 @@ class Errors:
         return Errors(offset=share * self.offset, form=share * self.form)
 
 
-GOOD = Errors(offset=OFFSET, form=FORM)
+GOOD = Errors(offset=OFFSET, form=GOOD_FORM)
 POOR = Errors(offset=1.0, form=POOR_FORM)
-EVEN = Errors(offset=DIFFERING * OFFSET, form=EVEN_FORM * FORM)
+HARDLY_DIFFERENT = Errors(offset=DIFFERING * OFFSET, form=EVEN_FORM * GOOD_FORM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +136,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
         (block.allowed, OFFSET, span.offset, each.offset)
     ]
     if np.any(form.signature):
-        parts.append((block.group_means(form.signature)[block.group], FORM, span.form, each.form))
+        parts.append((block.group_means(form.signature)[block.group], GOOD_FORM, span.form, each.form))
     if np.any(form.late):
         parts.append((form.late, *LATE))
     weight = 1.0 / variance

@@ -15,6 +15,8 @@ from wetwell.sim2real.likelihood.ways import likeliest
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
+WEIGHINGS = 2
+"""Looks at what is wrong: at the fit, and at what is most probable under what was seen there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,19 +88,17 @@ def evidence(
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
     count = slopes.shape[1]
-    columns = np.column_stack([residuals, slopes])
-    likely: list[tuple[float, Floats]] = []
-    stirred: list[Stirred] = []
-    inner = np.zeros((count + 1, count + 1))
-    for block in cells.blocks:
-        log, products, one = weighed(block, columns[block.rows], form.chosen(block.rows))
-        likely.append((log, products))
-        stirred.append(one)
-        inner += products
-    precision, slope = inner[1:, 1:], inner[1:, 0]
-    step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else np.zeros(0)
+    columns, step = np.column_stack([residuals, slopes]), np.zeros(count)
+    for _ in range(WEIGHINGS if count else 1):
+        left = residuals + slopes @ step
+        likely = [
+            weighed(block, columns[block.rows], left[block.rows], form.chosen(block.rows)) for block in cells.blocks
+        ]
+        inner = np.sum([products for _, products, _ in likely], axis=0)
+        precision, slope = inner[1:, 1:], inner[1:, 0]
+        step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else step
     along = np.r_[1.0, step]
-    by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products in likely])
+    by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products, _ in likely])
     peak = float(along @ inner @ along)
     logs = [
         _of_part(inner, fixed) + 0.5 * peak
@@ -112,7 +112,7 @@ def evidence(
         residuals=residuals + slopes @ step,
         step=step,
         precision=precision,
-        stirred=tuple(stirred),
+        stirred=tuple(one for _, _, one in likely),
     )
 
 
@@ -142,14 +142,16 @@ def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
 
 
-def weighed(block: Block, columns: Floats, form: Form) -> tuple[float, Floats, Stirred]:
+def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tuple[float, Floats, Stirred]:
     """A block under what is likeliest to be wrong in it.
 
     Parameters
     ----------
     block : Block
     columns : (k, n) array
-        The first are the residuals.
+        Of which products are made.
+    residuals : (k,) array
+        By which it is seen what is wrong.
     form : Form
         Of the block's cells.
 
@@ -161,7 +163,7 @@ def weighed(block: Block, columns: Floats, form: Form) -> tuple[float, Floats, S
     tried = []
     for surge, swing in product(block.surges, SWINGS if np.any(form.swinging) else SWINGS[:1]):
         one = Stirred(block=replace(block, surge=surge), swing=swing)
-        log_prior, allowance = likeliest(one.block, columns[:, 0], form, swing)
+        log_prior, allowance = likeliest(one.block, residuals, form, swing)
         products, log_det = projected(one.block, columns, form, allowance)
         tried.append((log_prior - 0.5 * log_det, products, one))
     log, products, stirred = max(tried, key=lambda each: each[0] - 0.5 * float(each[1][0, 0]))

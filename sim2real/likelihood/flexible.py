@@ -13,7 +13,7 @@ SCALES = (3.0, 10.0, 30.0)
 
 _LARGE = [(Way(errors=Errors(offset=scale, form=POOR.form), is_poor=True),) for scale in SCALES]
 _SMALLER = [(Way(errors=one.errors.times(DIFFERING), is_poor=True),) for (one,) in _LARGE]
-UNKNOWN = (
+UNKNOWN_WAYS = (
     *(Ways(span=large) for large in _LARGE),
     *(Ways(own=large) for large in _LARGE),
     *(Ways(changing=smaller) for smaller in _SMALLER),
@@ -42,7 +42,7 @@ def flexible_factor(found: Evidence, form: Form) -> float:
         rows = one.block.rows
         residuals, own = found.residuals[rows, None], form.chosen(rows)
         logs = []
-        for ways in UNKNOWN:
+        for ways in UNKNOWN_WAYS:
             log_prior, allowance = likeliest(one.block, residuals[:, 0], own, one.swing, ways)
             products, log_det = projected(one.block, residuals, own, allowance)
             logs.append(log_prior - 0.5 * (float(products[0, 0]) + log_det))

@@ -9,8 +9,8 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block
 from wetwell.sim2real.likelihood.covariance import (
     DIFFERING,
-    EVEN,
     GOOD,
+    HARDLY_DIFFERENT,
     LATE,
     POOR,
     Allowance,
@@ -30,10 +30,10 @@ class Way:
     is_poor: bool
 
 
-ALIKE = (Way(errors=GOOD, is_poor=False), Way(errors=POOR, is_poor=True))
+SPAN_WAYS = (Way(errors=GOOD, is_poor=False), Way(errors=POOR, is_poor=True))
 """What may be wrong alike for all pumps and cycles in a span of time."""
-DIFFERENT = (
-    Way(errors=EVEN, is_poor=False),
+OWN_WAYS = (
+    Way(errors=HARDLY_DIFFERENT, is_poor=False),
     Way(errors=GOOD.times(DIFFERING), is_poor=False),
     Way(errors=POOR.times(DIFFERING), is_poor=True),
 )
@@ -44,9 +44,9 @@ DIFFERENT = (
 class Ways:
     """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle."""
 
-    span: Sequence[Way] = ALIKE
-    own: Sequence[Way] = DIFFERENT
-    changing: Sequence[Way] = DIFFERENT
+    span: Sequence[Way] = SPAN_WAYS
+    own: Sequence[Way] = OWN_WAYS
+    changing: Sequence[Way] = OWN_WAYS
 
 
 KNOWN = Ways()

@@ -392,9 +392,8 @@ class Site:
                 ("wetwell.services.gateway.poller.random", self.dice),
                 ("wetwell.services.alarms.daemon.LOOK_S", 1.0 * self.period_s),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
-                ("wetwell.services.detector.checkpoint.atomic_file", file),
+                ("wetwell.services.runtime.state_file.atomic_file", file),
                 ("wetwell.services.detector.quarantine.atomic_file", file),
-                ("wetwell.services.alarms.state_file.atomic_file", file),
                 ("wetwell.services.historian.store.archive.atomic_file", file),
                 ("wetwell.services.historian.store.folder_store.FolderStore.write", keep),
             ):

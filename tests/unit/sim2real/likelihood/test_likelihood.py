@@ -9,8 +9,8 @@ from scipy.stats import multivariate_normal
 
 from wetwell.sim2real.likelihood.cells import cells_of
 from wetwell.sim2real.likelihood.covariance import (
-    EVEN,
     GOOD,
+    HARDLY_DIFFERENT,
     LATE,
     POOR,
     Allowance,
@@ -21,7 +21,7 @@ from wetwell.sim2real.likelihood.covariance import (
 )
 from wetwell.sim2real.likelihood.evidence import evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
-from wetwell.sim2real.likelihood.ways import ALIKE, DIFFERENT, POORLY
+from wetwell.sim2real.likelihood.ways import OWN_WAYS, POORLY, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, LEVEL, Bins
 
@@ -107,7 +107,13 @@ def everywhere(block, span, own, changing, swing=0.5):
 
 
 @pytest.mark.parametrize(
-    "errors", [(GOOD, EVEN, EVEN), (POOR, GOOD, POOR), (Errors(offset=3.0, form=0.3), EVEN, GOOD)], ids=str
+    "errors",
+    [
+        (GOOD, HARDLY_DIFFERENT, HARDLY_DIFFERENT),
+        (POOR, GOOD, POOR),
+        (Errors(offset=3.0, form=0.3), HARDLY_DIFFERENT, GOOD),
+    ],
+    ids=str,
 )
 @pytest.mark.parametrize("has_form", [True, False])
 @pytest.mark.parametrize("surge", [0.0, 3.0])
@@ -132,7 +138,7 @@ def log_densities(cells, residuals):
         spans = block.span.max() + 1
         logs = []
         for span, own, changing in product(
-            product(ALIKE, repeat=spans), product(DIFFERENT, repeat=groups), product(DIFFERENT, repeat=groups)
+            product(SPAN_WAYS, repeat=spans), product(OWN_WAYS, repeat=groups), product(OWN_WAYS, repeat=groups)
         ):
             allowance = Allowance(
                 span=of_ways([span[k] for k in block.span]),
@@ -140,7 +146,12 @@ def log_densities(cells, residuals):
                 changing=of_ways([changing[k] for k in block.group]),
             )
             prior = sum(
-                log_prior(ways, choices) for ways, choices in ((span, ALIKE), (own, DIFFERENT), (changing, DIFFERENT))
+                log_prior(ways, choices)
+                for ways, choices in (
+                    (span, SPAN_WAYS),
+                    (own, OWN_WAYS),
+                    (changing, OWN_WAYS),
+                )
             )
             density = multivariate_normal(cov=dense(block, no_form(cells).chosen(block.rows), allowance))
             log = density.logpdf(residuals[..., block.rows]) + 0.5 * block.rows.size * np.log(2.0 * np.pi)
