@@ -93,8 +93,7 @@ def test_acknowledging_by_name_works_and_survives_a_reload(site, open_page, scre
     page.get_by_label("Your name").fill("Ada")
     page.get_by_role("dialog").get_by_role("button", name="acknowledge").click()
     expect(row).to_contain_text("acknowledged by Ada", timeout=SLOW_MS)
-    act = site.acts[-1]
-    assert (act["alarm"], act["act"], act["by"]) == ("level_high", "acknowledge", "Ada")
+    assert ("level_high", "acknowledge", "Ada") in [(act["alarm"], act["act"], act["by"]) for act in site.acts]
     page.reload()
     expect(row).to_contain_text("acknowledged by Ada", timeout=SLOW_MS)
     row.get_by_role("button", name="shelve").click()

@@ -233,7 +233,7 @@ def test_a_crash_before_any_act_of_the_rollover_loses_nothing_and_doubles_nothin
                 assert raw_now == samples
             while store.maintain(NOW_NS):
                 pass
-        assert len(list(folder.glob("*/station=alpha/*.parquet"))) == 2
+        assert len(list(folder.glob("samples/station=alpha/*.parquet"))) == 2
         store.close()
     assert deaths > 15
 

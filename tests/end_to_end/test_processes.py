@@ -140,7 +140,7 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
             plc.sendall(bytes.fromhex("000100000006010400000002"))  # read level_m by function code 04
             answer = plc.recv(64)
         assert answer[7:9] == bytes([4, 4])
-        assert _told(f"http://127.0.0.1:{page_port}/api/stations/alpha", "model")["station"] == "alpha"
+        assert _told(page_port, "alpha", "model")["station"] == "alpha"
         children = _children(up.pid)
         assert len(children) == 6
         code, out, err = stop(up, signal.SIGINT)
@@ -152,11 +152,11 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
         assert not [child for child in children if Path(f"/proc/{child}").exists()]
 
 
-def _told(address: str, key: str) -> dict[str, object]:
+def _told(page_port: int, station: str, key: str) -> dict[str, object]:
     """What a page says of a station under a key, as soon as it has heard of it."""
     end = time.monotonic() + DEADLINE_S
     while True:
-        with urllib.request.urlopen(address, timeout=10) as page:
+        with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/stations/{station}", timeout=10) as page:
             if key in (said := json.load(page)):
                 return said[key]
         assert time.monotonic() < end, f"the page says nothing under {key}"
