@@ -20,8 +20,6 @@ EVEN_FORM = 0.1
 """Ratio of errors of form that differ so little that they hardly matter to those that are alike. [1]"""
 SWINGS = (0.1, 0.5, 1.5)
 """Error of form of effects that are known by how much they swing in time, not by their course; each as likely. [1]"""
-
-
 LATE = (1.0, 0.0, 0.1)
 """How alike pumps and spans of time are early or late: in a block, in a span, each by itself. [1]"""
 
@@ -102,13 +100,14 @@ def expected_squares(block: Block) -> Floats:
 def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -> tuple[Floats, float]:
     r"""Products of columns under the inverse of the covariance, and the logarithm of its determinant.
 
-    $$C = \operatorname{diag}\left(\sigma^2 + d^2 + (s_c f)^2\right) + \sum_c v_c v_c^T
-    + \tfrac{o^2}{2} \left(a a^T + \sum_g a_g a_g^T\right)
-    + \tfrac{s^2}{2} \left(f f^T + \sum_g f_g f_g^T\right), \quad
-    d^2 = \tfrac12 \left((c a)^2 + u \sigma^2\right), \quad v^2 = d^2 + (s_w w)^2$$
+    $$C = \operatorname{diag}\left(\sigma^2 + d^2 + (s_c f)^2\right) + \sum_c d_c d_c^T
+    + A\left(a; o_b, o_s, o_g\right) + A\left(\bar f; s_b, s_s, s_g\right) + A\left(t; \lambda\right), \quad
+    d^2 = \tfrac12 \left((c a)^2 + u \sigma^2 + (w f_w)^2\right)$$
 
-    with what is allowed a, the surge u, the signature f, what swings w, and the `Allowance` of offset o, change c,
-    form s and changing form $s_c$; `SWING` $s_w$; groups g are common to all cycles, and cycles c to all groups.
+    $$A(x; b, s, g) = b^2 x x^T + \sum_{\text{spans}} s^2 x_s x_s^T + \sum_{\text{groups}} g^2 x_g x_g^T$$
+
+    with what is allowed a, the signature f and its mean in a group, what is late t with `LATE` λ, what swings $f_w$,
+    the surge u, and the `Allowance` of changes c and $s_c$, spans s, groups g and the swing w; the sum is over cycles.
 
     Parameters
     ----------

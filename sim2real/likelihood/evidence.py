@@ -96,7 +96,7 @@ def evidence(
         ]
         inner = np.sum([products for _, products, _ in likely], axis=0)
         precision, slope = inner[1:, 1:], inner[1:, 0]
-        step = -solve(precision + np.eye(count) * TRUSTED**-2, slope, assume_a="pos") if count else step
+        step = _step(precision, slope)
     along = np.r_[1.0, step]
     by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products, _ in likely])
     peak = float(along @ inner @ along)
@@ -116,6 +116,13 @@ def evidence(
     )
 
 
+def _step(precision: Floats, slope: Floats) -> Floats:
+    """To the most probable parameters, within `TRUSTED` of the fit."""
+    if slope.size == 0:
+        return np.zeros(0)
+    return np.asarray(-solve(precision + np.eye(slope.size) * TRUSTED**-2, slope, assume_a="pos"), dtype=np.float64)
+
+
 def _partly(neutral: Mapping[int, float]) -> list[dict[int, float]]:
     """What is neutral where all strengths of an effect act, and where one alone does."""
     alone = [{k: way for k, way in neutral.items() if k != one} for one in neutral]
@@ -131,9 +138,8 @@ def _of_part(inner: Floats, fixed: Mapping[int, float]) -> float:
     free = [1 + k for k in range(inner.shape[0] - 1) if k not in fixed]
     precision, slope = inner[np.ix_(free, free)], inner[free] @ first
     peak = float(first @ inner @ first)
-    if free:
-        step = -solve(precision + np.eye(len(free)) * TRUSTED**-2, slope, assume_a="pos")
-        peak += float(2.0 * slope @ step + step @ precision @ step)
+    step = _step(precision, slope)
+    peak += float(2.0 * slope @ step + step @ precision @ step)
     return -0.5 * (peak + float(np.linalg.slogdet(np.eye(len(free)) + precision / (2.0 * np.pi))[1]))
 
 
