@@ -107,7 +107,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     $$A(x; b, s, g) = b^2 x x^T + \sum_{\text{spans}} s^2 x_s x_s^T + \sum_{\text{groups}} g^2 x_g x_g^T$$
 
     with what is allowed a, the signature f and its mean in a group, what is late t with `LATE` λ, what swings $f_w$,
-    the surge u, and the `Allowance` of changes c and $s_c$, spans s, groups g and the swing w; the sum is over cycles.
+    the surge u, and the `Allowance` of changes c and $s_c$, spans s, groups g and swing w; the sum is over cycles.
 
     Parameters
     ----------
