@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any, LiteralString, TypeVar
 
 import psycopg
-from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
-from wetwell.protocols.errors import ConfigError, LinkError
-from wetwell.services.runtime.postgres import hang_up, unfrozen
+from wetwell.protocols.errors import LinkError
+from wetwell.services.runtime.postgres import hang_up, server_name, unfrozen, with_password
 
 T = TypeVar("T")
 
@@ -65,11 +64,7 @@ class LeaseDatabase:
     """
 
     def __init__(self, url: str, password_file: Path | None, patience_s: float) -> None:
-        try:
-            parts = conninfo_to_dict(url)
-        except psycopg.ProgrammingError:
-            raise ConfigError("lease.url: is no address of PostgreSQL (it is not shown, it may be secret)") from None
-        self.name = f"postgresql {parts.get('host', 'localhost')}/{parts.get('dbname', '')}"
+        self.name = server_name(url, "lease.url")
         self._url = url
         self._password_file = password_file
         self._patience_s = patience_s
@@ -113,9 +108,8 @@ class LeaseDatabase:
                 raise LinkError(f"{self.name}: {line}") from error
 
     def _connect(self) -> psycopg.Connection[Any]:
-        password = None if self._password_file is None else self._password_file.read_text().strip()
         database = psycopg.connect(
-            make_conninfo(self._url, password=password),
+            with_password(self._url, self._password_file),
             autocommit=True,
             connect_timeout=max(2, round(self._patience_s)),  # libpq takes two seconds at least
             options=unfrozen(self._patience_s),

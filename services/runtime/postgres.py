@@ -5,9 +5,13 @@ import os
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import psycopg
+from psycopg.conninfo import conninfo_to_dict, make_conninfo
+
+from wetwell.protocols.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,26 @@ class Fence:
 
     check: Callable[[psycopg.Connection[Any]], None]
     options: str
+
+
+def server_name(url: str, setting: str) -> str:
+    """Host and database of a URL, as messages say them: without its password.
+
+    Raises
+    ------
+    ConfigError
+        If the URL of the setting is none.
+    """
+    try:
+        parts = conninfo_to_dict(url)
+    except psycopg.ProgrammingError:
+        raise ConfigError(f"{setting}: is no address of PostgreSQL (it is not shown, it may be secret)") from None
+    return f"postgresql {parts.get('host', 'localhost')}/{parts.get('dbname', '')}"
+
+
+def with_password(url: str, password_file: Path | None) -> str:
+    """The URL with the password that the file holds now."""
+    return make_conninfo(url, password=None if password_file is None else password_file.read_text().strip())
 
 
 def hang_up(connection: psycopg.Connection[Any]) -> None:

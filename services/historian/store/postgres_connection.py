@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any, LiteralString
 
 import psycopg
-from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
-from wetwell.protocols.errors import ConfigError
 from wetwell.services.historian.store.interface import StoreError
-from wetwell.services.runtime.postgres import Fence, hang_up
+from wetwell.services.runtime.postgres import Fence, hang_up, server_name, with_password
 
 POSTGRES_CONNECT_S = 5
 LOCK = 0x77657477656C6C
@@ -74,13 +72,7 @@ class PostgresConnection:
     """
 
     def __init__(self, url: str, password_file: Path | None, *, is_alone: bool, fence: Fence | None = None) -> None:
-        try:
-            parts = conninfo_to_dict(url)
-        except psycopg.ProgrammingError:
-            raise ConfigError(
-                "historian.url: is no address of PostgreSQL (it is not shown, it may be secret)"
-            ) from None
-        self._name = f"postgresql {parts.get('host', 'localhost')}/{parts.get('dbname', '')}"
+        self._name = server_name(url, "historian.url")
         self._url = url
         self._password_file = password_file
         self._is_alone = is_alone
@@ -129,10 +121,9 @@ class PostgresConnection:
             return database.cursor(binary=True).execute(query, values).fetchall()
 
     def _connect(self) -> psycopg.Connection[Any]:
-        password = None if self._password_file is None else self._password_file.read_text().strip()
         options = None if self._fence is None else self._fence.options
         return psycopg.connect(
-            make_conninfo(self._url, password=password), connect_timeout=POSTGRES_CONNECT_S, options=options
+            with_password(self._url, self._password_file), connect_timeout=POSTGRES_CONNECT_S, options=options
         )
 
     def _connect_writer(self) -> psycopg.Connection[Any]:
