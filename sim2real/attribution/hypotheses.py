@@ -7,10 +7,10 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.presence import are_there, strengths_of
+from wetwell.sim2real.attribution.presence import are_there, is_only_late, strengths_of, time_constant_s
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import GOOD, Form, no_form
+from wetwell.sim2real.likelihood.covariance import GOOD, POOR_FORM, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
@@ -101,32 +101,39 @@ class Hypotheses:
         cells, residuals = self._cells, self._means(fit)
         fewer = [self._fitter.without(fit, member) for member in range(len(fit.names))]
         signatures = [np.zeros(residuals.size) if one is None else self._means(one) - residuals for one in fewer]
+        late = [
+            np.zeros(residuals.size) if one is None else self._late(fit, member, one)
+            for member, one in enumerate(fewer)
+        ]
         slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
-        form = self._form(fit, signatures)
+        form = self._form(fit, signatures, self._plain - residuals, late)
         found = evidence(
             cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form, strengths_of(fit)
         )
         is_possible = are_there(fit, found) and all(
-            one is not None and self._matters(signature, form, self._late(one))
-            for one, signature in zip(fewer, signatures, strict=True)
+            one is not None
+            and not is_only_late(fit, member, self._fitter.station.materiality.time_s)
+            and self._matters(signature, form, form.late - its)
+            for member, (one, signature, its) in enumerate(zip(fewer, signatures, late, strict=True))
         )
         return Hypothesis(fit=fit, evidence=found, form=form, is_possible=is_possible)
 
-    def _form(self, fit: Fit, signatures: Sequence[Floats]) -> Form:
+    def _form(self, fit: Fit, signatures: Sequence[Floats], explained: Floats, late: Sequence[Floats]) -> Form:
         swings = np.zeros(self._cells.group.size)
         for effect, signature in zip(fit.effects, signatures, strict=True):
             if type(effect).force is not Effect.force:
                 swings += self._cells.block_squares(signature)
         return Form(
-            signature=np.sqrt(np.sum(np.square(signatures), axis=0)),
+            signature=np.maximum(np.sqrt(np.sum(np.square(signatures), axis=0)), np.abs(explained)),
             swinging=np.sqrt(swings),
-            late=self._late(fit),
+            late=np.sum(late, axis=0),
         )
 
-    def _late(self, fit: Fit) -> Floats:
-        """(cells,) what a time that is material changes in what is explained."""
-        explained = residuals_of(self._fitter.plain.residuals) - residuals_of(fit.residuals)
-        return self._fitter.station.materiality.time_s * self._cells.means(rate_of(self._fitter.bins, explained))
+    def _late(self, fit: Fit, member: int, fewer: Fit) -> Floats:
+        """(cells,) change of what an effect explains, within a time that is material or a share of its own."""
+        explained = residuals_of(fewer.residuals) - residuals_of(fit.residuals)
+        time_s = np.hypot(self._fitter.station.materiality.time_s, POOR_FORM * time_constant_s(fit, member))
+        return np.asarray(time_s * self._cells.means(rate_of(self._fitter.bins, explained)), dtype=np.float64)
 
     def _matters(self, signature: Floats, form: Form, late: Floats) -> bool:
         """Whether an effect does more in some group than what is allowed, and than the others may have wrong there.

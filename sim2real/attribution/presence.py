@@ -54,6 +54,27 @@ def strengths_of(fit: Fit) -> list[dict[int, float]]:
     return found
 
 
+def time_constant_s(fit: Fit, member: int) -> float:
+    """Seconds of the longest strength of an effect that is a time, such as a lag; 0 without any."""
+    return max(_times_s(fit, member), default=0.0)
+
+
+def is_only_late(fit: Fit, member: int, time_s: float) -> bool:
+    """Whether an effect only lets something come late, by a time that is not material."""
+    times = _times_s(fit, member)
+    strengths = sum(free.neutral is not None for free in fit.candidates[member].free)
+    return 0 < strengths == len(times) and max(times) <= time_s
+
+
+def _times_s(fit: Fit, member: int) -> list[float]:
+    candidate, point = fit.candidates[member], fit.points[member]
+    return [
+        abs(free.value(float(one)) - free.neutral)
+        for free, one in zip(candidate.free, point, strict=True)
+        if free.unit == "s" and free.neutral is not None
+    ]
+
+
 def _is_away(away: Floats, covariance: Floats, is_known: Flags) -> bool:
     if np.any(away[~is_known] != 0.0):
         return True

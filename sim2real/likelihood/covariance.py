@@ -70,11 +70,12 @@ class Form:
     Attributes
     ----------
     signature : (cells,) array
-        What the effects explain, in one number: the root of the sum of squares of what each does.
+        What the effects explain, in one number: the root of the sum of squares of what each does, or what they do
+        together where that is more: one effect that is split into two has no better form.
     swinging : (cells,) array
         Root mean square, within its block, of what those do that swing in time.
     late : (cells,) array
-        Change of what they explain together within the time by which a signal may be early or late.
+        Change of what they explain within the time by which each may be early or late.
     """
 
     signature: Floats
@@ -165,9 +166,11 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
 
 def _alike(span: Integers, of_block: float, of_span: float | Floats, own: float | Floats) -> tuple[Floats, float]:
     """Inverse and log determinant of the covariance of groups: alike in a block, in a span, each by itself."""
-    covariance = (
-        of_block**2 + np.outer(of_span, of_span) * (span[:, None] == span[None, :]) + np.eye(span.size) * own**2
-    )
-    factor = cho_factor(covariance, lower=True)
-    inverse = cho_solve(factor, np.eye(span.size))
-    return np.asarray(inverse, dtype=np.float64), 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
+    alone = np.broadcast_to(1.0 / np.square(own), span.shape)
+    shared = alone * of_span
+    excess = 1.0 + np.bincount(span, shared * of_span)
+    inverse = np.diag(alone) - np.outer(shared, shared) * (span[:, None] == span[None, :]) / excess[span]
+    summed = inverse.sum(axis=1)
+    further = 1.0 + of_block**2 * float(summed.sum())
+    inverse -= np.outer(summed, summed) * (of_block**2 / further)
+    return inverse, float(np.sum(np.log(excess)) - np.sum(np.log(alone)) + np.log(further))

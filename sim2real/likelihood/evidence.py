@@ -64,12 +64,12 @@ def evidence(
 ) -> Evidence:
     r"""Laplace's approximation around a fit.
 
-    $$\ln p(z \mid S) = \sum_b \ln p(r_b \mid \text{poor}_b) + \ln \pi(\text{poor}) - \tfrac12 \ln\det(1 + H / 2\pi),
+    $$\ln p(z \mid S) = \sum_b \ln p(r_b \mid \text{way}_b) + \ln w - \tfrac12 \ln\det(1 + H / 2\pi),
     \qquad H = \sum_b J_b^T C_b^{-1} J_b$$
 
     with the residuals r at the best parameters, their slopes J, a prior that is even over the range of each
-    parameter, and in each block b the groups that are poor, and the surges of the inflow, by what the fit leaves; π
-    has `POORLY` for each poor group, and the share of a surge.
+    parameter, and in each block b the likeliest way to be wrong, and surge of the inflow, by what the fit leaves; w
+    is what the sum over all of them adds, each with its probability.
 
     Parameters
     ----------
@@ -164,7 +164,8 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
     Returns
     -------
     log, products, stirred : float, (n, n) array, Stirred
-        Logarithm of prior and volume, the products of the columns, and the likeliest surge and swing.
+        Logarithm of volume and of what not knowing the ways adds, the products of the columns, and the likeliest
+        surge and swing.
     """
     tried = []
     for surge, swing in product(block.surges, SWINGS if np.any(form.swinging) else SWINGS[:1]):
@@ -172,5 +173,8 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
         log_prior, allowance = likeliest(one.block, residuals, form, swing)
         products, log_det = projected(one.block, columns, form, allowance)
         tried.append((log_prior - 0.5 * log_det, products, one))
-    log, products, stirred = max(tried, key=lambda each: each[0] - 0.5 * float(each[1][0, 0]))
-    return log - float(np.log(len(tried))), products, stirred
+    totals = np.array([log - 0.5 * float(products[0, 0]) for log, products, _ in tried])
+    best = int(np.argmax(totals))
+    log, products, stirred = tried[best]
+    unsure = float(logsumexp(totals) - totals[best] - np.log(len(tried)))
+    return log + unsure, products, stirred

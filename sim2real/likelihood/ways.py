@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -32,12 +33,20 @@ class Way:
 
 SPAN_WAYS = (Way(errors=GOOD, is_poor=False), Way(errors=POOR, is_poor=True))
 """What may be wrong alike for all pumps and cycles in a span of time."""
+BETTER, POORER = GOOD.times(DIFFERING), POOR.times(DIFFERING)
 OWN_WAYS = (
     Way(errors=HARDLY_DIFFERENT, is_poor=False),
-    Way(errors=GOOD.times(DIFFERING), is_poor=False),
-    Way(errors=POOR.times(DIFFERING), is_poor=True),
+    Way(errors=BETTER, is_poor=False),
+    Way(errors=POORER, is_poor=True),
 )
-"""What may differ between pumps, or between cycles."""
+"""What may differ between pumps."""
+CHANGING_WAYS = tuple(
+    Way(errors=Errors(offset=offset, form=form), is_poor=offset == POORER.offset or form == POORER.form)
+    for offset, form in product(
+        (BETTER.offset, POORER.offset), (0.0, HARDLY_DIFFERENT.form, BETTER.form, POORER.form)
+    )
+)
+"""What may differ between cycles."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +55,7 @@ class Ways:
 
     span: Sequence[Way] = SPAN_WAYS
     own: Sequence[Way] = OWN_WAYS
-    changing: Sequence[Way] = OWN_WAYS
+    changing: Sequence[Way] = CHANGING_WAYS
 
 
 KNOWN = Ways()
@@ -70,7 +79,7 @@ def likeliest(
     Returns
     -------
     log_prior, allowance : float, Allowance
-        Logarithm of the probability of the ways that were chosen, and what they allow.
+        What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow.
     """
     counts = block.group_sums(np.ones(residuals.size))
     mean, noise, allowed, signature, swinging, late = (
@@ -115,21 +124,21 @@ def likeliest(
 
 
 def _chosen(logs: Floats, ways: Sequence[Way]) -> tuple[Integers, float]:
-    """(n,) likeliest of the ways by their (ways, n) logarithms, and the logarithm of the probability of the choice.
+    """(n,) likeliest of the ways by their (ways, n) logarithms, and what not knowing them adds to the logarithm.
 
+    That is the sum over all ways, each with its probability, over the likeliest: ways that say the same cost nothing.
     A block is prone to be poor with the probability with which one of its members is where it is not.
     """
     poor = np.array([way.is_poor for way in ways])
     if poor.all():
-        return np.zeros(logs.shape[1], dtype=np.int64), 0.0
+        return np.argmax(logs, axis=0), 0.0
     tried = []
     for share, log_prone in ((POORLY, np.log(1.0 - POORLY)), (1.0 - POORLY, np.log(POORLY))):
         log_priors = np.log(np.where(poor, share / poor.sum(), (1.0 - share) / (~poor).sum()))
-        best = np.argmax(logs + log_priors[:, None], axis=0)
-        log_prior = float(log_priors[best].sum() + log_prone)
-        tried.append((float(_picked(logs, best).sum()) + log_prior, best, log_prior))
-    _, best, log_prior = max(tried, key=lambda one: one[0])
-    return best, log_prior
+        joint = logs + log_priors[:, None]
+        tried.append((float(np.logaddexp.reduce(joint, axis=0).sum()) + log_prone, np.argmax(joint, axis=0)))
+    _, best = max(tried, key=lambda one: one[0])
+    return best, float(np.logaddexp.reduce([total for total, _ in tried]) - _picked(logs, best).sum())
 
 
 def _picked(values: Floats, chosen: Integers) -> Floats:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.jit import compiled
 
 GAUSSIAN_MAD = 0.6745
@@ -21,6 +21,18 @@ def filled(values: Floats, longest: int, otherwise: float) -> Floats:
     last = np.maximum.accumulate(np.where(np.isfinite(values), place, -1))
     held = np.where((last >= 0) & (place - last <= longest), values[last], otherwise)
     return np.asarray(held, dtype=np.float64)
+
+
+def since_changes(key: Integers) -> Integers:
+    """(n,) places since a key changed last.
+
+    Examples
+    --------
+    >>> since_changes(np.array([7, 7, 7, 2, 2, 7]))
+    array([0, 1, 2, 0, 1, 0])
+    """
+    place = np.arange(key.size)
+    return place - np.maximum.accumulate(np.where(np.r_[True, key[1:] != key[:-1]], place, 0))
 
 
 def repeated(values: Floats) -> Flags:

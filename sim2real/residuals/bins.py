@@ -8,6 +8,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.sim2real.recording.seconds import since_changes
 
 Signal = Literal["flow", "head", "power", "level", "start_level", "stop_level", "telemetry"]
 SIGNALS: tuple[Signal, ...] = get_args(Signal)
@@ -125,10 +126,7 @@ def binned(counted: Flags, key: Integers, length_s: Integers) -> Seconds:
     length_s : (n,) array
         [s]
     """
-    place = np.arange(counted.size)
-    changed = np.r_[True, key[1:] != key[:-1]]
-    since = place - np.maximum.accumulate(np.where(changed, place, 0))
-    number = np.cumsum(changed | (since % length_s == 0))
+    number = np.cumsum(since_changes(key) % length_s == 0)
     second = np.flatnonzero(counted)
     _, inverse = np.unique(number[second], return_inverse=True)
     return Seconds(second=second, bin=inverse.ravel(), counts=np.bincount(inverse.ravel()).astype(np.float64))

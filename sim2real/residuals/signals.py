@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.materiality import Materiality
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP, Regimes
-from wetwell.sim2real.recording.seconds import repeated, trailing_means
+from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, REGIMES, START_RAMP, STEADY, STOP_RAMP, Regimes
+from wetwell.sim2real.recording.seconds import repeated, since_changes, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S, level_noise_m
 from wetwell.sim2real.replay.replay import Doubt, Prediction
@@ -188,7 +188,7 @@ def _one_pump(
     if rated == 0.0:
         return None
     slope = np.gradient(expected)
-    size = np.abs(np.where(counted, recorded, 0.0))
+    size = _usual_size(np.where(counted, recorded, 0.0), regime, is_ramp)
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
     late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
     material = np.sqrt(
@@ -215,6 +215,17 @@ def _one_pump(
         is_repeated=repeated(recorded)[seconds.second],
         pattern=pattern,
     )
+
+
+def _usual_size(recorded: Floats, regime: Integers, is_ramp: Flags) -> Floats:
+    """(n,) size of a reading, in ramps the usual one at that second of all of them.
+
+    By the size of the noise is known. With its own size a reading would be as far from zero, in units of it, as any.
+    """
+    size = np.abs(recorded)
+    keys, group = np.unique((since_changes(regime) * len(REGIMES) + regime)[is_ramp], return_inverse=True)
+    size[is_ramp] = (np.bincount(group, size[is_ramp], keys.size) / np.bincount(group, minlength=keys.size))[group]
+    return size
 
 
 def _share(materiality: Materiality, name: AnalogueQuantity) -> float:

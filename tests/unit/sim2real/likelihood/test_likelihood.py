@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from wetwell.sim2real.likelihood.cells import cells_of
@@ -21,7 +22,7 @@ from wetwell.sim2real.likelihood.covariance import (
 )
 from wetwell.sim2real.likelihood.evidence import evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
-from wetwell.sim2real.likelihood.ways import OWN_WAYS, POORLY, SPAN_WAYS
+from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, LEVEL, Bins
 
@@ -131,14 +132,14 @@ def test_products_are_those_of_the_dense_covariance(cells, errors, has_form, sur
 
 
 def log_densities(cells, residuals):
-    """Of the likeliest of all ways to be wrong, block by block, but for the factors of 2π: (blocks, ...)."""
+    """Of all ways to be wrong together, block by block, but for the factors of 2π: (blocks, ...)."""
     found = []
     for block in cells.blocks:
         groups = block.span.size
         spans = block.span.max() + 1
         logs = []
         for span, own, changing in product(
-            product(SPAN_WAYS, repeat=spans), product(OWN_WAYS, repeat=groups), product(OWN_WAYS, repeat=groups)
+            product(SPAN_WAYS, repeat=spans), product(OWN_WAYS, repeat=groups), product(CHANGING_WAYS, repeat=groups)
         ):
             allowance = Allowance(
                 span=of_ways([span[k] for k in block.span]),
@@ -150,13 +151,13 @@ def log_densities(cells, residuals):
                 for ways, choices in (
                     (span, SPAN_WAYS),
                     (own, OWN_WAYS),
-                    (changing, OWN_WAYS),
+                    (changing, CHANGING_WAYS),
                 )
             )
             density = multivariate_normal(cov=dense(block, no_form(cells).chosen(block.rows), allowance))
             log = density.logpdf(residuals[..., block.rows]) + 0.5 * block.rows.size * np.log(2.0 * np.pi)
             logs.append(log + prior)
-        found.append(np.max(logs, axis=0))
+        found.append(logsumexp(logs, axis=0))
     return np.array(found)
 
 
@@ -167,22 +168,23 @@ def of_ways(ways):
 
 
 def log_prior(ways, choices):
-    """Of what was chosen, in a block that is prone to be poor or in one that is not."""
+    """Of what was chosen, whether in a block that is prone to be poor or in one that is not."""
     poor = sum(way.is_poor for way in choices)
-    return max(
-        np.log(of_block)
-        + sum(np.log(share / poor if way.is_poor else (1.0 - share) / (len(choices) - poor)) for way in ways)
-        for of_block, share in ((1.0 - POORLY, POORLY), (POORLY, 1.0 - POORLY))
+    return np.logaddexp.reduce(
+        [
+            np.log(of_block)
+            + sum(np.log(share / poor if way.is_poor else (1.0 - share) / (len(choices) - poor)) for way in ways)
+            for of_block, share in ((1.0 - POORLY, POORLY), (POORLY, 1.0 - POORLY))
+        ]
     )
 
 
 @pytest.mark.parametrize("poor", [0.0, 4.0], ids=["good", "one group poor"])
-def test_the_evidence_of_none_is_nearly_that_of_the_likeliest_way_to_be_wrong(cells, poor):
-    """It is chosen by the means of groups and their scatter, not by trying all ways."""
+def test_the_evidence_of_none_is_nearly_that_of_all_ways_to_be_wrong(cells, poor):
+    """They are weighed by the means of groups and their scatter, not by trying all of them together."""
     residuals = 0.5 * np.sqrt(cells.variance) * np.random.default_rng(6).normal(size=cells.group.size)
     residuals += poor * cells.allowed * (cells.group == 1)
-    likeliest = log_densities(cells, residuals).sum()
-    assert likeliest - 2.0 < evidence_of_none(cells, residuals).log <= likeliest + 1e-9
+    assert evidence_of_none(cells, residuals).log == pytest.approx(log_densities(cells, residuals).sum(), abs=2.0)
 
 
 def test_a_parameter_is_integrated_over_its_range(cells):
@@ -190,12 +192,12 @@ def test_a_parameter_is_integrated_over_its_range(cells):
     rng = np.random.default_rng(7)
     slope = 40.0 * rng.normal(size=cells.group.size)
     residuals = 0.5 * rng.normal(size=cells.group.size)
-    grid = np.linspace(-0.5, 0.5, 20_001)
+    grid = np.linspace(-0.5, 0.5, 2_001)
     logs = log_densities(cells, residuals + grid[:, None] * slope).sum(axis=0)
     best = int(np.argmax(logs))
     expected = float(np.log(np.mean(np.exp(logs - logs[best]))) + logs[best])
     found = evidence(cells, residuals + grid[best] * slope, slope[:, None], no_form(cells))
-    assert found.log == pytest.approx(expected, abs=0.1)
+    assert found.log == pytest.approx(expected, abs=0.25)
     inner = np.exp(logs - logs[best])
     variance = float(np.sum(inner * (grid - grid[best]) ** 2) / inner.sum())
     assert 1.0 / found.precision[0, 0] == pytest.approx(variance, rel=0.2)
