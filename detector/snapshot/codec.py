@@ -114,7 +114,7 @@ def decode_snapshot(
         header, text = json.loads(head), body.rstrip(b"\n")
         name, _, number = header["schema"].partition("/")
         form = int(number) if name == _SCHEMA_NAME else 0
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise SnapshotError(f"snapshot of station '{station}': damaged, its first line is no header") from error
     if form != FORM and form not in UPGRADES:
         known = f"format '{header['schema']}', this version reads up to '{SCHEMA}'"
@@ -135,7 +135,7 @@ def decode_snapshot(
             arrays["steady_samples"] = arrays["steady_samples"].view(STEADY_SAMPLE)[:, 0]
         systems = state["system"] if isinstance(state["system"], list) else [state["system"]]
         return arrays, systems, state["pumps"]
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
 
 

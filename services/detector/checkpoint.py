@@ -124,7 +124,7 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         verdicts = [Verdict.model_validate(verdict) for verdict in header["verdicts"]]
         acts = [MaintenanceRecord.model_validate(record) for record in header.get("acts", [])]
         return Told(answers, verdicts, acts), rest
-    except (ValueError, KeyError, AttributeError, TypeError) as error:
+    except (ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
 
 
@@ -139,5 +139,5 @@ def is_intact(data: bytes) -> bool:
         head, _, body = snapshot.partition(b"\n")
         header = json.loads(head)
         return bool(hashlib.sha256(body.rstrip(b"\n")).hexdigest() == header["sha256"])
-    except (SnapshotError, ValueError, KeyError, TypeError):
+    except (SnapshotError, ValueError, KeyError, TypeError, RecursionError):
         return False

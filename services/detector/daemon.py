@@ -15,7 +15,7 @@ from wetwell.protocols.messages.status import Status
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.detector.checkpoint import Checkpoint, checkpoint_in
 from wetwell.services.detector.follower import Follower
-from wetwell.services.detector.intake import Intake
+from wetwell.services.detector.intake import LOOK_AGAIN_S, Intake
 from wetwell.services.detector.kernels import load_kernels
 from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.detector.station_detector import StationDetector
@@ -143,7 +143,7 @@ async def judge_all(
                 report_health(bus, judge.station, "detector", period_s, figures, lead_s=lead_s),
                 name=f"{name}.{judge.station}.health",
             )
-        group.create_task(_keep(judges, kept.checkpoint_s), name=f"{name}.checkpoint")
+        group.create_task(keep_in_turn(judges, intake, kept.checkpoint_s), name=f"{name}.checkpoint")
 
 
 async def _show_left_out(bus: Bus, station: str, period_s: float) -> None:
@@ -160,9 +160,19 @@ def _figures(judge: StationDetector, intake: Intake) -> dict[str, float]:
     return judge.figures() | {"dropped": float(intake.dropped)}
 
 
-async def _keep(judges: Sequence[StationDetector], period_s: float) -> None:
-    """Save each detector once a period, one after the other, so that no second bears all of them."""
-    while judges:
-        for judge in judges:
-            await asyncio.sleep(period_s / len(judges))
-            await judge.keep_aside()
+async def keep_in_turn(judges: Sequence[StationDetector], intake: Intake, period_s: float) -> None:
+    """Save each detector once a period, one after the other, so that no second bears all of them.
+
+    The oldest state comes first, and at once: where processes live shortly, one after another, each station has its
+    turn. One that has yet to take what it has missed comes when it has, as its state is the one that is kept already.
+    """
+    turns = sorted(judges, key=lambda judge: judge.detector.seen_until_ns)
+    while turns:
+        ready = next((judge for judge in turns if not intake.is_behind(judge)), None)
+        if ready is None:
+            await asyncio.sleep(LOOK_AGAIN_S)
+            continue
+        turns.remove(ready)
+        turns.append(ready)
+        await ready.keep_aside()
+        await asyncio.sleep(period_s / len(turns))

@@ -63,6 +63,10 @@ class Intake:
         """Messages for which there was no room."""
         return self._samples.dropped + self._passed_over + sum(one.dropped for one in self._behind.values())
 
+    def is_behind(self, judge: StationDetector) -> bool:
+        """Whether a judge has yet to take what it has missed."""
+        return judge in self._behind
+
     async def run(self) -> None:
         """Judge for ever; restored stations take first what they have missed."""
         async with asyncio.TaskGroup() as group:

@@ -110,7 +110,7 @@ class Quarantine:
     def _crashes_ns(self, station: str) -> list[int]:
         try:
             return [int(each) for each in json.loads(self._path(station).read_bytes())["crashes_ns"]]
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return []
 
     def _path(self, station: str) -> Path:
