@@ -2,18 +2,26 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 
 import zenoh
 
 TURN = 5_000
 """Messages that are taken from one channel before the others have their turn."""
 EARLY = 0.8
-"""Share of the pause between two messages of a channel for which it is left alone after the second."""
+"""Share of the rhythm of a channel for which it is left alone after a message that was in time."""
+SLOWER = 1.1
+"""A rhythm is the shortest of the last pauses; it may become slower by this factor with each message."""
 LONGEST_REST_S = 0.8
 """It is never left alone for longer: Zenoh's threads wait where a channel is full. [s]"""
 QUIET_S = 5.0
 """A channel without a message for so long is looked into now and then only. [s]"""
 QUIET_REST_S = 0.25
+STIRRED_S = 2.0
+"""After one that was silent has spoken the others are looked into each time for so long: where a link is back or a
+gateway begins, all of them speak. [s]"""
+CALM_S = 60.0
+"""From one such time to the next, where some speak seldom. [s]"""
 SLOT_S = 0.05
 """Channels that rest are woken in groups of this length, at the beginning of it. [s]"""
 FEW = 64
@@ -25,29 +33,35 @@ Receive = Callable[[], zenoh.Sample | None]
 class Channel:
     """A channel that Zenoh's threads fill, and the rhythm of what comes."""
 
-    __slots__ = ("count", "heard_s", "receive")
+    __slots__ = ("count", "heard_s", "receive", "rhythm_s")
 
     def __init__(self, receive: Receive) -> None:
         self.receive = receive
         self.heard_s = float("-inf")
+        self.rhythm_s = float("inf")
         self.count = 0
 
     def rest_s(self, now_s: float) -> float:
-        """Time in s for which nothing is to be expected of it; `count` messages have just been taken."""
-        silent_s = now_s - self.heard_s
-        if not self.count:
-            return QUIET_REST_S if silent_s > QUIET_S else 0.0
-        pause_s = silent_s / self.count
+        """Time in s for which nothing is to be expected of it, after the `count` messages that have just been taken.
+
+        By so much as the last one was late the next one comes sooner.
+        """
+        silent_s, count = now_s - self.heard_s, self.count
         self.heard_s, self.count = now_s, 0
-        return 0.0 if pause_s > QUIET_S else min(EARLY * pause_s, LONGEST_REST_S)
+        if silent_s > count * QUIET_S:
+            return 0.0
+        pause_s = silent_s / count
+        usual_s, self.rhythm_s = min(pause_s, self.rhythm_s), min(pause_s, SLOWER * self.rhythm_s)
+        late_s = silent_s - count * usual_s
+        return max(min(EARLY * usual_s, LONGEST_REST_S) - late_s, 0.0)
 
 
 class Channels:
     """Channels of a subscription.
 
     A look into an empty channel costs .25 µs: with a thousand of them two hundred times a second a twentieth of a
-    core. Stations have a rhythm: after a message its channel rests for most of the pause before it. What comes
-    early waits until then, by a fifth of that pause or .8 s at most.
+    core. Stations have a rhythm: after a message its channel rests until shortly before the next one is due. What
+    comes earlier waits until then, by .8 of the rhythm or .8 s at most.
 
     Parameters
     ----------
@@ -62,6 +76,7 @@ class Channels:
         self._resting: defaultdict[int, list[Channel]] = defaultdict(list)
         self._rests = has_rhythm and len(receivers) > FEW
         self._slot = 0
+        self._stirred_s = float("-inf")
 
     def messages(self, now_s: float) -> Iterator[zenoh.Sample]:
         """Yield what has come, of each channel in its order; to be taken to the end."""
@@ -86,8 +101,22 @@ class Channels:
 
     def _rest(self, channel: Channel, now_s: float) -> bool:
         """Let a channel rest if it may; whether it does."""
-        slot = int((now_s + channel.rest_s(now_s)) / SLOT_S)
+        is_quiet = now_s - channel.heard_s > QUIET_S
+        if channel.count:
+            if is_quiet and now_s - self._stirred_s > CALM_S:
+                self._stir(now_s)
+            rest_s = channel.rest_s(now_s)
+        elif is_quiet and now_s - self._stirred_s > STIRRED_S:
+            rest_s = QUIET_REST_S
+        else:
+            return False
+        slot = int((now_s + rest_s) / SLOT_S)
         if slot == self._slot:
             return False
         self._resting[slot].append(channel)
         return True
+
+    def _stir(self, now_s: float) -> None:
+        """Let all channels be woken with the next look."""
+        self._stirred_s = now_s
+        self._resting = defaultdict(list, {self._slot: list(chain.from_iterable(self._resting.values()))})

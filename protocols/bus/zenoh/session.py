@@ -60,6 +60,7 @@ def _config(mode: Literal["router", "client"], endpoint: str, access: ZenohAcces
         "connect/endpoints": [endpoint] if mode == "client" else [],
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False,  # a process that is killed would leave 16 MB of it behind
     }
     try:
         for name, value in settings.items():

@@ -366,3 +366,18 @@ with open_router(sys.argv[1]) as router, open_client(sys.argv[1]) as client:
     with python(script, endpoint) as process:
         output, errors = process.communicate(timeout=LIMIT_S)
         assert (process.returncode, output, errors) == (0, "", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_session_has_no_shared_memory_which_a_killed_process_would_leave_behind(endpoint):
+    """In a process of its own: others here open sessions as foreign clients do, which have some."""
+    script = (
+        "import sys; from pathlib import Path\n"
+        "from wetwell.protocols.bus.zenoh.link import open_client, open_router\n"
+        "with open_router(sys.argv[1]), open_client(sys.argv[1]) as bus:\n"
+        "    bus.publisher('wetwell/a/verdict/1', history=1).put(bytes(100_000))\n"
+        "    sys.stdout.write(Path('/proc/self/maps').read_text())\n"
+    )
+    maps = subprocess.run([sys.executable, "-c", script, endpoint], capture_output=True, text=True, check=True).stdout
+    assert "libc" in maps
+    assert ".zenoh" not in maps

@@ -5,7 +5,16 @@ from itertools import pairwise
 
 import pytest
 
-from wetwell.protocols.bus.zenoh.channels import EARLY, FEW, LONGEST_REST_S, QUIET_REST_S, SLOT_S, Channels
+from wetwell.protocols.bus.zenoh.channels import (
+    EARLY,
+    FEW,
+    LONGEST_REST_S,
+    QUIET_REST_S,
+    QUIET_S,
+    SLOT_S,
+    STIRRED_S,
+    Channels,
+)
 
 TICK_S = 0.005
 MANY = FEW + 1
@@ -28,14 +37,21 @@ def feeds() -> list[Feed]:
     return [Feed() for _ in range(MANY)]
 
 
-def played(feeds, channels, arrivals_s: list[float], until_s: float) -> list[tuple[float, int, float]]:
-    """What the last feed had: when it came, its number, and when it was taken. The others stay empty."""
+def played(
+    feeds, channels, arrivals_s: list[float], until_s: float, away_s=(0.0, 0.0)
+) -> list[tuple[float, int, float]]:
+    """What the last feed had: when it came, its number, and when it was taken. The others stay empty.
+
+    Between the times `away_s` the process stands still.
+    """
     coming, taken = deque(enumerate(arrivals_s)), []
     for tick in range(round(until_s / TICK_S)):
         now_s = 1000.0 + tick * TICK_S
         while coming and 1000.0 + coming[0][1] <= now_s:
             number, arrival_s = coming.popleft()
             feeds[-1].waiting.append((1000.0 + arrival_s, number))
+        if away_s[0] < now_s - 1000.0 < away_s[1]:
+            continue
         taken += [(arrival_s, number, now_s) for arrival_s, number in channels.messages(now_s)]
     return taken
 
@@ -49,9 +65,43 @@ def test_a_feed_with_a_rhythm_is_heard_in_time_with_few_looks(feeds, pause_s):
     in_rhythm = [one for one in taken if one[0] > 1001.0 + 2.0 * pause_s]
     assert max(now_s - arrival_s for arrival_s, _, now_s in in_rhythm) <= TICK_S + EARLY * TICK_S + 1e-9
     ticks = 31.0 / TICK_S
-    assert feeds[0].looks < 2 * ticks * TICK_S / QUIET_REST_S
+    assert feeds[0].looks < 2 * ticks * TICK_S / QUIET_REST_S + STIRRED_S / TICK_S
     if pause_s == 1.0:
         assert feeds[-1].looks < (1.0 - EARLY + 0.25) * ticks
+
+
+@pytest.mark.parametrize("late_s", [0.1, 0.4, 0.9])
+def test_what_comes_in_time_after_a_message_that_was_late_is_heard_at_once(feeds, late_s):
+    channels = Channels([feed.receive for feed in feeds], has_rhythm=True)
+    arrivals_s = [number + (late_s if number in {10, 15} else 0.0) for number in range(1, 20)]
+    taken = played(feeds, channels, arrivals_s, 21.0)
+    assert len(taken) == len(arrivals_s)
+    assert max(now_s - arrival_s for arrival_s, _, now_s in taken[2:]) <= TICK_S + 1e-9
+
+
+@pytest.mark.parametrize("stood_s", [0.4, 1.3, 2.95])
+def test_what_comes_after_the_process_stood_still_is_heard_at_once(feeds, stood_s):
+    channels = Channels([feed.receive for feed in feeds], has_rhythm=True)
+    taken = played(feeds, channels, [float(number) for number in range(1, 20)], 20.0, (10.1, 10.1 + stood_s))
+    assert len(taken) == 19
+    assert all(
+        now_s - arrival_s <= TICK_S + 1e-9 for arrival_s, _, now_s in taken[2:] if arrival_s > 1010.1 + stood_s
+    )
+
+
+def test_where_one_that_was_silent_speaks_the_others_are_heard_at_once_for_a_while(feeds):
+    channels = Channels([feed.receive for feed in feeds], has_rhythm=True)
+    waits_s = []
+    for tick in range(round(40.0 / TICK_S)):
+        now_s = 1000.0 + tick * TICK_S
+        if tick % 20 == 0 and tick // 20 < MANY:  # one station each tenth of a second, then silence
+            feeds[tick // 20].waiting.append((now_s, 0))
+        waits_s += [now_s - came_s for came_s, _ in channels.messages(now_s)]
+    assert len(waits_s) == MANY
+    assert waits_s[0] <= QUIET_REST_S + TICK_S
+    assert max(waits_s[1 : int(STIRRED_S / 0.1)]) <= TICK_S
+    assert max(waits_s) <= QUIET_REST_S + TICK_S
+    assert feeds[0].looks < 40.0 / QUIET_REST_S + 2 * (STIRRED_S + QUIET_S) / TICK_S
 
 
 def test_whatever_comes_and_whenever_all_of_it_is_taken_in_order(feeds):
