@@ -84,8 +84,9 @@ def changes_of(store: Store, station: str, start_ns: int, end_ns: int, points: i
         The span; a change before it is told for each pump, with its own time.
     """
     before = store.events("changes", station, -LONGEST_NS, start_ns, LEAD)
-    before = before or store.events("verdicts", station, -LONGEST_NS, start_ns, LEAD)
-    standing = {told.pump: told for told in changed(before)}
+    since_ns = from_iso(Told.model_validate_json(before[0]).time) if before else start_ns
+    earlier = store.events("verdicts", station, -LONGEST_NS, since_ns, LEAD) if len(before) < LEAD else []
+    standing = {told.pump: told for told in [*changed(earlier), *changed(before)]}  # of earlier versions, and kept
     older = verdicts_of_before(store, station, start_ns, end_ns, MOST_ROWS)
     within = [*older, *store.events("changes", station, start_ns, end_ns, MOST_ROWS)]
     first = sorted(standing.values(), key=lambda told: str(told.time))

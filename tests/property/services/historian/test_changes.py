@@ -4,7 +4,7 @@ import contextlib
 import tempfile
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wetwell.protocols.messages.history import History, HistoryQuery
@@ -32,6 +32,7 @@ def verdict(time: int, pump: int, state: str, stage: str | None) -> bytes:
     again=st.integers(0, 60),
     span=st.tuples(st.integers(0, 60), st.integers(1, 60)),
 )
+@example(told=[(1, "normal", None)] * 2 + [(2, "normal", None)], older=2, again=0, span=(3, 1))
 def test_changes_of_a_span_are_those_of_its_verdicts(told, older, again, span) -> None:
     payloads = [verdict(10 * place, *one) for place, one in enumerate(told)]
     start, end = 10 * span[0], 10 * (span[0] + span[1])
