@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: help up test check long soak lint types imports kernels format docs requirements clean sbom audit image
+.PHONY: help up test check long soak lint types imports kernels format docs requirements clean sbom audit release sign verify image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -67,9 +67,21 @@ build/sbom.json: requirements/fleet.txt pyproject.toml $(VENV)/.dev
 	$(BIN)/python -W ignore $(BIN)/cyclonedx-py requirements requirements/fleet.txt --index-url index \
 	  --pyproject pyproject.toml --output-reproducible --output-format JSON --output-file $@
 
-audit: $(VENV)/.dev  ## Known holes in the pinned packages; says so if the service that knows them is away
+audit: $(VENV)/.dev  ## Known holes in the pinned packages, and what scanners say; says so if one is not there
 	$(UV) pip check
 	$(BIN)/python .ci/audit.py requirements/fleet.txt
+	$(BIN)/python .ci/scan.py $(SCANNERS)
+
+release: sbom  ## Wheel, source distribution and bill of materials, in build/release
+	rm -rf build/release
+	$(BIN)/hatchling build -d build/release
+	cp build/sbom.json build/release/
+
+sign: release  ## Sign the release: make sign KEY=release.key IMAGES="--image NAME@sha256:DIGEST"
+	$(BIN)/python .ci/provenance.py sign $(KEY) build/release.json build/release/* $(IMAGES)
+
+verify: $(VENV)/.dev  ## Whether a release is what was signed: make verify PUBLIC=release.pem
+	$(BIN)/python .ci/provenance.py verify $(PUBLIC) build/release.json build/release/* $(IMAGES)
 
 image:  ## Image of the containers; make image BUILDER="buildah --storage-driver vfs" where there is no Docker
 	$(BUILDER) build --build-arg BASE=$(BASE) --file docker/Dockerfile --tag $(IMAGE) .

@@ -42,7 +42,8 @@ from wetwell.protocols.quantities import (
 )
 from wetwell.protocols.recordings.covariates import covariate_of
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
-from wetwell.protocols.timestamps import from_iso, has_zone, to_iso_array
+from wetwell.protocols.recordings.stamp_texts import to_iso_array
+from wetwell.protocols.timestamps import from_iso, has_zone
 
 TRUTH_PREFIX = "truth_"
 SUFFIXES = (".csv", ".csv.gz", ".parquet")

@@ -1,10 +1,7 @@
 """Pump curve from datasheet points by least squares."""
 
+import math
 from collections.abc import Sequence
-
-import numpy as np
-
-from wetwell.protocols.arrays import Floats
 
 
 def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
@@ -35,7 +32,8 @@ def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float,
     >>> round(c0, 9), abs(round(c1, 9)), round(c2, 9)
     (20.0, 0.0, -0.0001)
     """
-    from scipy.optimize import lsq_linear  # noqa: PLC0415 - slow to import, and needed by datasheet points only
+    import numpy as np  # noqa: PLC0415 - slow to import, as is the next, and needed by datasheet points only
+    from scipy.optimize import lsq_linear  # noqa: PLC0415
 
     flow_m3h = np.array([flow for flow, _ in points], dtype=float)
     head_m = np.array([head for _, head in points], dtype=float)
@@ -44,9 +42,7 @@ def fit_pump_curve(points: Sequence[tuple[float, float]]) -> tuple[float, float,
     scale_m3h = float(flow_m3h.max())
     reduced = flow_m3h / scale_m3h
     design = np.column_stack([np.ones_like(reduced), reduced, reduced**2])
-    solution: Floats = lsq_linear(
-        design, head_m, bounds=([0.0, -np.inf, -np.inf], [np.inf, 0.0, 0.0]), method="bvls"
-    ).x
+    solution = lsq_linear(design, head_m, bounds=([0.0, -np.inf, -np.inf], [np.inf, 0.0, 0.0]), method="bvls").x
     return float(solution[0]), float(solution[1]) / scale_m3h, float(solution[2]) / scale_m3h**2
 
 
@@ -60,4 +56,4 @@ def fit_error_m(points: Sequence[tuple[float, float]], coefficients: tuple[float
     """
     c0, c1, c2 = coefficients
     misfit_m = [c0 + c1 * flow + c2 * flow**2 - head for flow, head in points]
-    return float(np.sqrt(np.mean(np.square(misfit_m))))
+    return math.hypot(*misfit_m) / math.sqrt(len(misfit_m))

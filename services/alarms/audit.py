@@ -169,7 +169,7 @@ def broken_among(lines: Iterable[str]) -> list[int]:
 def _entry(line: str) -> dict[str, object] | None:
     try:
         entry = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return entry if isinstance(entry, dict) else None
 

@@ -13,6 +13,7 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.security.attempts import Attempts
 from wetwell.services.security.exposure import is_loopback
 from wetwell.services.security.tokens import Holder, holder_of
@@ -20,6 +21,8 @@ from wetwell.services.security.tokens import Holder, holder_of
 log = logging.getLogger(__name__)
 
 COOKIE = "wetwell_token"
+MOST_BODY_BYTES = 65_536
+"""Of a request: an act is short, and whoever has no token must not fill the memory."""
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -98,7 +101,7 @@ class Guard:
             status, reason = refusal
             await JSONResponse({"error": reason}, status)(scope, receive, send_safe)
             return
-        await self._app(scope, receive, send_safe)
+        await self._app(scope, bounded(receive), send_safe)
 
     def _is_admitted(self, path: str, token: str) -> bool:
         """Whether who was let in still is: a stream may outlive its token."""
@@ -119,6 +122,21 @@ class Guard:
         if method not in {"GET", "HEAD"} and not holder.may("operator"):
             return holder, (403, f"'{holder.name}' may look, not act")
         return holder, None
+
+
+def bounded(receive: Receive) -> Receive:
+    """What a client sends, as long as it is no more than `MOST_BODY_BYTES`; then it is refused."""
+    count = 0
+
+    async def receive_bounded() -> Message:
+        nonlocal count
+        message = await receive()
+        count += len(message.get("body", b""))
+        if count > MOST_BODY_BYTES:
+            raise RefusalError(413, f"body: must be no more than {MOST_BODY_BYTES} bytes")
+        return message
+
+    return receive_bounded
 
 
 def too_many(attempts: Attempts, scope: Scope) -> tuple[int, str] | None:

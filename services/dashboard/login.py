@@ -36,7 +36,7 @@ class Login:
         """Take {"token"}; a right one comes back as a cookie, an empty one takes the cookie away."""
         try:
             token = str(json.loads(await request.body())["token"])
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             return JSONResponse({"error": "token: must be given"}, 400)
         holder = None if self._tokens_file is None else holder_of(self._tokens_file, token)
         answer = JSONResponse(self._told(holder), headers={"cache-control": "no-store"})

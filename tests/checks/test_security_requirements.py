@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROWS = re.findall(
-    r"^\| (SR .*?) \| (\w+) \| .*? \| ?(.*?) ?\|$", (ROOT / "docs/security-requirements.md").read_text(), re.MULTILINE
-)
+REQUIREMENTS = (ROOT / "docs/security-requirements.md").read_text()
+ROWS = re.findall(r"^\| (SR .*?) \| (\w+) \| .*? \| ?(.*?) ?\|$", REQUIREMENTS, re.MULTILINE)
 TESTS = {
     name for file in (ROOT / "tests").rglob("test_*.py") for name in re.findall(r"def (test_\w+)\(", file.read_text())
 }
@@ -27,3 +26,16 @@ def test_each_test_that_is_named_is_there(requirement, met, tests):
 def test_every_requirement_of_the_level_has_a_row():
     named = re.findall(r"SR (\d)\.(\d+)", " ".join(row[0] for row in ROWS))
     assert sorted((int(a), int(b)) for a, b in named) == sorted((a, b) for a, all_b in LEVEL_2.items() for b in all_b)
+
+
+def test_the_threat_model_answers_each_question_of_each_way_and_names_tests_that_there_are():
+    parts = re.split(r"^## F\d: ", (ROOT / "docs/threat-model.md").read_text(), flags=re.MULTILINE)[1:]
+    assert len(parts) == 7
+    for part in parts:
+        rows = re.findall(r"^\| ([STRIDE]) \| (.+?) \| (SR \d\.\d+) \| (.+?) \|$", part, re.MULTILINE)
+        assert "".join(letter for letter, *_ in rows) == "STRIDE"
+        for _, answer, requirement, shown in rows:
+            assert re.search(rf"^\|.*{re.escape(requirement)}\b", REQUIREMENTS, re.MULTILINE), answer
+            named = set(re.findall(r"`(test_\w+)`", shown))
+            assert named <= TESTS, answer
+            assert named or shown == "reason", answer

@@ -73,7 +73,7 @@ async def enter_act(bus: Bus, station: str, body: bytes, by: str | None = None) 
         act = MaintenanceAct.model_validate(named if by is None else named | {"by": by})
     except ValidationError as error:
         raise RefusalError(400, first_fault(error)) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise RefusalError(400, f"act: is no JSON: {error}") from error
     try:
         record = await asyncio.wait_for(entered(bus, act), ANSWER_S)

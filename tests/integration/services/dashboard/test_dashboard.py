@@ -537,6 +537,24 @@ def test_a_login_sets_a_cookie_that_scripts_and_other_sites_do_not_get(tokens) -
     asyncio.run(run())
 
 
+def test_a_request_that_is_too_long_or_nested_too_deeply_is_refused_before_any_token(tokens) -> None:
+    file, *_ = tokens
+
+    async def run():
+        async def endless():
+            while True:
+                yield b" " * 4096
+
+        headers = {"content-type": "application/json"}
+        async with guarded(file) as client:
+            long = await client.post("/api/login", content=endless(), headers=headers)
+            assert (long.status_code, long.json()) == (413, {"error": "body: must be no more than 65536 bytes"})
+            deep = await client.post("/api/login", content=b"[" * 3000, headers=headers)
+            assert (deep.status_code, deep.json()) == (400, {"error": "token: must be given"})
+
+    asyncio.run(run())
+
+
 def test_of_an_address_with_many_wrong_tokens_only_a_right_one_is_heard(tokens) -> None:
     file, operator, _ = tokens
 
