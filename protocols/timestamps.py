@@ -2,12 +2,6 @@
 
 import re
 from datetime import UTC, datetime, timedelta
-from typing import Literal
-
-import numpy as np
-import numpy.typing as npt
-
-from wetwell.protocols.arrays import Integers
 
 NS_PER_S = 1_000_000_000
 NS_PER_DAY = 86_400 * NS_PER_S
@@ -31,8 +25,11 @@ def to_iso(stamp_ns: int) -> str:
     >>> to_iso(1_500_000_000)
     '1970-01-01T00:00:01.500Z'
     """
-    unit: Literal["s", "ms", "ns"] = "s" if stamp_ns % NS_PER_S == 0 else "ms" if stamp_ns % 1_000_000 == 0 else "ns"
-    return f"{np.datetime_as_string(np.datetime64(stamp_ns, 'ns'), unit=unit)}Z"
+    second, rest_ns = divmod(stamp_ns, NS_PER_S)
+    whole = (_EPOCH + timedelta(seconds=second)).strftime("%Y-%m-%dT%H:%M:%S")
+    if rest_ns == 0:
+        return f"{whole}Z"
+    return f"{whole}.{rest_ns // 1_000_000:03}Z" if rest_ns % 1_000_000 == 0 else f"{whole}.{rest_ns:09}Z"
 
 
 def from_iso(text: str) -> int:
@@ -76,12 +73,3 @@ def has_zone(text: str) -> bool:
     (True, True, False)
     """
     return text.endswith("Z") or datetime.fromisoformat(text).tzinfo is not None
-
-
-def to_iso_array(stamps_ns: Integers) -> npt.NDArray[np.str_]:
-    """ISO 8601 texts of (n,) stamps, all with the same number of decimals."""
-    unit: Literal["s", "ms", "ns"] = (
-        "s" if not np.any(stamps_ns % NS_PER_S) else "ms" if not np.any(stamps_ns % 1_000_000) else "ns"
-    )
-    texts = np.datetime_as_string(stamps_ns.astype("datetime64[ns]"), unit=unit)
-    return np.char.add(texts, "Z")

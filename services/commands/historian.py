@@ -104,10 +104,10 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Write a recording from the history; needs no running historian."""
+    settings, span, name = with_history(settings_of(config), data), _span(start, end), station_name(station)
     from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import export_recording
 
-    settings, span, name = with_history(settings_of(config), data), _span(start, end), station_name(station)
     with open_store(settings.historian, alone=False, must_exist=True) as store:
         rows = export_recording(store, name, *span, out)
     print_result({"recording": str(out), "station": name, "rows": rows}, as_json=as_json)

@@ -2,13 +2,15 @@
 
 import contextlib
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.services.doctor.finding import Finding
-from wetwell.services.lease.database import LeaseDatabase
-from wetwell.services.lease.table import Standing, standings
 from wetwell.services.runtime.settings import LeaseSettings
+
+if TYPE_CHECKING:
+    from wetwell.services.lease.table import Standing
 
 LEASES_S = 5.0
 """So long the database may take to answer. [s]"""
@@ -20,6 +22,9 @@ async def lease_findings(settings: LeaseSettings) -> list[Finding]:
     """Each role with its owner, since when it is that, and who stands by; nothing without a database of leases."""
     if settings.url is None:
         return []
+    from wetwell.services.lease.database import LeaseDatabase  # noqa: PLC0415 - most sites have no database
+    from wetwell.services.lease.table import standings  # noqa: PLC0415
+
     with contextlib.closing(LeaseDatabase(settings.url.get_secret_value(), settings.password_file, LEASES_S)) as kept:
         try:
             found = await kept.call(standings)
@@ -30,7 +35,7 @@ async def lease_findings(settings: LeaseSettings) -> list[Finding]:
     ]
 
 
-def findings_of(found: Iterable[Standing]) -> Iterator[Finding]:
+def findings_of(found: Iterable["Standing"]) -> Iterator[Finding]:
     """Findings of the roles."""
     for role, lease, now_s, members in found:
         others = [one.holder for one in members if one.age_s < SEEN_S and one.holder != lease.holder]

@@ -1,31 +1,24 @@
 """The schemas by name: of files that people write, and of what programs read."""
 
 from collections.abc import Callable, Mapping
+from pkgutil import resolve_name
 from typing import Any
 
-from pydantic import BaseModel, TypeAdapter
+from pydantic import TypeAdapter
 
 from wetwell.protocols.errors import ConfigError
-from wetwell.protocols.messages.alarm import Alarm
-from wetwell.protocols.messages.sample import Sample
-from wetwell.protocols.messages.verdict import Verdict
-from wetwell.protocols.modbus.device_map import DeviceFile
 from wetwell.protocols.quantities import HAND_COLUMNS, PUMP_QUANTITIES, STATION_QUANTITIES
-from wetwell.protocols.recordings.importers.mapping import TagMapping
-from wetwell.protocols.station.station_file import Station
-from wetwell.services.runtime.settings import Settings
 from wetwell.services.schemas.described import describe, described_schema
 from wetwell.services.schemas.examples import add_examples, examples_of
-from wetwell.sim2real.diagnosis.report import GapReport
-from wetwell.sim2real.recording.preparation import Preparation
-from wetwell.simulator.effects import EFFECTS, AnyEffect
-from wetwell.simulator.scenario import Scenario
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def _station() -> dict[str, Any]:
     """Station file; a table `[[effect]]` is one of the effects of the library, with their parameters."""
+    from wetwell.protocols.station.station_file import Station
+    from wetwell.simulator.effects import EFFECTS, AnyEffect
+
     schema = described_schema(Station)
     effects = TypeAdapter(AnyEffect).json_schema(ref_template="#/$defs/{model}")
     schema["$defs"] |= effects.pop("$defs")
@@ -36,6 +29,8 @@ def _station() -> dict[str, Any]:
 
 def _scenario() -> dict[str, Any]:
     """Scenario file; a recorded inflow may name a recording, whose series then takes the place of its name."""
+    from wetwell.simulator.scenario import Scenario
+
     schema = described_schema(Scenario)
     recorded = schema["$defs"]["RecordedInflow"]
     series = recorded["required"]
@@ -72,28 +67,28 @@ def _value(unit: str, description: str) -> dict[str, Any]:
     return {"type": ["number", "null"], "description": description} | ({"unit": unit} if unit else {})
 
 
-def _read(model: type[BaseModel]) -> Callable[[], dict[str, Any]]:
-    return lambda: described_schema(model)
+def _read(model: str) -> Callable[[], dict[str, Any]]:
+    return lambda: described_schema(resolve_name(model))
 
 
-def _written(model: type[BaseModel]) -> Callable[[], dict[str, Any]]:
-    return lambda: described_schema(model, "serialization")
+def _written(model: str) -> Callable[[], dict[str, Any]]:
+    return lambda: described_schema(resolve_name(model), "serialization")
 
 
 SCHEMAS: Mapping[str, tuple[str, Callable[[], dict[str, Any]]]] = {
     "station": ("station file, TOML", _station),
     "scenario": ("scenario file, TOML", _scenario),
-    "settings": ("settings of the services, TOML", _read(Settings)),
+    "settings": ("settings of the services, TOML", _read("wetwell.services.runtime.settings:Settings")),
     "recording": ("row of a recording, CSV or Parquet", _recording),
-    "mapping": ("mapping of an export, TOML", _read(TagMapping)),
-    "preparation": ("preparation of field data, TOML", _read(Preparation)),
-    "plc": ("PLCs that the gateway polls, TOML", _read(DeviceFile)),
-    "gap-report": ("report.json of a diagnosis", _written(GapReport)),
-    "verdict": ("line of verdicts.jsonl, message on the bus", _written(Verdict)),
-    "sample": ("sample, message on the bus", _written(Sample)),
-    "alarm": ("alarm, message on the bus", _written(Alarm)),
+    "mapping": ("mapping of an export, TOML", _read("wetwell.protocols.recordings.importers.mapping:TagMapping")),
+    "preparation": ("preparation of field data, TOML", _read("wetwell.sim2real.recording.preparation:Preparation")),
+    "plc": ("PLCs that the gateway polls, TOML", _read("wetwell.protocols.modbus.device_map:DeviceFile")),
+    "gap-report": ("report.json of a diagnosis", _written("wetwell.sim2real.diagnosis.report:GapReport")),
+    "verdict": ("line of verdicts.jsonl, message on the bus", _written("wetwell.protocols.messages.verdict:Verdict")),
+    "sample": ("sample, message on the bus", _written("wetwell.protocols.messages.sample:Sample")),
+    "alarm": ("alarm, message on the bus", _written("wetwell.protocols.messages.alarm:Alarm")),
 }
-"""What each describes, and how it is made."""
+"""What each describes, and how it is made. A model is loaded with its schema: all together take half a second."""
 
 
 def schema_named(name: str) -> dict[str, Any]:

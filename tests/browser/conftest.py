@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-import httpx
 import pytest
-from browser_site import CLOGGING, DEADLINE_S, SCENARIO, free_port, until, whole_site
+from browser_site import CLOGGING, SCENARIO, free_port, until, whole_site
 from playwright.sync_api import expect, sync_playwright
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -40,9 +39,7 @@ def site(tmp_path_factory):
     """A site whose pump 2 is told as blocked, to be acted on; then its time goes slowly, which costs little."""
     with whole_site(tmp_path_factory.mktemp("site"), SCENARIO) as place:
         until(lambda: place.stage_of("pump:2") == "act")
-        order = {"speed": CALM_SPEED}
-        answer = httpx.post(f"{place.url}/api/stations/alpha/plant-clock", json=order, timeout=DEADLINE_S)
-        assert answer.json()["speed"] == CALM_SPEED
+        assert place.plant_clock(speed=CALM_SPEED)["speed"] == CALM_SPEED
         yield place
 
 

@@ -6,6 +6,7 @@ import signal
 from importlib.resources import files
 
 import pytest
+from browser_site import until
 from playwright.sync_api import expect
 
 from wetwell.services.security.tokens import new_token
@@ -43,6 +44,30 @@ def test_live_values_move_and_pumps_turn(site, open_page) -> None:
     expect(page.locator(".pump.runs").first).to_be_visible(timeout=SLOW_MS)
     name = page.locator(".pump.runs .impeller").first.evaluate("node => getComputedStyle(node).animationName")
     assert name in {"turn", "none"}  # none: the pump has stopped meanwhile
+
+
+def test_the_plant_is_held_let_go_and_slowed_down(site, open_page) -> None:
+    page = open_page(f"{site.url}/station/alpha")
+    clock = page.get_by_role("group", name="Clock of the simulated plant")
+    level = page.locator(".well .big")
+    expect(clock).to_be_visible(timeout=SLOW_MS)
+    clock.get_by_role("button", name="hold").click()
+    try:
+        expect(clock.get_by_role("button", name="go on")).to_have_attribute("aria-pressed", "true", timeout=SLOW_MS)
+        held = level.text_content()
+        page.wait_for_timeout(2_000)  # of a plant that stands nothing comes that one could wait for
+        assert level.text_content() == held
+    finally:
+        clock.get_by_role("button", name="go on").click()
+    expect(clock.get_by_role("button", name="hold")).to_have_attribute("aria-pressed", "false", timeout=SLOW_MS)
+    expect(level).not_to_have_text(held, timeout=SLOW_MS)
+    speed = clock.get_by_label("Speed of the plant")
+    before = site.plant_clock()["speed"]
+    try:
+        speed.select_option("10")
+        until(lambda: site.plant_clock()["speed"] == 10.0)
+    finally:
+        site.plant_clock(speed=before)
 
 
 def test_who_wants_no_motion_gets_none(site, open_page) -> None:

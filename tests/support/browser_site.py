@@ -103,6 +103,10 @@ class Site:
         stations = httpx.get(f"{self.url}/api/stations", timeout=10).json()["stations"].values()
         return next((one["cause"]["stage"] for one in stations if (one["cause"] or {}).get("asset") == asset), None)
 
+    def plant_clock(self, **order):
+        """How the clock of the plant stands after an order, or without one."""
+        return httpx.post(f"{self.url}/api/stations/alpha/plant-clock", json=order, timeout=DEADLINE_S).json()
+
     @property
     def url(self):
         return f"http://127.0.0.1:{self.port}"

@@ -93,7 +93,7 @@ def steps_of(path: Path) -> tuple[Step, ...]:
         acts = table["experiments"]
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise ConfigError(f"{path}: has no 'experiments': give a report.json of wetwell gap diagnose") from error
     if not acts:
         raise ConfigError(f"{path}: proposes no experiment")

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S, from_iso, to_iso, to_iso_array
+from wetwell.protocols.recordings.stamp_texts import to_iso_array
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S, from_iso, to_iso
 
 STAMPS = st.integers(-MAX_STAMP_NS, MAX_STAMP_NS)
 

@@ -155,6 +155,14 @@ def test_the_command_line_loads_nothing_that_help_does_not_need():
     assert done.stdout == "[]\n"
 
 
+@pytest.mark.parametrize("name", ["runtime.settings", "runtime.client", "doctor.leases", "schemas.registry"])
+def test_what_a_command_needs_to_ask_and_to_check_its_settings_loads_no_arrays(name):
+    heavy = ("numba", "numpy", "pandas", "psycopg", "pyarrow", "scipy")
+    code = f"import sys, wetwell.services.{name}; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout == "[]\n"
+
+
 @pytest.mark.parametrize(
     "environment",
     [
