@@ -63,7 +63,7 @@ def test_the_plant_is_held_let_go_and_slowed_down(site, open_page) -> None:
     speed = clock.get_by_label("Speed of the plant")
     before = site.plant_clock()["speed"]
     try:
-        with page.expect_response("**/plant-clock"):  # nothing of the page goes on while the test asks the site itself
+        with page.expect_response("**/plant-clock"):  # the page stands while the test asks the site
             speed.select_option("10")
         assert site.plant_clock()["speed"] == 10.0
     finally:
