@@ -1,6 +1,7 @@
 """Which state explains a run: normal, pump, system, both, or a meter that is wrong."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,20 +44,50 @@ _FAULTS = [PUMP_FAULT, SYSTEM_FAULT, BOTH]
 
 
 class _Table(NamedTuple):
-    """Ways to shift: of each its hypothesis, the scales of new faults, the curves that one that is carried moves."""
+    """Ways to shift, w of them: each hypothesis at each scale, with each way to disturb its witnesses.
 
-    hypotheses: Integers
+    Attributes
+    ----------
+    new : (w, 2) array
+        Variances of new shifts of both curves, as shares of that of the usual fault.
+    moves, is_old : (w, 2) arrays
+        Which curves it moves, and which of them as far as the fault that is carried.
+    slopes : (w, 2) array
+        Of which curve the slope counts: the flow was moved along it, or what is carried was seen at another flow.
+    meter_scale : (w,) array
+        Variance of the error of the meter, as a share of the usual one.
+    flow, head : arrays
+        Ways of either meter.
+    witnesses : (w, 2) array
+        Variances of what disturbs drawdown and power.
+    log_share, log_witnesses : (w,) arrays
+        Of the share of its scale, and of its witnesses, in its hypothesis.
+    is_of : (6, w) array
+        Of which hypothesis it is.
+    first : (6,) array
+        The way of each hypothesis at full scale, of which no witness is disturbed.
+    """
+
     new: Floats
     moves: Flags
     is_old: Flags
+    slopes: Flags
+    meter_scale: Floats
     flow: Integers
     head: Integers
+    witnesses: Floats
     log_share: Floats
+    log_witnesses: Floats
     is_of: Flags
+    first: Integers
 
 
-def _table(*, carried: bool) -> _Table:
-    """Ways of new faults, of each hypothesis the one at full scale before the others, then those that are carried."""
+@cache
+def _table(*, carried: bool, drawdown: bool, power: bool) -> _Table:
+    """Ways of new faults, of each hypothesis the one at full scale before the others, then those that are carried.
+
+    Whether the drawdown and the power are known says in how many ways the witnesses may be disturbed.
+    """
     rows: list[tuple[int, float, float, bool, bool]] = [(NORMAL, 0.0, 0.0, False, False)]
     for scale in SCALES:
         rows += [(PUMP_FAULT, scale, 0.0, False, False), (SYSTEM_FAULT, 0.0, scale, False, False)]
@@ -66,21 +97,33 @@ def _table(*, carried: bool) -> _Table:
         for scale in SCALES:
             rows += [(BOTH, 0.0, scale, True, False), (BOTH, scale, 0.0, False, True)]
         rows.append((BOTH, 0.0, 0.0, True, True))
-    hypotheses = np.array([row[0] for row in rows])
-    new = np.array([row[1:3] for row in rows])
+    causes = np.array([row[0] for row in rows])
+    disturbed = np.array([1.0 - DISTURBED_SHARE, DISTURBED_SHARE] if drawdown else [1.0])
+    moving = np.where(causes < FLOW_METER, LOAD_SHARE, DISTURBED_SHARE)
+    powers = np.column_stack([1.0 - moving, moving]) if power else np.ones((len(rows), 1))
+    share = disturbed[:, np.newaxis] * powers[:, np.newaxis]
+    witnesses = np.zeros((*share.shape, 2))
+    witnesses[:, 1:, :, 0] = DISTURBED_DRAWDOWN**2
+    witnesses[:, :, 1:, 1] = POWER_SHIFT**2
+    way = np.repeat(np.arange(len(rows)), share[0].size)
+    hypotheses, scales = causes[way], np.array([row[1:3] for row in rows])[way]
+    moves = np.column_stack([np.isin(hypotheses, (PUMP_FAULT, BOTH)), np.isin(hypotheses, (SYSTEM_FAULT, BOTH))])
+    is_old = np.array([row[3:] for row in rows])[way]
+    is_of = hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis]
     return _Table(
-        hypotheses=hypotheses,
-        new=new,
-        moves=np.column_stack([np.isin(hypotheses, (PUMP_FAULT, BOTH)), np.isin(hypotheses, (SYSTEM_FAULT, BOTH))]),
-        is_old=np.array([row[3:] for row in rows]),
+        new=moves * scales,
+        moves=moves,
+        is_old=is_old,
+        slopes=moves[:, ::-1] | is_old,
+        meter_scale=scales[:, 0],
         flow=np.flatnonzero(hypotheses == FLOW_METER),
         head=np.flatnonzero(hypotheses == HEAD_SENSOR),
-        log_share=np.where(new.any(axis=1), -np.log(len(SCALES)), 0.0),
-        is_of=hypotheses == np.arange(HEAD_SENSOR + 1)[:, np.newaxis],
+        witnesses=witnesses.reshape(-1, 2),
+        log_share=np.where(scales.any(axis=1), -np.log(len(SCALES)), 0.0),
+        log_witnesses=np.log(share).ravel(),
+        is_of=is_of,
+        first=is_of.argmax(axis=1),
     )
-
-
-_NEW, _CARRIED = _table(carried=False), _table(carried=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,48 +187,30 @@ class Carried:
 
 
 def _ways(
-    observation: Observation, scales: Scales, known: Flags, carried: Carried | None
-) -> tuple[Flags, Floats, Floats, Floats]:
-    """Each way to shift: (6, w) of which hypothesis, (w,) log of its share in that, (w, 4) mean, (w, 4, 4) spread.
-
-    The first way of each hypothesis is the one at full scale.
-    """
-    table = _NEW if carried is None else _CARRIED
-    new, moves = table.new, table.moves
-    v_p, v_s = observation.slope_variance
+    observation: Observation, scales: Scales, table: _Table, carried: Carried | None
+) -> tuple[Floats, Floats, Floats]:
+    """Each way to shift: (w,) log of its share in its hypothesis, (w, 4) mean, (w, 4, 4) spread."""
     log_share = table.log_share
-    offset, spread = np.zeros((len(new), 4)), np.zeros((len(new), 4, 4))
-    tau_p, tau_s = scales.pump_m**2, scales.system_m**2
-    slopes = moves[:, ::-1] | table.is_old  # what is carried was seen at another flow
-    spread[:, PUMP, PUMP] = (
-        moves[:, 0] * new[:, 0] * tau_p
-        + moves[:, 1] * new[:, 1] * tau_s * observation.system_in_pump**2
-        + slopes[:, 0] * v_p
-    )
-    spread[:, SYSTEM, SYSTEM] = moves[:, 1] * new[:, 1] * tau_s + slopes[:, 1] * v_s
-    for meter, variance, way in (
+    offset, spread = np.zeros((len(log_share), 4)), np.zeros((len(log_share), 4, 4))
+    tau = np.array([scales.pump_m**2, scales.system_m**2])
+    variance = table.new * tau
+    variance[:, PUMP] += variance[:, SYSTEM] * observation.system_in_pump**2
+    variance += table.slopes * observation.slope_variance
+    if carried is not None:
+        offset[:, : SYSTEM + 1] = table.is_old * carried.mean_m
+        variance += table.is_old * carried.variance_m2
+        log_old, log_new = np.log(np.maximum([carried.share, 1.0 - carried.share], 1e-300))
+        log_share = log_share + (np.where(table.is_old, log_old, log_new) * table.moves).sum(axis=1)
+    spread[:, PUMP, PUMP], spread[:, SYSTEM, SYSTEM] = variance.T
+    for meter, meter_variance, way in (
         (table.flow, FLOW_METER_ERROR**2, observation.flow_meter),
         (table.head, scales.head_m**2, observation.head_sensor),
     ):
-        spread[meter] = new[meter, :1, np.newaxis] * variance * (way[:, np.newaxis] * way)
-    if carried is not None:
-        offset[:, : SYSTEM + 1] = table.is_old * carried.mean_m
-        spread[:, PUMP, PUMP] += table.is_old[:, 0] * carried.variance_m2[0]
-        spread[:, SYSTEM, SYSTEM] += table.is_old[:, 1] * carried.variance_m2[1]
-        log_old, log_new = np.log(np.maximum([carried.share, 1.0 - carried.share], 1e-300))
-        log_share = log_share + (np.where(table.is_old, log_old, log_new) * moves).sum(axis=1)
-    disturbed = (1.0 - DISTURBED_SHARE, DISTURBED_SHARE) if known[DRAWDOWN] else (1.0,)
-    witnesses = 2 * len(disturbed) if known[POWER] else len(disturbed)
-    ways = np.repeat(spread, witnesses, axis=0).reshape(len(new), len(disturbed), -1, 4, 4)
-    ways[:, 1:, :, DRAWDOWN, DRAWDOWN] += DISTURBED_DRAWDOWN**2
-    ways[:, :, 1:, POWER, POWER] += POWER_SHIFT**2
-    share = np.array(disturbed)[:, np.newaxis]
-    if known[POWER]:
-        moving = np.where(table.hypotheses < FLOW_METER, LOAD_SHARE, DISTURBED_SHARE)
-        share = share * np.column_stack([1.0 - moving, moving])[:, np.newaxis]
-    log_each = np.broadcast_to(log_share[:, np.newaxis, np.newaxis] + np.log(share), ways.shape[:3]).ravel()
-    is_of = np.repeat(table.is_of, witnesses, axis=1)
-    return is_of, log_each, np.repeat(offset, witnesses, axis=0), ways.reshape(-1, 4, 4)
+        meter_scale = table.meter_scale[meter, np.newaxis, np.newaxis]
+        spread[meter] = meter_scale * meter_variance * (way[:, np.newaxis] * way)
+    spread[:, DRAWDOWN, DRAWDOWN] += table.witnesses[:, 0]
+    spread[:, POWER, POWER] += table.witnesses[:, 1]
+    return log_share + table.log_witnesses, offset, spread
 
 
 def _log_sums(log_values: Floats) -> Floats:
@@ -236,16 +261,17 @@ def posterior_of(
     carried : Carried, optional
         Faults of which the size is known; without it every fault is a new one.
     """
-    known = np.isfinite(observation.mean) & np.isfinite(np.diag(observation.covariance))
+    known = np.isfinite(observation.mean) & np.isfinite(observation.covariance.diagonal())
     mean = observation.mean[known]
-    is_of, log_share, offset, spread = _ways(observation, scales, known, carried)
-    every = spread[:, known][:, :, known] + observation.covariance[np.ix_(known, known)]
+    table = _table(carried=carried is not None, drawdown=bool(known[DRAWDOWN]), power=bool(known[POWER]))
+    log_share, offset, spread = _ways(observation, scales, table, carried)
+    every = (spread + observation.covariance).compress(known, axis=1).compress(known, axis=2)
     _, log_determinant = np.linalg.slogdet(every)
     inverse = np.linalg.inv(every)
-    error = mean - offset[:, known]
+    error = mean - offset.compress(known, axis=1)
     log_each = log_share - 0.5 * (log_determinant + np.einsum("hi,hij,hj->h", error, inverse, error))
-    log_likelihood = _log_sums(np.where(is_of, log_each, -np.inf))
-    inverse = inverse[is_of.argmax(axis=1)]
+    log_likelihood = _log_sums(np.where(table.is_of, log_each, -np.inf))
+    inverse = inverse[table.first]
     estimates, deviations = _shifts(observation, scales, inverse, mean)
     is_losing, is_rising = ndtr(-estimates[PUMP] / deviations[PUMP]), ndtr(estimates[SYSTEM] / deviations[SYSTEM])
     usual_pump = 2.0 * (LOSING_SHARE * is_losing + (1.0 - LOSING_SHARE) * (1.0 - is_losing))
