@@ -48,14 +48,14 @@ class AssetBelief:
         """Whether the size that is carried is that of the fault which stands: what an early look told is not yet."""
         return self.since_ns is not None and abs(self.track.size[0]) >= CLEARED_SHARE * self.told_size
 
-    def tell(self, onset_ns: int, size: float) -> None:
-        """Note that a run has shown the asset to be at fault, by so much."""
+    def tell(self, onset_ns: int) -> None:
+        """Note that the last run has shown the asset to be at fault."""
         if self.since_ns is None:
-            self.since_ns, self.told_size = onset_ns, abs(size)
+            self.since_ns, self.told_size = onset_ns, abs(self.track.size[0])
 
-    def look(self, size: float) -> None:
-        """Note that a run has shown no fault: one that was told goes if little is left of its size."""
-        if self.since_ns is not None and abs(size) < CLEARED_SHARE * self.told_size:
+    def look(self) -> None:
+        """Note that the last run has shown no fault: one that was told goes if little is left of its size."""
+        if self.since_ns is not None and abs(self.track.size[0]) < CLEARED_SHARE * self.told_size:
             self.clear()
 
     def clear(self) -> None:

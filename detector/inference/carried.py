@@ -46,8 +46,8 @@ def carry(
     """
     if observation.system_in_pump != 0.0 or friction_m <= 0.0:
         return joint_prior(pump, system), None
-    disturbance = np.diag(run_covariance)
-    own_m2 = np.diag(observation.covariance)
+    disturbance = run_covariance.diagonal()
+    own_m2 = observation.covariance.diagonal()[: SYSTEM + 1]
     lost_m, lost_m2 = pump.asset.track.foretold(time_ns, scales.pump_m, disturbance[PUMP])
     rise, variance = system.asset.track.foretold(
         time_ns, scales.system_m / friction_m, disturbance[SYSTEM] / friction_m**2
@@ -56,7 +56,7 @@ def carry(
     mean_m = np.array([-lost_m, rise * friction_m - change_m])
     variance_m2 = np.array([lost_m2, variance * friction_m**2 + change_m**2])
     is_known = np.array([asset.track.time_ns is not None for asset in (pump.asset, system.asset)])
-    is_fault = is_known * _beyond(mean_m, variance_m2, np.sqrt(own_m2[[PUMP, SYSTEM]]))
+    is_fault = is_known * _beyond(mean_m, variance_m2, np.sqrt(own_m2))
     begun = CHANGE_PER_RUN * np.array([PUMP_PRIOR, SYSTEM_PRIOR])
     chance = np.array([pump.pump, system.system])
     share = np.maximum(chance - begun, 0.0) / chance * is_fault

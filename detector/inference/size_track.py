@@ -18,8 +18,10 @@ DISTURBANCE_DAYS = 0.25
 """Time after which what disturbs runs is forgotten: that of a daily wave, a quarter of its period. [d]"""
 WEIGHT_DAYS = 4.0
 """Time after which what the filters of the bank have been worth is forgotten. [d]"""
-JUMP_SCALES = (1.0, 0.02)
+JUMP_SCALES = np.array([1.0, 0.02])
 """Variances of faults that appear at once, as shares of that of the usual size: large, and just begun."""
+_GROWTH_DIVISORS = np.array([[3.0, 2.0], [2.0, 1.0]])
+"""Of the powers of time in the covariance of size and rate that white noise of the growth makes."""
 
 
 @dataclass(slots=True)
@@ -111,7 +113,7 @@ class SizeTrack:
         log_carried = _log_sum(log_each)
         own = variance + disturbance
         log_gone = math.log(change_share) - 0.5 * (math.log(own) + value**2 / own)
-        jumps = own + scale**2 * np.array(JUMP_SCALES)
+        jumps = own + scale**2 * JUMP_SCALES
         log_jump = math.log(change_share**2 / len(jumps)) + _log_sum(-0.5 * (np.log(jumps) + value**2 / jumps))
         was_strange, self.is_strange = self.is_strange, max(log_gone, log_jump) > log_carried
         is_anew = self.is_strange and (is_sure or was_strange)
@@ -158,10 +160,8 @@ class SizeTrack:
         step = np.array([[1.0, days, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, kept]])
         covariance = step @ self.covariance @ step.T
         change = (RATE_CHANGES * scale) ** 2
-        covariance[:, SIZE, SIZE] += change * days**3 / 3.0
-        covariance[:, SIZE, RATE] += change * days**2 / 2.0
-        covariance[:, RATE, SIZE] += change * days**2 / 2.0
-        covariance[:, RATE, RATE] += change * days
+        powers = np.array([[days**3, days**2], [days**2, days]])
+        covariance[:, : RATE + 1, : RATE + 1] += change[:, np.newaxis, np.newaxis] * powers / _GROWTH_DIVISORS
         covariance[:, DISTURBANCE, DISTURBANCE] += (1.0 - kept**2) * disturbance
         log_weight = math.exp(-days / WEIGHT_DAYS) * self.log_weight
         return self.mean @ step.T, covariance, _normalised(log_weight)

@@ -100,9 +100,9 @@ def believe(pump: AssetBelief, main: AssetBelief, weighed: Weighed, state: State
         _believe_main(main, weighed, is_headless=is_headless, is_sure=changed[1])
     for asset, states in assets:
         if state in states:
-            asset.tell(onset_ns, asset.track.size[0])
+            asset.tell(onset_ns)
         elif state != "unknown":
-            asset.look(asset.track.size[0])
+            asset.look()
 
 
 def _believe_pump(pump: AssetBelief, weighed: Weighed, *, is_headless: bool, is_sure: bool) -> None:
