@@ -19,7 +19,6 @@ from wetwell.detector.inference.posterior import (
     FAULT_STATES,
     PUMP_FAULT,
     SYSTEM_FAULT,
-    Posterior,
     fault_scales,
 )
 from wetwell.detector.inference.prior import SystemPrior, update_prior
@@ -34,6 +33,7 @@ from wetwell.detector.verdict.asset_faults import AssetFaults, StageRules
 from wetwell.detector.verdict.evidence import run_evidence, shift_evidence
 from wetwell.detector.verdict.maintenance import advice, expected_costs
 from wetwell.detector.verdict.severity import severity
+from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.verdict import AssetFault, Severity, State
 from wetwell.protocols.station.costs import Costs
 
@@ -196,7 +196,7 @@ class PumpJudge:
         evidence: dict[str, Any] = {"steady_samples": len(run.time_s), "early": True}
         weighed = self._weigh(run, reference, system, evidence)
         posterior = weighed.posterior
-        state, remark = decide(posterior, float(median(run.head_m)))
+        state, remark = decide(posterior, weighed.point.head_m)
         fault = posterior.probability[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum()
         previous, memory.early = memory.early, state if state in FAULT_STATES and fault > EARLY_PROBABILITY else None
         if memory.early is None or memory.early != previous or state == memory.state:
@@ -207,7 +207,7 @@ class PumpJudge:
         memory.recent.pop()
         evidence |= run_evidence(run, self._datasheet, rng)
         evidence |= self._index(run, reference, rng)
-        evidence |= self._consequences(run, reference, posterior, posterior.by_state(), state, remark)
+        evidence |= self._consequences(run, reference, weighed, posterior.by_state(), state, remark)
         pump, main = deepcopy(memory.prior.asset), deepcopy(system.asset)  # the whole run will be taken in at its end
         believe(pump, main, weighed, state, memory.onset_ns or run.window_ns[0])
         for asset, copy in ((memory.prior.asset, pump), (system.asset, main)):
@@ -284,7 +284,7 @@ class PumpJudge:
         weighed = self._weigh(run, reference, system, evidence)
         posterior = weighed.posterior
         update_prior(posterior.probability, memory.prior, system, lacks_head=run.lacks_head)
-        state, remark = decide(posterior, float(median(run.head_m)))
+        state, remark = decide(posterior, weighed.point.head_m)
         memory.recent.append((sum(run.window_ns) // 2, posterior.shift_m))
         wrong = doubtful_sensors(run, reference)
         evidence |= wrong
@@ -301,7 +301,7 @@ class PumpJudge:
         probability = posterior.by_state()
         if state == "sensor_fault" and wrong:
             probability |= {"normal": 0.0, "sensor_fault": probability["normal"] + probability["sensor_fault"]}
-        evidence |= self._consequences(run, reference, posterior, probability, state, remark)
+        evidence |= self._consequences(run, reference, weighed, probability, state, remark)
         for asset in (memory.prior.asset, system.asset):
             if asset.since_ns is not None:
                 asset.wasted_kwh[self._pump] = evidence["wasted_kwh_per_day"]
@@ -344,19 +344,18 @@ class PumpJudge:
         self,
         run: Run,
         reference: HealthyReference,
-        posterior: Posterior,
+        weighed: Weighed,
         probability: Mapping[State, float],
         state: State,
         remark: str | None,
     ) -> dict[str, Any]:
         """Severity, advice and expected costs."""
-        flow_m3h = float(median(run.segments.flow_m3h))
-        friction_m = self._friction_h2_m5 * float(median(run.segments.total_m3h)) ** 2
+        posterior, point = weighed.posterior, weighed.point
         healthy_m3h = reference.baseline.explained_flows(run.segments)[0]
-        power_kw = float(np.nanmean(run.power_kw)) if np.isfinite(run.power_kw).any() else 0.0
+        power_kw = _mean_power(run.power_kw)
         run_share = run.run_s / max(run.seen_s, 1.0)
-        wasted_kwh = power_kw * 24.0 * run_share * max(1.0 - flow_m3h / max(healthy_m3h, 1e-9), 0.0)
-        figures = severity(posterior.shift_m, posterior.deviation_m, self._curve, flow_m3h, friction_m)
+        wasted_kwh = power_kw * 24.0 * run_share * max(1.0 - point.flow_m3h / max(healthy_m3h, 1e-9), 0.0)
+        figures = severity(posterior.shift_m, posterior.deviation_m, self._curve, point.flow_m3h, point.friction_m)
         if run.lacks_head:  # each as if it were the only cause
             figures = {name: figure for name, figure in figures.items() if state in CAUSE_OF[name]}
         return {
@@ -377,6 +376,14 @@ class PumpJudge:
 def _generator(run: Run) -> np.random.Generator:
     """What resamples of a run are drawn with: the same whenever it is judged."""
     return np.random.default_rng(abs(run.window_ns[0]) + run.pump)
+
+
+def _mean_power(power_kw: Floats) -> float:
+    """Mean of the readings that are known; 0 without any."""
+    known = ~np.isnan(power_kw)
+    if not known.any():
+        return 0.0
+    return float(np.where(known, power_kw, 0.0).sum() / np.count_nonzero(known))
 
 
 def _errors_of(wrong: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

@@ -27,7 +27,8 @@ class Kernel(Generic[P, R]):
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Call the machine code."""
-        return cast("R", self.dispatcher(*args, **kwargs))
+        result: R = self.dispatcher(*args, **kwargs)
+        return result
 
     def __reduce__(self) -> str:
         """By name, as a function: each process compiles for itself, or loads what is on disk."""

@@ -49,10 +49,10 @@ class Model:
     mean: Floats
     covariance: Floats
 
-    def at(self, point: Floats) -> tuple[float, float]:
-        """Residual at an operating point (p,), and the variance of that. [m, m²]."""
-        basis = np.concatenate(([1.0], point - self.origin))
-        return float(basis @ self.mean), float(basis @ self.covariance @ basis)
+    def variance_at(self, *point: float) -> float:
+        """Variance of the residual at an operating point of p numbers. [m²]."""
+        basis = np.array([1.0, *(at - origin for at, origin in zip(point, self.origin.tolist(), strict=True))])
+        return float(basis @ self.covariance @ basis)
 
     def along(self, points: Floats) -> tuple[Floats, Floats]:
         """(m,) residuals at operating points (m, p), and the variances of them. [m, m²]."""
@@ -118,18 +118,16 @@ class Baseline:
     def shifts(self, segments: Segments) -> Floats:
         """(m, 2) distance of segments from what the baseline expects at their operating points. [m]."""
         shifts_m = np.empty((len(segments), 2))
-        level_m = self.level_m if math.isfinite(self.level_m) else 0.0
         _subtract_expected(
-            *(segments.residual_m, segments.flow_m3h, segments.total_m3h, segments.level_m, level_m),
+            *(segments.residual_m, segments.flow_m3h, segments.total_m3h, segments.level_m, self._usual_level_m),
             *(self.pump.origin, self.pump.mean, self.system.origin, self.system.mean, shifts_m),
         )
         return shifts_m
 
     def deviations(self, runs: Sequence[Segments]) -> Floats:
         """(runs, 2) distance of the means of healthy runs from what is expected at the datasheet's flows. [m]."""
-        level_m = self.level_m if np.isfinite(self.level_m) else 0.0
         slopes = np.array([self.pump.mean[-1], self.system.mean[-1]])
-        at_level = np.full(len(runs), level_m)
+        at_level = np.full(len(runs), self._usual_level_m)
         flow_m3h = self.duty_fit[0] + self.duty_fit[1] * _means(runs, "duty_m3h")
         total_m3h = self.duty_total_fit[0] + self.duty_total_fit[1] * _means(runs, "duty_total_m3h")
         means = np.array([_without_level(run, slopes, self.level_m).mean(axis=0) for run in runs])
@@ -149,11 +147,11 @@ class Baseline:
 
     def variances(self, flow_m3h: float, total_m3h: float, level_m: float) -> Floats:
         """(2,) variances of what is expected at an operating point. [m²]."""
-        level = self._levels(np.array([level_m]))
+        level_m = self._usual_level_m if math.isnan(level_m) else level_m
         return np.array(
             [
-                self.pump.at(_pump_points(np.array([flow_m3h]), level)[0])[1],
-                self.system.at(_system_points(np.array([total_m3h]), level)[0])[1],
+                self.pump.variance_at(flow_m3h, flow_m3h * flow_m3h, level_m),
+                self.system.variance_at(total_m3h * total_m3h, level_m),
             ]
         )
 
@@ -169,12 +167,14 @@ class Baseline:
         deviation_m = segments.residual_m - segments.residual_m.mean(axis=0)
         recent = deviation_m.T @ deviation_m / (len(segments) - 1) * self.correlation_factor
         recent += np.eye(2) * (LEAST_NOISE_SHARE * shutoff_head_m) ** 2
-        limit = 4.0 * np.trace(self.segment_covariance)
-        recent *= min(1.0, limit / max(float(np.trace(recent)), 1e-300))
+        limit = 4.0 * float(self.segment_covariance.trace())
+        recent *= min(1.0, limit / max(float(recent.trace()), 1e-300))
         return replace(self, segment_covariance=(1.0 - weight) * self.segment_covariance + weight * recent)
 
-    def _levels(self, level_m: Floats) -> Floats:
-        return np.where(np.isnan(level_m), self.level_m if np.isfinite(self.level_m) else 0.0, level_m)
+    @property
+    def _usual_level_m(self) -> float:
+        """Mean level while the pump ran; 0 where none was measured."""
+        return self.level_m if math.isfinite(self.level_m) else 0.0
 
 
 def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Baseline:

@@ -53,7 +53,7 @@ class Observation:
     @property
     def sigmas(self) -> Floats:
         """(4,) shift over its standard deviation."""
-        sigmas: Floats = self.mean / np.sqrt(np.diag(self.covariance))
+        sigmas: Floats = self.mean / np.sqrt(self.covariance.diagonal())
         return sigmas
 
 
@@ -124,6 +124,6 @@ def _noise(shifts_m: Floats, covariance: Floats, correlation_factor: float) -> F
     """Covariance of the median of the segments of a run, from that of one segment."""
     if len(shifts_m) >= MIN_STEPS:
         own = step_variance(shifts_m) * correlation_factor
-        covariance = covariance * max(1.0, float(np.max(own / np.diag(covariance))) / NOISIER_FACTOR)
+        covariance = covariance * max(1.0, float((own / covariance.diagonal()).max()) / NOISIER_FACTOR)
     noise: Floats = covariance * (np.pi / 2.0 / len(shifts_m))
     return noise

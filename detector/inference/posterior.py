@@ -310,7 +310,7 @@ def _shifts(observation: Observation, scales: Scales, inverse: Floats, mean: Flo
     """
     tau = np.array([scales.pump_m**2, scales.system_m**2])
     if observation.system_in_pump == 0.0:
-        estimates, shares = (inverse[BOTH] @ mean)[: SYSTEM + 1], np.diag(inverse[BOTH])[: SYSTEM + 1]
+        estimates, shares = (inverse[BOTH] @ mean)[: SYSTEM + 1], inverse[BOTH].diagonal()[: SYSTEM + 1]
     else:
         gains = np.array([1.0, observation.system_in_pump])
         alone = inverse[[PUMP_FAULT, SYSTEM_FAULT]]

@@ -18,7 +18,7 @@ DISTURBANCE_DAYS = 0.25
 """Time after which what disturbs runs is forgotten: that of a daily wave, a quarter of its period. [d]"""
 WEIGHT_DAYS = 4.0
 """Time after which what the filters of the bank have been worth is forgotten. [d]"""
-JUMP_SCALES = np.array([1.0, 0.02])
+JUMP_SCALES = (1.0, 0.02)
 """Variances of faults that appear at once, as shares of that of the usual size: large, and just begun."""
 _GROWTH_DIVISORS = np.array([[3.0, 2.0], [2.0, 1.0]])
 """Of the powers of time in the covariance of size and rate that white noise of the growth makes."""
@@ -113,8 +113,9 @@ class SizeTrack:
         log_carried = _log_sum(log_each)
         own = variance + disturbance
         log_gone = math.log(change_share) - 0.5 * (math.log(own) + value**2 / own)
-        jumps = own + scale**2 * JUMP_SCALES
-        log_jump = math.log(change_share**2 / len(jumps)) + _log_sum(-0.5 * (np.log(jumps) + value**2 / jumps))
+        jumps = [own + share * scale**2 for share in JUMP_SCALES]
+        log_each_jump = [-0.5 * (math.log(jump) + value**2 / jump) for jump in jumps]
+        log_jump = math.log(change_share**2 / len(jumps)) + float(np.logaddexp(*log_each_jump))
         was_strange, self.is_strange = self.is_strange, max(log_gone, log_jump) > log_carried
         is_anew = self.is_strange and (is_sure or was_strange)
         if is_anew:

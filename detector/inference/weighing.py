@@ -57,7 +57,7 @@ class Weighed:
     @property
     def is_by_meter(self) -> bool:
         """Whether what it shows is rather that of a meter that is wrong."""
-        return float(self.posterior.probability[[FLOW_METER, HEAD_SENSOR]].sum()) > 0.5
+        return float(self.posterior.probability[FLOW_METER] + self.posterior.probability[HEAD_SENSOR]) > 0.5
 
     def meter_error(self, pump: int) -> dict[str, tuple[float, float]]:
         """The meter of a pump (from 0) that is wrong: its relative error, and the standard deviation of that."""

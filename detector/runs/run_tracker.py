@@ -87,7 +87,7 @@ class RunTracker:
     def newly_blind_runs(self) -> list[Run]:
         """Open runs that have lacked a needed signal since their start, `BLIND_S` ago; each is given once."""
         blind = np.flatnonzero(self.state.pumps["is_blind"]).tolist()
-        return [self._handed_over(pump) for pump in blind]
+        return [self._handed_over(pump, self._steady_of(pump)) for pump in blind]
 
     def gathered_pumps(self) -> list[int]:
         """Pumps that lack signals, and have just filled a segment of what is left."""
@@ -106,7 +106,7 @@ class RunTracker:
         if not self.state.pumps["is_open"][pump]:
             raise ValueError(f"pump {pump} has no open run")
         samples = int(self.state.pumps["samples"][pump])
-        return self._open_run(pump, max(samples - segments * self._segment_samples, 0))
+        return self._open_run(pump, self._steady_of(pump), max(samples - segments * self._segment_samples, 0))
 
     def last_segment(self, pump: int) -> Segments:
         """The last segment of an open run."""
@@ -171,25 +171,26 @@ class RunTracker:
             self.state = self.state._replace(steady_samples=self.state.steady_samples[:needed].copy())
         return ended
 
-    def _handed_over(self, pump: int) -> Run:
+    def _handed_over(self, pump: int, steady: Records) -> Run:
         """The open run with its drawdown, which is told once, as are the readings that were stuck."""
         own = self.state.pumps[pump]
-        run = self._open_run(pump, log_ratio=float(own["log_ratio"]))
+        run = self._open_run(pump, steady, log_ratio=float(own["log_ratio"]))
         own["log_ratio"], own["stuck"] = math.nan, 0
         return run
 
     def _finished(self, pump: int) -> Run:
         """The whole open run; its period says how many samples a segment has from now on."""
-        time_s = self._steady_of(pump)["time_s"]
-        period_s = float(median(np.diff(time_s))) if len(time_s) > 1 else self._step_s
+        steady = self._steady_of(pump)
+        time_s = steady["time_s"]
+        period_s = float(median(time_s[1:] - time_s[:-1])) if len(time_s) > 1 else self._step_s
         if period_s > 0.0:
             samples = min(SEGMENT_SAMPLES, max(1, round(SEGMENT_S / period_s)))
             self.state.sampling_period["segment_samples"] = samples
-        return self._handed_over(pump)
+        return self._handed_over(pump, steady)
 
-    def _open_run(self, pump: int, first: int = 0, *, log_ratio: float = math.nan) -> Run:
+    def _open_run(self, pump: int, steady: Records, first: int = 0, *, log_ratio: float = math.nan) -> Run:
         """The open run from a steady sample on; where that is not the first, its window begins there."""
-        own, steady = self.state.pumps[pump], self._steady_of(pump)[first:]
+        own, steady = self.state.pumps[pump], steady[first:]
         part_ns, seen, time_s = int(own["part_ns"]), int(own["seen"]), steady["time_s"]
         return Run(
             pump=pump,

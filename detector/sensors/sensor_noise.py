@@ -22,11 +22,13 @@ def reading_noise(run: Run) -> Floats:
     """
     if len(run.time_s) <= MIN_DIFFERENCES:
         return np.full(2, math.nan)
-    is_next = np.diff(run.time_s) <= 1.5
+    is_next = run.time_s[1:] - run.time_s[:-1] <= 1.5
     if np.count_nonzero(is_next) < MIN_DIFFERENCES:
         return np.full(2, math.nan)
     noise = [
-        DIFFERENCE_MEDIAN * float(median(np.abs(np.diff(values)[is_next]))) / max(abs(float(values.mean())), 1e-9)
+        DIFFERENCE_MEDIAN
+        * float(median(np.abs((values[1:] - values[:-1]).compress(is_next))))
+        / max(abs(float(values.mean())), 1e-9)
         for values in (run.flow_m3h, run.head_m)
     ]
     return np.array(noise)

@@ -77,7 +77,7 @@ def block_bootstrap_interval(
     starts = rng.integers(0, samples - block + 1, size=(resamples, blocks))
     ends = starts + block
     ends[:, -1] -= blocks * block - samples
-    pump, system = ((sums[ends] - sums[starts]).sum(axis=1) for sums in running)
+    pump, system = ((sums.take(ends) - sums.take(starts)).sum(axis=1) for sums in running)
     total = pump + system
     index = np.full(resamples, 0.5)
     np.divide(pump, total, out=index, where=total > 0.0)

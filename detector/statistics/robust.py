@@ -57,5 +57,5 @@ def step_variance(values: Floats) -> Floats:
     >>> step_variance(np.array([[0.0], [1.0], [0.0], [1.0], [50.0], [51.0]])).round(1).tolist()
     [1.1]
     """
-    variance: Floats = median(np.diff(values, axis=0) ** 2) / STEP_MEDIAN
+    variance: Floats = median((values[1:] - values[:-1]) ** 2) / STEP_MEDIAN
     return variance

@@ -155,8 +155,8 @@ def tangent_residuals(
     slope_p = pump_slope((nominal_flow[1:] + nominal_flow[:-1]) / 2.0, curve)
     slope_s = system_slope((total_flow[1:] + total_flow[:-1]) / 2.0, friction_h2_m5)
     return (
-        np.diff(nominal_head) - slope_p * np.diff(nominal_flow),
-        np.diff(head) - slope_s * np.diff(total_flow),
+        nominal_head[1:] - nominal_head[:-1] - slope_p * (nominal_flow[1:] - nominal_flow[:-1]),
+        head[1:] - head[:-1] - slope_s * (total_flow[1:] - total_flow[:-1]),
     )
 
 

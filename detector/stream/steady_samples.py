@@ -45,10 +45,10 @@ def new_steady_samples(room: int = LEAST_ROOM) -> Records:
 
 @SameTypes
 @compiled
-def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Floats) -> None:
-    """Add the samples of each segment to its sums, one a row; `own` is the pump in the table."""
-    pump_sum_m, system_sum_m, flow_m3h, total_m3h, duty_m3h, duty_total_m3h, level_m, speed_ratio = sums
-    for segment in range(sums.shape[1]):
+def _average_segments(own: Any, steady_samples: Any, samples: int, residual_m: Floats, means: Floats) -> None:
+    """Mean of each segment, in the place of zeros; `own` is the pump in the table."""
+    flow_m3h, total_m3h, duty_m3h, duty_total_m3h, level_m, speed_ratio = means
+    for segment in range(means.shape[1]):
         for at in range(segment * samples, (segment + 1) * samples):
             steady = steady_samples[at]
             pump_m, system_m = distances(
@@ -56,19 +56,23 @@ def _sum_segments(own: Any, steady_samples: Any, samples: int, sums: Floats) -> 
                 *(own["c0"], own["c1"], own["c2"], static_head_at_m(own, steady["level_m"]), own["friction_h2_m5"]),
             )
             is_closed = steady["total_m3h"] < NO_FLOW_SHARE * own["runout_m3h"] and system_m < 0.0
-            pump_sum_m[segment] += pump_m
-            system_sum_m[segment] += 0.0 if is_closed else system_m
+            residual_m[segment, 0] += pump_m
+            residual_m[segment, 1] += 0.0 if is_closed else system_m
             flow_m3h[segment] += steady["flow_m3h"] / steady["speed_ratio"]
             total_m3h[segment] += steady["total_m3h"]
             duty_m3h[segment] += steady["duty_m3h"]
             duty_total_m3h[segment] += steady["duty_total_m3h"]
             level_m[segment] += steady["level_m"]
             speed_ratio[segment] += steady["speed_ratio"]
+        for residual in range(residual_m.shape[1]):
+            residual_m[segment, residual] /= samples
+        for quantity in range(means.shape[0]):
+            means[quantity, segment] /= samples
 
 
 def segment_averages(own: Any, steady_samples: Any, samples: int) -> tuple[Floats, dict[str, Floats]]:
     """(m, 2) mean residuals of the segments of so many samples, and their other means by name; a rest is left out."""
-    sums = np.zeros((2 + len(SEGMENT_MEANS), len(steady_samples) // samples))
-    _sum_segments(own, steady_samples, samples, sums)
-    sums /= samples
-    return np.ascontiguousarray(sums[:2].T), dict(zip(SEGMENT_MEANS, sums[2:], strict=True))
+    segments = len(steady_samples) // samples
+    residual_m, means = np.zeros((segments, 2)), np.zeros((len(SEGMENT_MEANS), segments))
+    _average_segments(own, steady_samples, samples, residual_m, means)
+    return residual_m, dict(zip(SEGMENT_MEANS, means, strict=True))

@@ -31,6 +31,8 @@ def new_stuck_sensors(pumps: int) -> Records:
 
 def stuck_names(pump: int, bits: int) -> list[str]:
     """Names of the readings that were stuck in a run of a pump (from 0)."""
+    if not bits:
+        return []
     names = ("level_m", *(pump_column(pump + 1, name) for name in PUMP_METERS))
     return sorted(name for bit, name in enumerate(names) if bits >> bit & 1)
 
