@@ -110,7 +110,9 @@ class RunTracker:
 
     def last_segment(self, pump: int) -> Segments:
         """The last segment of an open run."""
-        return self._segments(pump, self._steady_of(pump)[-self._segment_samples :])
+        steady = self._steady_samples()
+        last = (steady["pump"] == pump).nonzero()[0][-self._segment_samples :]
+        return self._segments(pump, steady.take(last))
 
     def missing_now(self, pump: int) -> list[str]:
         """Needed signals that the last sample lacks of a pump."""
@@ -213,8 +215,12 @@ class RunTracker:
             lacks_head=bool(self.state.lacks_head[pump]),
         )
 
+    def _steady_samples(self) -> Records:
+        """Those of all open runs."""
+        return self.state.steady_samples[: count_steady(self.state.pumps)]
+
     def _steady_of(self, pump: int) -> Records:
-        steady = self.state.steady_samples[: count_steady(self.state.pumps)]
+        steady = self._steady_samples()
         own: Records = steady.compress(steady["pump"] == pump)  # a third of the time of indexing with a mask
         return own
 

@@ -21,7 +21,7 @@ def block_bootstrap_interval(
     \psi^* = \text{n residuals in blocks of } l \text{ neighbours, drawn with replacement}$$
 
     Both residuals of an instant stay together, and neighbours stay neighbours, so correlation within a block's length
-    widens the interval as it must. Sums over blocks come from running sums: O(n + resamples · n / block), no copies.
+    widens the interval as it must. Sums over blocks come from running sums: O(n + resamples · n / block).
 
     If nothing moves in a resample its index is 0.5; two series of zeros give (0.5, 0.5). One block as long as the
     series leaves nothing to draw and gives an interval of width 0, and so does a series of length 1.
@@ -75,9 +75,12 @@ def block_bootstrap_interval(
     running = np.concatenate((np.zeros((2, 1)), np.cumsum(moved, axis=1)), axis=1)
     blocks = -(-samples // block)
     starts = rng.integers(0, samples - block + 1, size=(resamples, blocks))
-    ends = starts + block
-    ends[:, -1] -= blocks * block - samples
-    pump, system = ((sums.take(ends) - sums.take(starts)).sum(axis=1) for sums in running)
+    first = running[:, : samples - block + 1]
+    left_out = blocks * block - samples
+    drawn = (running[:, block:] - first).take(starts, axis=1)
+    if left_out:
+        drawn[:, :, -1] = (running[:, block - left_out : -left_out] - first).take(starts[:, -1], axis=1)
+    pump, system = drawn.sum(axis=2)
     total = pump + system
     index = np.full(resamples, 0.5)
     np.divide(pump, total, out=index, where=total > 0.0)
