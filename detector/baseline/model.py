@@ -186,7 +186,8 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
     """
     floor = (FLOOR_SHARE * curve[0]) ** 2
     level_m = float(np.nanmean(levels)) if np.isfinite(levels := _joined(runs, "level_m")).any() else np.nan
-    level_slopes = _level_slopes(runs)
+    level_weight_m2 = _level_weight(runs)
+    level_slopes = _level_slopes(runs, level_weight_m2)
     centred = [_without_level(run, level_slopes, level_m) for run in runs]
     factor = _correlation_factor(centred)
     deviations = np.concatenate([part - part.mean(axis=0) for part in centred])
@@ -194,9 +195,10 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
     within += np.eye(2) * (LEAST_NOISE_SHARE * curve[0]) ** 2
     means = np.array([part.mean(axis=0) for part in centred])
     counts = np.array([len(run) for run in runs])
-    duty_fit, flow_m3h = _fitted(runs, "duty_m3h", "flow_m3h")
-    duty_total_fit, total_m3h = _fitted(runs, "duty_total_m3h", "total_m3h")
-    level_variance = np.diag(within) / max(_level_weight(runs), 1e-300)
+    measured_m3h = _means(runs, "flow_m3h")
+    duty_fit, flow_m3h = _fitted(_means(runs, "duty_m3h"), measured_m3h)
+    duty_total_fit, total_m3h = _fitted(_means(runs, "duty_total_m3h"), _means(runs, "total_m3h"))
+    level_variance = np.diag(within) / max(level_weight_m2, 1e-300)
     at_level = np.full(len(runs), level_m if np.isfinite(level_m) else 0.0)
     pump_points, system_points = _pump_points(flow_m3h, at_level), _system_points(total_m3h, at_level)
     pump_prior = SLOPE_SHARE**2 * np.array([curve[1] ** 2, curve[2] ** 2])
@@ -219,7 +221,7 @@ def learn(runs: Sequence[Segments], curve: Curve, friction_h2_m5: float) -> Base
         system=system,
         duty_fit=duty_fit,
         duty_total_fit=duty_total_fit,
-        flow_scatter=2.0 * float(np.std(_means(runs, "flow_m3h") - flow_m3h)) / max(float(flow_m3h.mean()), 1e-9),
+        flow_scatter=2.0 * float(np.std(measured_m3h - flow_m3h)) / max(float(flow_m3h.mean()), 1e-9),
         level_m=level_m,
         segment_covariance=within,
         correlation_factor=factor,
@@ -264,7 +266,7 @@ def _joined(runs: Sequence[Segments], name: str) -> Floats:
 
 
 def _means(runs: Sequence[Segments], name: str) -> Floats:
-    return np.array([np.mean(getattr(run, name)) for run in runs])
+    return np.array([getattr(run, name).mean() for run in runs])
 
 
 def _level_weight(runs: Sequence[Segments]) -> float:
@@ -272,22 +274,26 @@ def _level_weight(runs: Sequence[Segments]) -> float:
     return float(sum(np.nansum((run.level_m - _mean(run.level_m)) ** 2) for run in runs))
 
 
-def _level_slopes(runs: Sequence[Segments]) -> Floats:
+def _level_slopes(runs: Sequence[Segments], level_weight_m2: float) -> Floats:
     """(2,) change of the residuals with the level within runs, drawn towards 0 by its prior. [m/m]."""
     products, noise = np.zeros(2), np.zeros(2)
     for run in runs:
         residual_m = run.residual_m - run.residual_m.mean(axis=0)
-        level_m = np.nan_to_num(run.level_m - _mean(run.level_m))
+        level_m = _known_or_0(run.level_m - _mean(run.level_m))
         products += level_m @ residual_m
         noise += np.sum(residual_m**2, axis=0)
     noise /= max(sum(len(run) - 1 for run in runs), 1)
-    slopes: Floats = products / np.maximum(_level_weight(runs) + noise / LEVEL_SLOPE**2, 1e-300)
+    slopes: Floats = products / np.maximum(level_weight_m2 + noise / LEVEL_SLOPE**2, 1e-300)
     return slopes
 
 
 def _without_level(run: Segments, slopes: Floats, level_m: float) -> Floats:
     """Residuals of a run as they would be at one level; as they are where the level is not known."""
-    return run.residual_m - np.outer(np.nan_to_num(run.level_m - level_m), slopes)
+    return run.residual_m - np.outer(_known_or_0(run.level_m - level_m), slopes)
+
+
+def _known_or_0(values: Floats) -> Floats:
+    return np.where(np.isnan(values), 0.0, values)
 
 
 def _mean(values: Floats) -> float:
@@ -295,9 +301,8 @@ def _mean(values: Floats) -> float:
     return float(known.mean()) if known.size else np.nan
 
 
-def _fitted(runs: Sequence[Segments], duty: str, measured: str) -> tuple[Floats, Floats]:
-    """Line from the datasheet's flow to the measured one, and the (runs,) flows on that line."""
-    by_datasheet, by_meter = _means(runs, duty), _means(runs, measured)
+def _fitted(by_datasheet: Floats, by_meter: Floats) -> tuple[Floats, Floats]:
+    """Line from the datasheet's flows of runs to the measured ones, and the (runs,) flows on that line."""
     deviation = by_datasheet - by_datasheet.mean()
     if np.sqrt(np.mean(deviation**2)) > SPREAD_SHARE * max(by_datasheet.mean(), 1e-9):
         slope = float(deviation @ by_meter / (deviation @ deviation))

@@ -42,7 +42,7 @@ def decide(posterior: Posterior, head_m: float) -> tuple[State, str | None]:
     """
     p = posterior.probability
     fault = float(p[[PUMP_FAULT, SYSTEM_FAULT, BOTH]].sum())
-    meter = float(p[[FLOW_METER, HEAD_SENSOR]].sum())
+    meter = float(p[FLOW_METER] + p[HEAD_SENSOR])
     is_flow = p[FLOW_METER] >= p[HEAD_SENSOR]
     scale = 1.0 if is_flow else max(abs(head_m), 1e-9)
     error = (posterior.flow_error if is_flow else posterior.head_error_m) / scale

@@ -180,9 +180,9 @@ def _anew(value: float, variance: float, scale: float, disturbance: float) -> tu
 
 
 def _log_sum(log_values: Floats) -> float:
-    """Logarithm of the sum of logarithms; SciPy's takes ten times as long on five."""
-    top = float(log_values.max())
-    return top + math.log(float(np.exp(log_values - top).sum()))
+    """Logarithm of the sum of a few logarithms; SciPy's takes ten times as long on five."""
+    top = max(log_values.tolist())
+    return float(top + math.log(sum(np.exp(log_values - top).tolist())))
 
 
 def _normalised(log_weight: Floats) -> Floats:

@@ -61,7 +61,8 @@ def segment_means(values: npt.ArrayLike, samples_per_segment: int) -> Floats:
             f"got shape {array.shape} and {samples_per_segment}"
         )
     segments = array.size // samples_per_segment
-    return np.asarray(array[: segments * samples_per_segment].reshape(segments, samples_per_segment).mean(axis=1))
+    sums = array[: segments * samples_per_segment].reshape(segments, samples_per_segment).sum(axis=1)
+    return np.asarray(sums / samples_per_segment)
 
 
 def pump_slope(flow_m3h: npt.ArrayLike, curve: Curve) -> Floats:

@@ -14,6 +14,10 @@ _CURED: Mapping[str, frozenset[State]] = {
     "pull the pump and flush the main": frozenset({"pump_fault", "system_fault", "pump_and_system_fault"}),
     "check the meter": frozenset({"sensor_fault"}),
 }
+_UNCURED: Mapping[str, tuple[State, ...]] = {
+    act: tuple(state for state in FAULT_STATES if state not in cured) for act, cured in _CURED.items()
+}
+"""Faults that an act leaves as they are."""
 
 
 def expected_costs(probability: Mapping[State, float], wasted_kwh_per_day: float, costs: Costs) -> dict[str, Any]:
@@ -46,8 +50,8 @@ def expected_costs(probability: Mapping[State, float], wasted_kwh_per_day: float
     energy = max(wasted_kwh_per_day, 0.0) * costs.horizon_days * costs.energy_per_kwh
     left = costs.failure_share * costs.call_out + energy
     expected = {}
-    for act, cured in _CURED.items():
-        uncured = sum(probability.get(state, 0.0) for state in FAULT_STATES if state not in cured)
+    for act, faults in _UNCURED.items():
+        uncured = sum(probability.get(state, 0.0) for state in faults)
         blind = 0.0 if act == "check the meter" else probability.get("sensor_fault", 0.0) * costs.pull_pump
         expected[act] = round(crews[act] + uncured * left + blind, 1)
     ordered = dict(sorted(expected.items(), key=lambda item: item[1]))
