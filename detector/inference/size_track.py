@@ -115,7 +115,7 @@ class SizeTrack:
         log_gone = math.log(change_share) - 0.5 * (math.log(own) + value**2 / own)
         jumps = [own + share * scale**2 for share in JUMP_SCALES]
         log_each_jump = [-0.5 * (math.log(jump) + value**2 / jump) for jump in jumps]
-        log_jump = math.log(change_share**2 / len(jumps)) + float(np.logaddexp(*log_each_jump))
+        log_jump = math.log(change_share**2 / len(jumps)) + float(np.logaddexp.reduce(log_each_jump))
         was_strange, self.is_strange = self.is_strange, max(log_gone, log_jump) > log_carried
         is_anew = self.is_strange and (is_sure or was_strange)
         if is_anew:

@@ -96,10 +96,9 @@ class RunTracker:
 
     def full_pumps(self) -> list[int]:
         """Pumps that have just filled a segment."""
-        pumps = self.state.pumps
-        is_full = (pumps["is_steady"] != 0) & (pumps["samples"] % self._segment_samples == 0)
-        full: list[int] = is_full.nonzero()[0].tolist()
-        return full
+        pumps, each = self.state.pumps, self._segment_samples
+        steady = zip(pumps["is_steady"].tolist(), pumps["samples"].tolist(), strict=True)
+        return [pump for pump, (is_steady, samples) in enumerate(steady) if is_steady and samples % each == 0]
 
     def last_segments(self, pump: int, segments: int) -> Run:
         """The last segments of an open run, or all if it has fewer; the window begins with them."""
