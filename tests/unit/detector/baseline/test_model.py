@@ -65,8 +65,8 @@ def made_runs(
 
 def expected_m(baseline, flow_m3h, total_m3h, level_m):
     return (
-        baseline.pump.at(np.array([flow_m3h, flow_m3h**2, level_m]))[0],
-        baseline.system.at(np.array([total_m3h**2, level_m]))[0],
+        baseline.pump.along(np.array([[flow_m3h, flow_m3h**2, level_m]]))[0][0],
+        baseline.system.along(np.array([[total_m3h**2, level_m]]))[0][0],
     )
 
 
