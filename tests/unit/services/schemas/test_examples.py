@@ -75,7 +75,9 @@ def test_each_key_has_a_meaning_in_words_and_a_value_to_see(name):
     for table in (schema, *schema.get("$defs", {}).values()):
         for key, rule in {**table.get("properties", {}), **table.get("patternProperties", {})}.items():
             assert len(rule.get("description", "").split()) > 1, f"{table['title']}.{key}"
-            assert rule.get("examples") or "default" in rule or list(tables_of(schema, rule)), f"{table['title']}.{key}"
+            assert rule.get("examples") or "default" in rule or list(tables_of(schema, rule)), (
+                f"{table['title']}.{key}"
+            )
 
 
 def test_the_first_example_counts_and_tables_are_looked_into():
