@@ -45,6 +45,22 @@ def as_lines(result: Mapping[str, object], indent: str = "") -> str:
     return "\n".join(lines)
 
 
+def named(key: object, labels: Sequence[str]) -> object:
+    """Number of a pump, or an asset, and beside it what people call that pump, where `labels` say it.
+
+    Examples
+    --------
+    >>> labels = ("Pumpwerk Süd 1", "Pumpwerk Süd 2")
+    >>> named(2, labels), named("pump:2", labels), named("main", labels), named(2, ())
+    ('2 (Pumpwerk Süd 2)', 'pump:2 (Pumpwerk Süd 2)', 'main', 2)
+    """
+    kind, _, number = str(key).rpartition(":")
+    if kind not in {"", "pump"} or not number.isdecimal() or int(number) > len(labels):
+        return key
+    label = labels[int(number) - 1]
+    return key if label == number else f"{key} ({label})"
+
+
 def kpi_table(figures: "Kpis", labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:
     """Figures of a recording by day and in total, and by hour where asked for; what is not known is None.
 
