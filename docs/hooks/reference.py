@@ -2,21 +2,23 @@
 
 import importlib
 import pkgutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, get_args, get_origin
 
 import names
 import python_api
 import schemas
 import typer
+from pydantic import BaseModel
 
 import wetwell.protocols.messages
 from wetwell.protocols.messages.message import Message
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.cli import app
-from wetwell.services.reports.part_tables import part_table
 from wetwell.services.schemas.described import described_schema
-from wetwell.simulator.effects import effect_table
+from wetwell.services.schemas.examples import add_examples, examples_of
+from wetwell.services.schemas.registry import schema_named
+from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.inflow import INFLOWS
 
@@ -28,9 +30,9 @@ def pages() -> dict[str, str]:
         "python.md": python_api.python_page(),
         "messages.md": _messages(),
         "registers.md": _registers(),
-        "effects.md": _parts("Effects", effect_table()),
-        "faults.md": _parts("Faults", part_table(FAULTS)),
-        "inflows.md": _parts("Inflow models", part_table(INFLOWS)),
+        "effects.md": _parts("Effects", EFFECTS, "station"),
+        "faults.md": _parts("Faults", FAULTS, "scenario"),
+        "inflows.md": _parts("Inflow models", INFLOWS, "scenario"),
         "names.md": names.names_page(),
     }
 
@@ -72,6 +74,7 @@ def _messages() -> str:
     text = ["# Messages", "", "JSON on the bus. A key that is not listed is ignored; a new one has a default.", ""]
     for model in _message_models():
         schema = described_schema(model, mode="serialization")
+        add_examples(schema, examples_of(model.__name__.lower()))
         text += [f"## {model.__name__}", "", schema["description"], "", schemas.key_table(schema, schema)]
     return "\n".join(text)
 
@@ -96,25 +99,14 @@ def _registers() -> str:
     return f"# Modbus registers\n\n{intro}\n{rules}\n\n" + _table(head, rows)
 
 
-def _parts(title: str, parts: Iterable[dict[str, Any]]) -> str:
+def _parts(title: str, parts: Mapping[str, type[BaseModel]], file: str) -> str:
+    """Parts that a file may name, each with the keys that the schema of the file has for it."""
+    schema = schema_named(file)
     text = [f"# {title}: parameters", ""]
-    for part in parts:
-        text += [f"## `{part.get('name') or part['kind']}`", "", str(part["summary"]), ""]
-        text += [_table(("parameter", "unit", "range", "default"), [_parameter(row) for row in part["parameters"]])]
+    for name, part in parts.items():
+        table = schema["$defs"][part.__name__]
+        text += [f"## `{name}`", "", table["description"], "", schemas.key_table(schema, table)]
     return "\n".join(text)
-
-
-def _parameter(row: dict[str, Any]) -> tuple[str, ...]:
-    if "choices" in row:
-        limits = ", ".join(row["choices"])
-    elif "parts" in row:
-        return f"`{row['name']}`", "", f"tables with {', '.join(row['parts'])}", ""
-    elif "low" in row:
-        limits = f"{row['low']:g} to {row['high']:g}"
-    else:
-        limits = row.get("range") or ""
-    default = row.get("default")
-    return f"`{row['name']}`", row.get("unit", ""), limits, "" if default is None else f"`{default}`"
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:

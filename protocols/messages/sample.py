@@ -16,7 +16,7 @@ class PumpReading(Message):
     Parameters
     ----------
     frequency_hz : float, optional
-        Of the drive.
+        Frequency of the drive.
     flow_m3h : float, optional
         What the pump delivers, by its own meter.
     head_m : float, optional

@@ -40,7 +40,7 @@ class PumpBlock(Message):
     Parameters
     ----------
     frequency_hz : list of float
-        Of the drive.
+        Frequency of the drive.
     flow_m3h : list of float
         What the pump delivers, by its own meter.
     head_m : list of float

@@ -37,7 +37,7 @@ class Signal(Table):
     table : "coil", "discrete", "holding" or "input"
         Or the function code that reads it, 1 to 4.
     address : int
-        From zero.
+        Address of its first register, from zero.
     type : str
         Form in which it stands there.
     bit : int, optional

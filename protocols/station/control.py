@@ -59,7 +59,7 @@ class Control(Table):
     setpoint_m : float
         Level that mode "pid" holds. [m]
     gain_hz_m : float
-        Its proportional gain. [Hz/m]
+        Proportional gain of mode "pid". [Hz/m]
     integral_s, derivative_s : float
         Its integral and derivative time. [s]
     """

@@ -13,13 +13,13 @@ class Costs(Table):
     Attributes
     ----------
     pull_pump, flush_main, check_meter : float
-        A crew and its work.
+        What a visit for it costs, a crew and its work.
     call_out : float
         An unplanned call-out, if a fault is left until the station fails.
     failure_share : float
         Probability that a fault which is left fails before the next planned visit.
     energy_per_kwh : float
-        Price of energy.
+        Price of a kilowatt-hour, to price what a fault wastes.
     crew_per_hour : float
         An hour of one who works at the station or at its screens.
     horizon_days : float

@@ -9,14 +9,14 @@ class Materiality(Table):
     Parameters
     ----------
     flow_share : float
-        Of the reading of the flow, and of half of that at the duty point where it is lower; also for the balance of
-        the wet well. [1]
+        Share of the reading of the flow, and of half of that at the duty point where it is lower; also for the
+        balance of the wet well. [1]
     head_share, power_share : float
-        As of the flow. [1]
+        The same for the head and for the power. [1]
     level_m : float
-        Of the level. [m]
+        Difference of the level. [m]
     threshold_m : float
-        Of the level at which a pump starts or stops. [m]
+        Difference of the level at which a pump starts or stops. [m]
     time_s : float
         How late or early a signal may be while it moves. [s]
     """

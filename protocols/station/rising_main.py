@@ -24,7 +24,7 @@ class RisingMain(Table):
     delivery_level_m : float, optional
         L_d, level to which the main lifts, counted from where the levels of the wet well are. [m]
     friction_h2_m5 : float
-        k, with Q in m³/h. [h²/m⁵]
+        k of the friction k Q², with Q in m³/h. [h²/m⁵]
     layout : str
         "individual": each pump has a pipe of its own; "common": they share it.
     """

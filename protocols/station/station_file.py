@@ -31,7 +31,7 @@ class Electrical(Table):
     rated_current_a : float
         That the motor takes at nominal frequency. [A]
     power_factor : float
-        cos φ. [1]
+        cos φ of the motor. [1]
     efficiency : float
         Of the pump without its motor at its rated duty, where the pump has no points of its own. [1]
     power_model : str
@@ -58,9 +58,9 @@ class Sensors(Table):
     Parameters
     ----------
     flow_noise, head_noise, power_noise, inflow_noise : float
-        Share of the reading. [1]
+        Standard deviation, as a share of the reading. [1]
     level_noise_m : float
-        Of the level. [m]
+        Standard deviation of the level. [m]
     correlation : float
         Of the noise from one second to the next. [1]
     """
@@ -96,11 +96,11 @@ class Station(Table):
     name : str
         Its key on the bus and in files.
     title : str, optional
-        What people call it.
+        What people call it: `Pumpwerk Süd`. Tables and pages show it.
     pump : list of Pump
-        In rotation order.
+        The pumps, in the order in which they take turns.
     rising_main : RisingMain, optional
-        The only main.
+        The rising main, where there is one; else see `main`.
     main : list of RisingMain, optional
         Instead of `rising_main`, where there are several; each pump says which is its own.
     costs : Costs, optional

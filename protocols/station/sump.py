@@ -14,7 +14,7 @@ class Sump(Table):
     Parameters
     ----------
     area_m2 : float, optional
-        The same at each level. [m²]
+        Area of the water, where it is the same at each level. [m²]
     profile : sequence of (level_m, area_m2), optional
         Beside `area_m2`: levels rise from 0, the area is linear between them. [m, m²]
     volume_points : sequence of (level_m, volume_m3), optional

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from wetwell.protocols.messages.alarm import Alarm, AlarmReport
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.tables import as_lines
+from wetwell.services.reports.tables import as_lines, named
 
 TARGETS: Mapping[str, str] = {
     "alarms_10min": "1 wanted, 2 at most in the long run, 10 at most ever",
@@ -17,8 +17,8 @@ TARGETS: Mapping[str, str] = {
 """What ISA-18.2 and EEMUA 191 want for one operator."""
 
 
-def alarm_lines(alarms: Sequence[Alarm]) -> str:
-    """A table of alarms for people.
+def alarm_lines(alarms: Sequence[Alarm], labels: Sequence[str] = ()) -> str:
+    """A table of alarms for people; where `labels` say what they call the pumps, with that.
 
     Examples
     --------
@@ -35,6 +35,7 @@ def alarm_lines(alarms: Sequence[Alarm]) -> str:
             "priority": alarm.priority,
             "station": alarm.station,
             "alarm": alarm.id,
+            **({"pump": named(alarm.pump or "", labels)} if labels else {}),
             "state": alarm.state if alarm.until is None else f"shelved until {to_iso(alarm.until)}",
             "raised": "" if alarm.raised is None else to_iso(alarm.raised),
             "text": alarm.text,

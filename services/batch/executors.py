@@ -37,7 +37,7 @@ def check_scheduler(scheduler: str | None) -> None:
     try:
         import distributed  # noqa: F401, PLC0415 - an extra
     except ImportError as error:
-        raise ConfigError(f"--scheduler: needs the extra 'fleet' (pip install 'wetwell[fleet]'): {error}") from error
+        raise ConfigError(f"--scheduler: needs the extra 'fleet' (pip install '.[fleet]'): {error}") from error
 
 
 @contextlib.contextmanager

@@ -140,6 +140,7 @@ def validate_file(
         {
             "day": day,
             "pump": pump + 1,
+            "name": station.pump_labels[pump],
             "starts_measured": int(result.starts[0, row, pump]),
             "starts_simulated": int(result.starts[1, row, pump]),
             "run_h_measured": round(float(result.run_h[0, row, pump]), 3),

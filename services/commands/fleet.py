@@ -32,5 +32,5 @@ def fleet(
     try:
         from wetwell.services.fleet.controller import serve_fleet
     except ImportError as error:
-        raise ConfigError(f"fleet: needs the extra 'fleet' (pip install 'wetwell[fleet]'): {error}") from error
+        raise ConfigError(f"fleet: needs the extra 'fleet' (pip install '.[fleet]'): {error}") from error
     run(settings, serve_fleet(settings, stations))

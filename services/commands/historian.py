@@ -24,6 +24,7 @@ from wetwell.services.commands.options import (
     reading_of,
     run,
     settings_of,
+    station_and_names,
     station_name,
     with_history,
 )
@@ -77,9 +78,10 @@ def history(
     from wetwell.services.historian.client import ask_history
     from wetwell.services.historian.tables import history_table
 
+    name, labels = station_and_names(station)
     asking = ask_history(
         settings,
-        SITE if kind == "stations" else station_name(station),
+        SITE if kind == "stations" else name,
         kind,
         last_s=last_s,
         span=span,
@@ -90,7 +92,7 @@ def history(
     if as_json:
         typer.echo(answer.encode().decode())
     else:
-        print_result(history_table(answer), as_json=False)
+        print_result(history_table(answer, labels), as_json=False)
 
 
 @app.command(cls=about("--station"), rich_help_panel=RECORD)
@@ -203,10 +205,10 @@ def list_maintenance(
     from wetwell.services.historian.client import ask_history
     from wetwell.services.historian.tables import history_table
 
-    span = (-LONGEST_NS, LONGEST_NS)
+    span, (name, labels) = (-LONGEST_NS, LONGEST_NS), station_and_names(station)
     asking = ask_history(
         settings_of(config, zenoh),
-        station_name(station),
+        name,
         "maintenance",
         last_s=None,
         span=span,
@@ -217,7 +219,7 @@ def list_maintenance(
     if as_json:
         print_result({"maintenance": list(answer.messages)}, as_json=True)
     else:
-        print_result(history_table(answer) if answer.messages else {"maintenance": "none"}, as_json=False)
+        print_result(history_table(answer, labels) if answer.messages else {"maintenance": "none"}, as_json=False)
 
 
 def _span(start: str | None, end: str | None) -> tuple[int, int]:

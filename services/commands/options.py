@@ -262,11 +262,17 @@ def station_name(name_or_file: str) -> str:
     >>> station_name("north")
     'north'
     """
+    return station_and_names(name_or_file)[0]
+
+
+def station_and_names(name_or_file: str) -> tuple[str, tuple[str, ...]]:
+    """Name of a station, and what people call its pumps; a name alone does not tell that."""
     if not name_or_file.endswith(".toml"):
-        return name_or_file
+        return name_or_file, ()
     from wetwell.protocols.station.station_file import load_station
 
-    return load_station(Path(name_or_file)).name
+    station = load_station(Path(name_or_file))
+    return station.name, station.pump_labels
 
 
 def signals_named(text: str, flag: str) -> tuple["SensedQuantity", ...]:

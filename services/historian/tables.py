@@ -1,9 +1,11 @@
 """Answers of the historian for people."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from wetwell.protocols.messages.history import History
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.reports.tables import named
 
 _SHOWN = {
     "verdicts": ("time", "pump", "state"),
@@ -13,13 +15,23 @@ _SHOWN = {
     "maintenance": ("time", "asset", "act", "found", "by", "result"),
     "stations": ("station", "first", "last"),
 }
+_PUMPS = ("pump", "asset")
+"""Columns that name a pump."""
 
 
-def history_table(history: History) -> dict[str, Any]:
-    """Rows of an answer; of samples without least and largest values, of figures those of the whole station."""
+def history_table(history: History, labels: Sequence[str] = ()) -> dict[str, Any]:
+    """Rows of an answer; of samples without least and largest values, of figures those of the whole station.
+
+    Where `labels` say what people call the pumps, that stands beside their numbers.
+    """
     if history.kind in _SHOWN:
         names = _SHOWN[history.kind]
-        return {history.kind: [{name: message.get(name) for name in names} for message in history.messages]}
+        return {
+            history.kind: [
+                {name: named(message.get(name), labels) if name in _PUMPS else message.get(name) for name in names}
+                for message in history.messages
+            ]
+        }
     names = tuple(name for name in history.columns if not name.endswith(("_min", "_max")))
     if history.kind == "kpi":
         names = tuple(name for name in names if not name.startswith("pump"))

@@ -9,6 +9,7 @@ from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.charts import Section, page, paragraph, table
 from wetwell.services.reports.charts.axes import Scale, time_ticks
 from wetwell.services.reports.charts.svg import GRID, LEFT, RIGHT, WIDTH, colour, legend, svg, text_at
+from wetwell.services.reports.tables import named
 
 STAGES: tuple[Stage, ...] = ("watch", "plan", "act")
 HEAD, ROW, FOOT = 48, 24, 28
@@ -31,7 +32,7 @@ def episode_rows(episodes: Sequence[Episode], labels: Sequence[str] = ()) -> lis
     """
     return [
         {
-            "asset": _named(episode.asset, labels),
+            "asset": named(episode.asset, labels),
             "state": episode.state,
             "stage": episode.stage,
             "from": to_iso(episode.since),
@@ -42,12 +43,6 @@ def episode_rows(episodes: Sequence[Episode], labels: Sequence[str] = ()) -> lis
         }
         for episode in episodes
     ]
-
-
-def _named(asset: str, labels: Sequence[str]) -> str:
-    kind, _, number = asset.partition(":")
-    label = labels[int(number) - 1] if kind == "pump" and int(number) <= len(labels) else number
-    return asset if label == number else f"{asset} ({label})"
 
 
 def episode_page(station: str, episodes: Sequence[Episode], first_ns: int, last_ns: int) -> str:

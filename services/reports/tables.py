@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.text_table import SCREEN_WIDTH, text_table
+from wetwell.services.reports.text_table import SCREEN_WIDTH, shown, text_table
 
 if TYPE_CHECKING:
     from wetwell.protocols.recordings.kpi import Kpis
@@ -35,14 +35,30 @@ def as_lines(result: Mapping[str, object], indent: str = "") -> str:
     """
     lines = []
     for key, value in result.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value:
             lines += [f"{indent}{key}:", as_lines(value, indent + "  ")]
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
             table = text_table(value, SCREEN_WIDTH - len(indent) - 2)
             lines += [f"{indent}{key}:", *(f"{indent}  {line}" for line in table)]
         else:
-            lines.append(f"{indent}{key}: {value}")
+            lines.append(f"{indent}{key}: {shown(value)}")
     return "\n".join(lines)
+
+
+def named(key: object, labels: Sequence[str]) -> object:
+    """Number of a pump, or an asset, and beside it what people call that pump, where `labels` say it.
+
+    Examples
+    --------
+    >>> labels = ("Pumpwerk Süd 1", "Pumpwerk Süd 2")
+    >>> named(2, labels), named("pump:2", labels), named("main", labels), named(2, ())
+    ('2 (Pumpwerk Süd 2)', 'pump:2 (Pumpwerk Süd 2)', 'main', 2)
+    """
+    kind, _, number = str(key).rpartition(":")
+    if kind not in {"", "pump"} or not number.isdecimal() or int(number) > len(labels):
+        return key
+    label = labels[int(number) - 1]
+    return key if label == number else f"{key} ({label})"
 
 
 def kpi_table(figures: "Kpis", labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:

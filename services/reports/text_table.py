@@ -33,15 +33,27 @@ def text_table(rows: Sequence[Mapping[str, object]], width: int = SCREEN_WIDTH) 
           look for rags
     """
     names = dict.fromkeys(name for row in rows for name in row)
-    columns = [[name, *(str(row.get(name, "")) for row in rows)] for name in names]
-    widths = _widths(columns, width)
-    shown = [_cells(cells, width) for cells, width in zip(columns, widths, strict=True)]
-    return [
-        GAP.join(line).rstrip()
-        for block in _blocks(widths, width)
-        for row in zip(*(shown[place] for place in block), strict=True)
-        for line in _lines(row, [widths[place] for place in block])
-    ]
+    columns = [[name, *(shown(row.get(name, "")) for row in rows)] for name in names]
+    lines = []
+    for block in _blocks(_widths(columns, width), width):
+        widths = _widths([columns[place] for place in block], width)
+        cells = [_cells(columns[place], its_width) for place, its_width in zip(block, widths, strict=True)]
+        for row in zip(*cells, strict=True):
+            lines += [GAP.join(line).rstrip() for line in _lines(row, widths)]
+    return lines
+
+
+def shown(value: object) -> str:
+    """A value for people: a list by its members, and a dash where there is nothing.
+
+    Examples
+    --------
+    >>> shown(26.0), shown(["a", "b"]), shown(None), shown({})
+    ('26.0', 'a, b', '–', '–')
+    """
+    if isinstance(value, list):
+        return ", ".join(map(shown, value)) or "–"
+    return "–" if value is None or value == {} else str(value)
 
 
 def _widths(columns: Sequence[Sequence[str]], width: int) -> list[int]:

@@ -120,7 +120,7 @@ class ModbusSettings(Table):
     port : int
         Where it listens: 5020 needs no privilege, unlike the standard 502 (802 with TLS); 0 takes a free one.
     unit_id : int
-        Of the station.
+        Unit id of the station.
     word_order : str
         Order of the four bytes of a 32-bit value, A being the highest.
     write_allow : list of WriteRule
@@ -242,7 +242,7 @@ class RuleSettings(Table):
 
 
 class AlarmSettings(Table):
-    """Alarms.
+    """When the daemon of alarms calls, and where it keeps them.
 
     Attributes
     ----------

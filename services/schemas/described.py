@@ -133,9 +133,9 @@ def _words_of(model: type[BaseModel]) -> dict[str, str]:
 
 
 def _summary(text: str) -> str:
-    return " ".join(
-        re.split(r"^(?:Parameters|Attributes|Raises|References)\n-+$", text, flags=re.MULTILINE)[0].split()
-    )
+    """What comes before the sections, without equations in lines of their own: editors and tables do not set them."""
+    words = re.split(r"^(?:Parameters|Attributes|Raises|References)\n-+$", text, flags=re.MULTILINE)[0]
+    return " ".join(re.sub(r"\$\$.*?\$\$", "", words, flags=re.DOTALL).split())
 
 
 def _words(text: str) -> dict[str, str]:

@@ -80,7 +80,7 @@ def swmm_passage_of(case: TruthCase) -> Passage:
     try:
         import pyswmm  # noqa: PLC0415 - an extra: only trials with SWMM need it
     except ImportError as error:
-        raise WetwellError("the truth plant 'swmm' needs pyswmm: pip install 'wetwell[trial]'") from error
+        raise WetwellError("the truth plant 'swmm' needs pyswmm: pip install '.[trial]'") from error
     for deviation in case.deviations:
         if deviation.name not in SWMM_LIBRARY + SWMM_OPEN:
             raise ValueError(f"deviation '{deviation.name}' is not one that SWMM can express")

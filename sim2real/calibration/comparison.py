@@ -142,7 +142,7 @@ def compare(recording: Recording, station: Station) -> Comparison:
         told=told,
         is_steady=steady,
         mains=tuple((name, tuple(np.flatnonzero(main_of_pump == m).tolist())) for m, name in enumerate(names)),
-        names=station.pump_names,
+        names=station.pump_labels,
     )
 
 

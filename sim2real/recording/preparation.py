@@ -19,7 +19,7 @@ class Offset(Table):
     Parameters
     ----------
     column : str
-        Of the recording.
+        Column of the recording.
     value : float
         What is added, in the unit of the column.
     start, end : stamp
@@ -44,7 +44,7 @@ class Scale(Table):
     Parameters
     ----------
     column : str
-        Of the recording.
+        Column of the recording.
     factor : float
         3.6 makes m³/h of L/s. [1]
     """

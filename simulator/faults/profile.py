@@ -23,13 +23,13 @@ class Profile(Table):
     Parameters
     ----------
     start_s, end_s : float
-        t0 and t1, since the start of the scenario. [s]
+        t0 and t1, from when to when it grows, since the start of the scenario. [s]
     after : "hold" or "clear"
         What becomes of the fault after the end.
     shape : "ramp", "step" or "intermittent"
         How the fault comes: it grows from start to end, is there at once, or comes and goes.
     period_s : float
-        T, of an intermittent fault. [s]
+        T, from one coming of an intermittent fault to the next. [s]
     duty : float
         d, share of the period in which an intermittent fault is there. [1]
     """
@@ -105,7 +105,7 @@ class ChannelFault(SensorFault):
     Parameters
     ----------
     channel : str
-        The quantity.
+        Measured value whose sensor it is.
     pump : int
         At which pump, counted from 1; 0 for all, and for level and inflow.
     """

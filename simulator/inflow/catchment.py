@@ -50,9 +50,9 @@ class CatchmentInflow(Table):
     storm_peak_m3h : float
         Mean of the peaks of the storms. [m³/h]
     storm_time_to_peak_s : float
-        t_p. [s]
+        t_p, from the begin of a storm to its peak. [s]
     storm_shape : float
-        n; the larger, the shorter the storm about its peak. [1]
+        n, form of a storm: the larger, the shorter the storm about its peak. [1]
 
     References
     ----------

@@ -20,7 +20,7 @@ class DiurnalInflow(Table):
     mean_m3h, amplitude_m3h, noise_m3h : float
         Mean, amplitude of the sine, standard deviation of the noise. [m³/h]
     period_s : float
-        Of the sine. [s]
+        Length of the sine; a day is 86,400. [s]
     surges : Surges
 
     References

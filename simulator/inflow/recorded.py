@@ -32,7 +32,7 @@ class RecordedInflow(Table):
     time_s : (n,) array
         Seconds since the first value, rising, starting at 0. [s]
     flow_m3h : (n,) array
-        At each of these times. [m³/h]
+        Inflow at each of these times. [m³/h]
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)

@@ -1,4 +1,4 @@
-"""Commands of README and docs, really run in the order of the page, each page in its own folder; what they print."""
+"""Commands and Python of README and docs, really run in the order of the page, in its own folder; what they print."""
 
 import math
 import os
@@ -49,15 +49,22 @@ def is_said(shown: str, printed: str, near: float) -> bool:
 
 
 def pages_with_commands() -> Iterator[str]:
-    """Pages of README and docs that have shell blocks."""
+    """Pages of README and docs that have blocks of shell or Python."""
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
-        if commands(page):
+        if commands(page) or blocks(page, "python"):
             yield page.relative_to(ROOT).as_posix()
 
 
 def test_every_page_with_commands_is_walked_or_left_out_for_a_reason() -> None:
     walked = [page for walk in WALKS for page in walk.pages]
     assert sorted([*walked, *LEFT_OUT_PAGES]) == sorted(pages_with_commands())
+
+
+def test_commands_stand_in_shell_blocks_where_a_walk_finds_them() -> None:
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        found = re.findall(r"^ *```(\w*)\n(.*?)^ *```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+        lines = [line for language, block in found if language != "sh" for line in block.splitlines()]
+        assert [line for line in lines if re.match(r" *wetwell (-|[a-z])", line)] == [], page
 
 
 def test_what_is_said_of_a_walk_is_in_its_pages() -> None:
@@ -114,6 +121,8 @@ def test_commands_run(walk: Walk, tmp_path: Path) -> None:
                 code = next((code for beginning, code in walk.codes.items() if line.startswith(beginning)), 0)
                 patience_s = PATIENCE_S if line.startswith(walk.patient) else 0.0
                 printed += lines_of(run(run_line, tmp_path, environment, code, patience_s))
+        for block in (block for page in walk.pages for block in blocks(ROOT / page, "python")):
+            run(f"python - <<'PYTHON'\n{block}PYTHON\n", tmp_path, environment)
         for process, said in started:
             wait_for_a_word(process, said)
     finally:

@@ -19,7 +19,7 @@ PYTHON"""
 
 @dataclass(frozen=True)
 class Walk:
-    """Pages whose commands are run one after the other, in one folder.
+    """Pages whose commands are run one after the other, in one folder, and then their Python.
 
     Attributes
     ----------
@@ -59,6 +59,19 @@ class Walk:
 
 
 WALKS = (
+    Walk(
+        ("README.md",),
+        left_out={
+            "make up": "is `wetwell up`, which a walk runs",
+            "make test": "is what every commit passes",
+            "make check": "runs this test",
+        },
+    ),
+    Walk(
+        ("docs/python.md",),
+        given="""cp "$ROOT"/simulator/stations/alpha.toml north.toml
+wetwell simulate --station north.toml --days 0.2 --out north.parquet""",
+    ),
     Walk(("docs/add-a-station.md",), services=("wetwell up",), shows_output=True),
     Walk(
         ("docs/tutorial-connect-a-plc.md",),
@@ -93,7 +106,19 @@ WALKS = (
         services=("wetwell dashboard",),
         left_out={"WETWELL_SECURITY__TOKENS_FILE": "opens a port to the network; test_dashboard.py"},
     ),
-    Walk(("docs/command-line.md",)),
+    Walk(
+        ("docs/historian.md",),
+        services=("wetwell up",),
+        patient=("wetwell history", "wetwell export"),
+        left_out={"wetwell historian": "`wetwell up` of this walk has one, and a folder has one"},
+    ),
+    Walk(
+        ("docs/command-line.md",),
+        left_out={
+            "wetwell --install-completion": "changes the shell; "
+            "tests/unit/services/commands/test_inputs.py completes words"
+        },
+    ),
     Walk(("docs/convert.md",), shows_output=True),
     Walk(("docs/tutorial-your-own-export.md",), shows_output=True, near=0.1),
     Walk(("docs/gateway.md",), before=("wetwell plc",), patient=("wetwell gateway read",)),
@@ -171,9 +196,11 @@ wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz"""
     ),
 )
 LEFT_OUT_PAGES = {
+    "docs/bridges.md": "needs bridges of others, which are not here; the page says that they were not tried",
+    "docs/install.md": "tests/packaging/test_wheel.py installs the wheel by uv pip, uv tool and pipx",
+    "docs/trial.md": "takes hours; tests/integration/services/trial/test_trial.py runs short trials",
     "docs/failover.md": "needs a database and several machines; tests/end_to_end/test_failover.py runs pairs",
     "docs/maintenance.md": "needs a crew's visits over days; "
     "tests/integration/services/detector/test_maintenance.py enters acts",
-    "README.md": "make check runs this test; make up is `wetwell up`, which a walk runs",
     "docs/real-station.md": "its recording states no licence and is not here; benchmarks/real_station.py reads it",
 }

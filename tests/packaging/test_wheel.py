@@ -43,10 +43,11 @@ print(wetwell.__version__)
 """
 
 
-def run(*command: object, cwd: Path) -> str:
+def run(*command: object, cwd: Path, **more: Path) -> str:
+    """What a command prints, with some more variables in its environment."""
     environment = {
         name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))
-    }
+    } | {name: str(path) for name, path in more.items()}
     done = subprocess.run(
         list(map(str, command)), cwd=cwd, env=environment, capture_output=True, text=True, check=False
     )
@@ -110,3 +111,20 @@ def test_it_installs_and_runs_in_an_empty_environment(version, wheel, tmp_path):
     assert run(wetwell, "--version", cwd=tmp_path) == f"wetwell {project['version']}\n"
     assert json.loads(run(wetwell, "schema", "station", cwd=tmp_path))["title"] == "Station"
     assert run(python, "-c", USE, cwd=tmp_path) == f"{project['version']}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "home", "commands"),
+    [
+        (("uv", "tool", "install", "--python", sys.executable), "UV_TOOL_DIR", "UV_TOOL_BIN_DIR"),
+        (("pipx", "install", "--python", sys.executable), "PIPX_HOME", "PIPX_BIN_DIR"),
+    ],
+    ids=["uv tool", "pipx"],
+)
+def test_it_installs_as_a_command_of_its_own(words, home, commands, wheel, tmp_path):
+    name, *rest = words
+    places = {home: tmp_path / "home", commands: tmp_path / "commands"}
+    run(BIN / name, *rest, wheel, cwd=tmp_path, **places)
+    wetwell = tmp_path / "commands" / "wetwell"
+    assert run(wetwell, "--version", cwd=tmp_path).startswith("wetwell ")
+    assert json.loads(run(wetwell, "station", "check", "alpha", "--json", cwd=tmp_path))["is_valid"]

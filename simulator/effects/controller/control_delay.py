@@ -15,7 +15,7 @@ class ControlDelay(Effect):
     Parameters
     ----------
     delay_s : float
-        d; 0 is no effect. Levels overshoot by d dL/dt. [s]
+        d, how old the level is; 0 is no effect. Levels overshoot by d dL/dt. [s]
 
     References
     ----------

@@ -16,9 +16,9 @@ class ThresholdShift(Effect):
     Parameters
     ----------
     start_m : float
-        Δ_S; 0 is none. [m]
+        Δ_S, how much higher pumps start; 0 is none. [m]
     stop_m : float
-        Δ_E; 0 is none. [m]
+        Δ_E, how much higher pumps stop; 0 is none. [m]
 
     References
     ----------

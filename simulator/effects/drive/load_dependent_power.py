@@ -16,7 +16,7 @@ class LoadDependentPower(Effect):
     Parameters
     ----------
     share : float
-        λ; 0 is no effect. [1]
+        λ, share of the power that follows the load of the shaft; 0 is no effect. [1]
     shutoff_share : float
         s, shaft power at zero flow over the rated one; also shapes the torque under `motor_slip`. [1]
     rated_factor : float

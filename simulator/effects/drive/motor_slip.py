@@ -20,7 +20,7 @@ class MotorSlip(Effect):
     Parameters
     ----------
     slip : float
-        s, at rated torque M_n; 0 is no effect. [1]
+        s, share of the speed that is lost at the rated torque M_n; 0 is no effect. [1]
 
     References
     ----------

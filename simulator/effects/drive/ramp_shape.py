@@ -17,9 +17,9 @@ class RampShape(Effect):
     Parameters
     ----------
     power : float
-        p; over 1 the ramp starts flat, under 1 steep. [1]
+        p, exponent of the ramp: over 1 it starts flat, under 1 steep. [1]
     lag_s : float
-        τ; 0 is none. [s]
+        τ, lag of the shaft behind its command; 0 is none. [s]
     bow : float
         b, share of an S-curve in the straight ramp. [1]
 

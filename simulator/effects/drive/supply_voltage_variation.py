@@ -20,13 +20,13 @@ class SupplyVoltageVariation(Effect):
     Parameters
     ----------
     daily_amplitude : float
-        a_d; 0 is none. [1]
+        a_d, share by which the voltage swings over the day; 0 is none. [1]
     daily_phase_h : float
         t_d, hours from the start to the highest voltage. [h]
     fast_amplitude : float
-        a_f; 0 is none. [1]
+        a_f, share by which it swings beside that, faster; 0 is none. [1]
     fast_period_s : float
-        T_f. [s]
+        T_f, time from one high of the faster swing to the next. [s]
     fast_phase_s : float
         t_f, from the start to the first rise through the mean. [s]
 

@@ -15,7 +15,7 @@ class PumpWear(Effect):
     Parameters
     ----------
     head_loss : float
-        w; 0 is none. [1]
+        w, share of the head that the impeller has lost; 0 is none. [1]
     leak_m3h : float
         q, leakage at nominal speed; 0 is none. [m³/h]
     pump : int

@@ -16,9 +16,9 @@ class Ragging(Effect):
     Parameters
     ----------
     speed_loss : float
-        ρ_max; 0 is no effect. [1]
+        ρ_max, share of the speed that all rags together cost; 0 is no effect. [1]
     growth_s : float
-        τ. [s]
+        τ, running time in which 63 % of the rags have gathered. [s]
     pump : int
         0 for all.
 

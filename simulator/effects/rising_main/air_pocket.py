@@ -18,11 +18,11 @@ class AirPocket(Effect):
     Parameters
     ----------
     head_m : float
-        a_max; 0 is no effect. [m]
+        a_max, head that the whole pocket costs; 0 is no effect. [m]
     growth_s : float
-        τ_g. [s]
+        τ_g, time in which air gathers while the pumps stand: 63 % of the pocket. [s]
     purge_s : float
-        τ_p. [s]
+        τ_p, time in which running water carries 63 % of the pocket away. [s]
     pocket : str
         "own": mains of their own have a pocket each; "shared": they meet at the high point, and whichever runs purges
         it for all. One main has one pocket.

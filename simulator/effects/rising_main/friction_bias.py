@@ -15,7 +15,7 @@ class FrictionBias(Effect):
     Parameters
     ----------
     factor : float
-        φ; 1 is no effect. [1]
+        φ, friction over that of the station file; 1 is no effect. [1]
     main : int
         0 for all.
 

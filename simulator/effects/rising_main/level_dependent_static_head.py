@@ -17,7 +17,7 @@ class LevelDependentStaticHead(Effect):
     Parameters
     ----------
     slope : float
-        s; 1 is what geometry asks for, 0 is no effect. [m/m]
+        s, fall of the static head for each metre that the water rises; 1 is geometry, 0 is no effect. [m/m]
     reference_level_m : float
         L_r, level at which the static head is the configured one. [m]
     main : int

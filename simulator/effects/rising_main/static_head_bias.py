@@ -15,7 +15,7 @@ class StaticHeadBias(Effect):
     Parameters
     ----------
     offset_m : float
-        ΔH_s; 0 is no effect. [m]
+        ΔH_s, what the static head has more than the station file says; 0 is no effect. [m]
     main : int
         0 for all.
 

@@ -43,15 +43,15 @@ class LearntCorrection(Effect):
     $$X \leftarrow X + X_r\,c \quad (\text{readings of flow, power, losses, pump head, speed: } X_r = X), \qquad
     c = c_0 + \sum_k a_k\, \phi_k\!\left(\frac{x_k - x_{0k}}{s_k}\right)$$
 
-    with the reference $X_r$: the rated head for static head and reading of the head, the rated flow for the balance
+    The reference $X_r$ is the rated head for static head and reading of the head, the rated flow for the balance
     of the level, 1 m for its reading. Shapes φ: z, z², cos 2πz, exp(−z), ln(1 + z), and the step [z >= 0].
 
     Parameters
     ----------
     term : str
-        X.
+        X, the term of the model that is corrected.
     offset : float
-        c_0; 0 is none. [1]
+        c_0, the same correction at all times; 0 is none. [1]
     part : sequence of tables
         At most three: `covariate` (x; `column` names one of a user), `shape` (φ), `size` (a), `centre` (x_0), `scale`
         (s), and the range from `low` to `high` in which it is known.

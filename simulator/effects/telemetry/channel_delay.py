@@ -16,9 +16,9 @@ class ChannelDelay(Effect):
     Parameters
     ----------
     channel : str
-        AnalogueQuantity that is late, of every pump if it is one of the pumps.
+        Measured value that is late, of every pump if it is one of the pumps.
     delay_s : float
-        d; 0 is no effect. [s]
+        d, how late the recording gets it; 0 is no effect. [s]
 
     References
     ----------

@@ -15,7 +15,7 @@ class FlowLowCutoff(Effect):
     Parameters
     ----------
     cutoff_m3h : float
-        Q_c; 0 is no effect. [m³/h]
+        Q_c, flow below which the meter reads 0; 0 is no effect. [m³/h]
 
     References
     ----------

@@ -15,7 +15,7 @@ class FlowMeterGain(Effect):
     Parameters
     ----------
     factor : float
-        g; 1 is no effect. [1]
+        g, reading over the true flow; 1 is no effect. [1]
 
     References
     ----------

@@ -15,7 +15,7 @@ class FlowMeterLag(Effect):
     Parameters
     ----------
     lag_s : float
-        τ; 0 is no effect. [s]
+        τ, time in which the reading makes up 63 % of a change; 0 is no effect. [s]
 
     References
     ----------

@@ -15,7 +15,7 @@ class HeadSensorOffset(Effect):
     Parameters
     ----------
     offset_m : float
-        o; 0 is no effect. [m]
+        o, reading less the true head; 0 is no effect. [m]
 
     References
     ----------

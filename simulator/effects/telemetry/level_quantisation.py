@@ -15,7 +15,7 @@ class LevelQuantisation(Effect):
     Parameters
     ----------
     quantum_m : float
-        q; 0 is no effect. [m]
+        q, step to which the level is rounded; 0 is no effect. [m]
 
     References
     ----------

@@ -16,9 +16,9 @@ class ReportByException(Effect):
     Parameters
     ----------
     channel : str
-        AnalogueQuantity that is reported so, of every pump if it is one of the pumps.
+        Measured value that is reported so, of every pump if it is one of the pumps.
     deadband : float
-        b; 0 is no effect. [unit of the channel]
+        b, change that is needed before a new value comes; 0 is no effect. [unit of the channel]
 
     References
     ----------

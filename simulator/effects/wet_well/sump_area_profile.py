@@ -29,7 +29,7 @@ class SumpAreaProfile(Effect):
     height_m : float
         h, height over the floor at which the area is the configured one. [m]
     exponent : float
-        p; 1 for walls that lean evenly, 2 for a cone with a narrow floor, large for a bench with its edge at h. [1]
+        p: 1 for walls that lean evenly, 2 for a cone with a narrow floor, large for a bench with its edge at h. [1]
     top_factor : float
         t, area at 2 h and above over the configured one; with 2 - b the walls lean evenly. [1]
 

@@ -15,7 +15,7 @@ class UnmeteredInflow(Effect):
     Parameters
     ----------
     flow_m3h : float
-        Q_u; 0 is no effect. [m³/h]
+        Q_u, inflow that no meter sees; 0 is no effect. [m³/h]
 
     References
     ----------

@@ -19,7 +19,7 @@ class AirPocket(SystemFault):
     Parameters
     ----------
     main : int
-        0 for all.
+        Which main, counted from 1; 0 for all.
     static_rise_m : float
         ΔH_s, height over which the pocket stretches at full strength. [m]
 

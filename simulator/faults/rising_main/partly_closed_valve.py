@@ -20,7 +20,7 @@ class PartlyClosedValve(SystemFault):
     Parameters
     ----------
     main : int
-        0 for all.
+        Which main, counted from 1; 0 for all.
     opening : float
         x1, open share of the valve's area at full strength, 0.01..1. [1]
     valve_share : float

@@ -20,7 +20,7 @@ class PipeClogging(SystemFault):
     Parameters
     ----------
     main : int
-        0 for all.
+        Which main, counted from 1; 0 for all.
     friction_rise : float
         Δk, relative rise of the friction coefficient at full strength; negative where deposits wash out. [1]
     static_rise_m : float

@@ -18,10 +18,10 @@ class SensorBias(ChannelFault):
     Parameters
     ----------
     bias : float
-        b at full strength; negative reads too little. [unit of the channel]
+        b, reading less the truth at full strength; negative reads too little. [unit of the channel]
     channel : "level_m", "inflow_m3h", "flow_m3h", "head_m" or "power_kw"
     pump : int
-        0 for all pumps, and for level and inflow.
+        Which pump, counted from 1; 0 for all, and for level and inflow.
 
     References
     ----------

@@ -19,10 +19,10 @@ class SensorDrift(ChannelFault):
     Parameters
     ----------
     bias_per_hour : float
-        d; negative falls. [unit of the channel an hour]
+        d, how fast the reading leaves the truth; negative falls. [unit of the channel an hour]
     channel : "level_m", "inflow_m3h", "flow_m3h", "head_m" or "power_kw"
     pump : int
-        0 for all pumps, and for level and inflow.
+        Which pump, counted from 1; 0 for all, and for level and inflow.
 
     References
     ----------

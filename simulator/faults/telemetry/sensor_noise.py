@@ -19,7 +19,7 @@ class SensorNoise(ChannelFault):
         m, factor on the standard deviation at full strength; 1 changes nothing. [1]
     channel : "level_m", "inflow_m3h", "flow_m3h", "head_m" or "power_kw"
     pump : int
-        0 for all pumps, and for level and inflow.
+        Which pump, counted from 1; 0 for all, and for level and inflow.
 
     References
     ----------

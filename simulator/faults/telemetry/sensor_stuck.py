@@ -16,7 +16,7 @@ class SensorStuck(ChannelFault):
     ----------
     channel : "level_m", "inflow_m3h", "flow_m3h", "head_m" or "power_kw"
     pump : int
-        0 for all pumps, and for level and inflow.
+        Which pump, counted from 1; 0 for all, and for level and inflow.
     shape : "step" or "intermittent"
 
     References

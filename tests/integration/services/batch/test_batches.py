@@ -187,7 +187,7 @@ def test_what_cannot_be_a_scheduler_is_one_line(tmp_path, monkeypatch, run_wetwe
     with pytest.raises(LinkError, match=r"--scheduler: no scheduler answers at tcp://127\.0\.0\.1:9$"):
         list(work_through(abs, [1], 1, 1, "x", "tcp://127.0.0.1:9"))
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ConfigError, match=r"--scheduler: needs the extra 'fleet' \(pip install 'wetwell\[fleet\]'\)"):
+    with pytest.raises(ConfigError, match=r"--scheduler: needs the extra 'fleet' \(pip install '\.\[fleet\]'\)"):
         executors.check_scheduler("local")
     assert not (tmp_path / "set").exists()
 

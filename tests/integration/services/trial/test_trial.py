@@ -293,7 +293,7 @@ def test_command_line(run_wetwell, folder, monkeypatch, capsys):
 
 def test_swmm_without_pyswmm_says_what_to_install(alpha, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyswmm", None)
-    with pytest.raises(WetwellError, match=r"needs pyswmm: pip install 'wetwell\[trial\]'"):
+    with pytest.raises(WetwellError, match=r"needs pyswmm: pip install '\.\[trial\]'"):
         run_swmm(TruthCase(station=alpha, seconds=60))
 
 

@@ -12,6 +12,7 @@ from wetwell.protocols.modbus.device_map import DeviceFile
 from wetwell.protocols.recordings.importers.mapping import TagMapping
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.runtime.settings import Settings
+from wetwell.services.schemas.described import tables_of
 from wetwell.services.schemas.examples import add_examples, examples_of
 from wetwell.services.schemas.registry import SCHEMAS, schema_named
 from wetwell.sim2real.diagnosis.report import GapReport
@@ -66,6 +67,17 @@ def test_what_a_key_shows_is_allowed_there(name):
     assert shown
     for key, value, rule in shown:
         assert Draft202012Validator(rule).is_valid(value), key
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_each_key_has_a_meaning_in_words_and_a_value_to_see(name):
+    schema = schema_named(name)
+    for table in (schema, *schema.get("$defs", {}).values()):
+        for key, rule in {**table.get("properties", {}), **table.get("patternProperties", {})}.items():
+            assert len(rule.get("description", "").split()) > 1, f"{table['title']}.{key}"
+            assert rule.get("examples") or "default" in rule or list(tables_of(schema, rule)), (
+                f"{table['title']}.{key}"
+            )
 
 
 def test_the_first_example_counts_and_tables_are_looked_into():

@@ -1,0 +1,23 @@
+"""Answers as tables: what people call a pump stands beside its number, where it is known."""
+
+from wetwell.protocols.messages.history import History
+from wetwell.services.historian.tables import history_table
+
+LABELS = ("Pumpwerk Süd 1", "Pumpwerk Süd Nord")
+EPISODE = {"asset": "pump:2", "state": "pump_fault", "from": "2026-03-02T08:00:00Z"}
+VERDICT = {"time": "2026-03-02T08:00:00Z", "pump": 2, "state": "normal"}
+
+
+def test_pumps_of_episodes_and_verdicts_have_their_names() -> None:
+    episodes = History(kind="episodes", station="sued", messages=[EPISODE, EPISODE | {"asset": "main"}])
+    assert [row["asset"] for row in history_table(episodes, LABELS)["episodes"]] == [
+        "pump:2 (Pumpwerk Süd Nord)",
+        "main",
+    ]
+    verdicts = History(kind="verdicts", station="sued", messages=[VERDICT])
+    assert history_table(verdicts, LABELS)["verdicts"][0]["pump"] == "2 (Pumpwerk Süd Nord)"
+
+
+def test_without_the_station_file_only_the_keys_are_known() -> None:
+    verdicts = History(kind="verdicts", station="sued", messages=[VERDICT])
+    assert history_table(verdicts)["verdicts"] == [VERDICT]
