@@ -7,7 +7,7 @@ METRICS: Mapping[str, str] = {
     "alarms_10min": "Alarms that called in the last ten minutes.",
     "alarms_hour": "Alarms that called in the last hour.",
     "alarms_day": "Alarms that called in the last day.",
-    "audit_errors": "Acts that were refused because the audit could not be written.",
+    "audit_errors": "Times that the audit could not be written.",
     "bad_quality": "Samples whose source calls them bad.",
     "behind_days": "Days that are over and were not looked at yet, of the station that is furthest behind. [d]",
     "chattering": "Alarms that come and go too often.",
