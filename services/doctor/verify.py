@@ -9,7 +9,7 @@ from wetwell.services.alarms.state_file import STATE_NAME, DamagedStateError, re
 from wetwell.services.detector.checkpoint import is_intact
 from wetwell.services.doctor.finding import Finding
 from wetwell.services.historian.store.archive import Archive
-from wetwell.services.historian.store.live_salvage import damage_of
+from wetwell.services.historian.store.live.salvage import damage_of
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.audit_chain import audits_in, broken_lines, is_cut_off
 from wetwell.services.watch.state_file import WATCH_SUFFIX, is_whole
