@@ -136,18 +136,19 @@ class Archive:
 
     def damage(self) -> list[str]:
         """Daily files that are missing, cannot be read, or are not what was written."""
-        told = []
-        for station in self._ledger.stations():
-            if self._ledger.damage(station):
-                time.sleep(SETTLE_S)  # a file may be written just now
-                told += self._ledger.damage(station)
+        unread: dict[Path, str] = {}
         for station in self.stations():
             for form in get_args(Form):
                 for day_ns in self.days_ns(form, station):
                     try:
                         self._read(form, station, day_ns)
                     except StoreError as error:
-                        told.append(str(error))
+                        unread[self.path(form, station, day_ns)] = str(error)
+        told = list(unread.values())
+        for station in self._ledger.stations():
+            if self._ledger.damage(station, unread):
+                time.sleep(SETTLE_S)  # a file may be written just now
+                told += self._ledger.damage(station, unread)
         return told
 
     def missing(self) -> int:

@@ -6,6 +6,7 @@ is deleted. Files of an earlier version come into it when they are looked throug
 
 import hashlib
 import logging
+from collections.abc import Collection
 from pathlib import Path
 from typing import Literal
 
@@ -88,12 +89,17 @@ class DayLedger:
         except OSError as error:
             raise StoreError(f"{file}: cannot be read: {error.strerror or error}") from error
 
-    def damage(self, station: str) -> list[str]:
-        """What is wrong with the ledger of a station, and the files that are missing or others than were written."""
+    def damage(self, station: str, told_of: Collection[Path] = ()) -> list[str]:
+        """What is wrong with the ledger of a station, and the files that are missing or others than were written.
+
+        Of files that are `told_of` already nothing is said.
+        """
         path = self._path(station)
         told = [f"{path}: line {number} is not what was written" for number in broken_lines(path)]
         told += [f"{path}: lines at its end are lost"] if is_cut_off(path) else []
         for file, expected in self.expected(station).items():
+            if file in told_of:
+                continue
             try:
                 told += [] if sum_of(file) == expected else [f"{file}: is another one than was written"]
             except FileNotFoundError:
