@@ -38,12 +38,13 @@ from wetwell.protocols.recordings.importers.conversion import convert
 from wetwell.protocols.recordings.importers.mapping import TagMapping, load_mapping
 from wetwell.protocols.recordings.recording import read_recording, write_recording
 from wetwell.services.alarms import state_file as alarm_state
-from wetwell.services.alarms.audit import LineAudit, broken_among
 from wetwell.services.dashboard.app import AppState, dashboard_app
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.runtime.settings import load_settings
+from wetwell.services.security.audit import LineAudit
+from wetwell.services.security.audit_chain import broken_among
 from wetwell.services.security.tokens import new_token, read_holders
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.services.watch import state_file as watch_state

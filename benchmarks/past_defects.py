@@ -40,14 +40,14 @@ PAST_DEFECTS = (
     PastDefect(
         "rows of samples are not checked when they are read",
         "41fcdb9",
-        f"{STORE}/live_database.py",
+        f"{STORE}/live/database.py",
         "elif is_sample_intact(station, time_ns, seq, quality, size, data, crc):",
         "elif len(data) % (8 * size) == 0:",
     ),
     PastDefect(
         "messages are not checked when they are read",
         "41fcdb9",
-        f"{STORE}/live_database.py",
+        f"{STORE}/live/database.py",
         "elif is_event_intact(*row):",
         "elif isinstance(row[4], bytes):",
     ),
@@ -61,14 +61,14 @@ PAST_DEFECTS = (
     PastDefect(
         "a database found damaged while it is used stays in use",
         "41fcdb9",
-        f"{STORE}/live_database.py",
+        f"{STORE}/live/database.py",
         '        if getattr(error, "sqlite_errorcode", None) in _DAMAGE:\n            self.is_damaged = True',
         "        return",
     ),
     PastDefect(
         "nothing is saved of a damaged database",
         "41fcdb9",
-        f"{STORE}/live_database.py",
+        f"{STORE}/live/database.py",
         "saved, lost = salvage(aside, self._writer)",
         "saved, lost = 0, 0",
     ),
@@ -89,7 +89,7 @@ PAST_DEFECTS = (
     PastDefect(
         "a row that is damaged keeps the same one from coming again",
         "769a621",
-        f"{STORE}/live_database.py",
+        f"{STORE}/live/database.py",
         '"WHERE payload != excluded.payload OR crc != excluded.crc"',
         '"WHERE payload != payload"',
     ),

@@ -73,6 +73,9 @@ class ModbusServer:
     on_write : callable
         Gets {register name: new value} of all that one request changes, before it changes; a ValueError refuses the
         request with exception 03. Writes that are no registers, or half of one, or read-only get exception 02.
+    witness : callable, optional
+        Gets address of the client, {register name: value} and why it was refused, empty if it was not, of each write
+        that has changed something, or that client or PLC program may not do.
     tls : ssl.SSLContext, optional
         Speak Modbus over TLS only.
     write_allow : sequence of WritePermission
@@ -95,13 +98,14 @@ class ModbusServer:
         pumps: int,
         levels: int,
         on_write: Callable[[Mapping[str, float]], None],
+        witness: Callable[[str, Mapping[str, float], str], None] = lambda _client, _changes, _refused: None,
         tls: ssl.SSLContext | None = None,
         write_allow: Sequence[WritePermission] = LOOPBACK_WRITES,
     ) -> None:
         if not 0 <= unit_id <= 255:
             raise ValueError(f"unit_id must lie in [0, 255], got {unit_id}")
         self._host, self._port, self._unit_id, self._word_order = host, port, unit_id, word_order
-        self._on_write, self._tls, self._write_allow = on_write, tls, write_allow
+        self._on_write, self._witness, self._tls, self._write_allow = on_write, witness, tls, write_allow
         self._measured_words, self._setting_words = measured_words(pumps), 4 * levels
         self._rows = {row.name: row for row in register_table(pumps, levels) if row.table != "input"}
         self._writable = {(row.table, row.address): row for row in self._rows.values() if row.access == "rw"}
@@ -237,6 +241,7 @@ class ModbusServer:
         allowed = allowed_registers(self._write_allow, client, self._names)
         if not allowed:
             _log.warning("write from %s refused: it may write nothing (modbus.write_allow)", client)
+            self._witness(client, {}, "may write nothing")
             return ExcCodes.ILLEGAL_FUNCTION
         changes: dict[str, float] = {}
         at, end = 0, len(values)
@@ -252,14 +257,19 @@ class ModbusServer:
         forbidden = [name for name in changes if name not in allowed]
         if forbidden:
             _log.warning("write of %s from %s refused (modbus.write_allow)", ", ".join(forbidden), client)
+            self._witness(client, changes, f"may not write {', '.join(forbidden)}")
             return ExcCodes.ILLEGAL_ADDRESS
         try:
             self._on_write(changes)
         except ValueError as error:
             _log.info("write of %s from %s refused: %s", ", ".join(changes), client, error)
+            self._witness(client, changes, str(error))
             return ExcCodes.ILLEGAL_VALUE
         _log.info("%s writes %s", client, ", ".join(f"{name} = {value:g}" for name, value in changes.items()))
-        self._image[table][address : address + end] = map(int, values)
+        words = list(map(int, values))
+        if self._image[table][address : address + end] != words:
+            self._image[table][address : address + end] = words
+            self._witness(client, changes, "")
         return None
 
     def _trace_packet(self, sending: bool, packet: bytes) -> bytes:

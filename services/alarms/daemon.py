@@ -19,7 +19,6 @@ from wetwell.protocols.bus.keys import (
     verdict_key,
 )
 from wetwell.protocols.station.station_file import Station
-from wetwell.services.alarms.audit import LineAudit
 from wetwell.services.alarms.service import SOURCES, AlarmService, Kept
 from wetwell.services.alarms.state_file import KeptSite
 from wetwell.services.alarms.station_watch import Now
@@ -28,6 +27,7 @@ from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.folder_lock import folder_held
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
+from wetwell.services.security.audit import LineAudit
 
 log = logging.getLogger(__name__)
 

@@ -27,7 +27,6 @@ from wetwell.protocols.messages.sample_block import LevelBlock
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import NAME_PATTERN, Station
-from wetwell.services.alarms.audit import Audit, AuditTrail
 from wetwell.services.alarms.record import AlarmRecord
 from wetwell.services.alarms.registry import SHELF, AlarmRegistry
 from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
@@ -35,6 +34,7 @@ from wetwell.services.alarms.state_file import KeptSite, SiteState, StationState
 from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
 from wetwell.services.alarms.status import ActRefusedError, AlarmStatus
 from wetwell.services.runtime.settings import AlarmSettings
+from wetwell.services.security.audit import AuditTrail, audit_in
 
 log = logging.getLogger(__name__)
 
@@ -80,7 +80,7 @@ class AlarmService:
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._counts: Counter[str] = Counter()
         self._lost_s: float | None = None
-        kept = kept or Kept(site_in(settings.state_dir), Audit(settings.state_dir))
+        kept = kept or Kept(site_in(settings.state_dir), audit_in(settings.state_dir, "alarm"))
         self._audit, self._file = kept.audit, kept.site
         self._no_limits = limits_of(settings, None)
         self._limits = {station.name: limits_of(settings, station) for station in stations}

@@ -131,12 +131,17 @@ def import_(
     """Fill the history from a recording; what is there already stays as it is."""
     from wetwell.services.historian.store.opening import open_store
     from wetwell.services.historian.transfer import import_recording
+    from wetwell.services.runtime.clock import now_ns
+    from wetwell.services.security.audit import audit_in
+    from wetwell.services.security.tokens import user
 
     reading = reading_of(time_zone, as_station=as_station)
     read = reading.read(recording)
     name = reading.name_for(read, None if station is None else station_name(station), recording)
     settings = with_history(settings_of(config), data)
     with open_store(settings.historian, alone=False) as store:
+        folder = settings.historian.folder if settings.historian.url is None else settings.security.audit_dir
+        audit_in(folder, "history").write(now_ns(), act="import", by=user(), station=name, recording=str(recording))
         rows, new = import_recording(store, name, read, recording)
     if read.value != "instant":
         typer.echo(f"{recording}: the history keeps values as instants, these are '{read.value}'", err=True)

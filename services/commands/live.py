@@ -212,10 +212,14 @@ def release(
     as_json: JsonOption = False,
 ) -> None:
     """Judge a station again, from the next start on, that was left out because the detector had crashed at it."""
-    kept = settings_of(config).detector
+    settings = settings_of(config)
     from wetwell.services.detector.quarantine import Quarantine
+    from wetwell.services.runtime.clock import now_ns
+    from wetwell.services.security.audit import audit_in
+    from wetwell.services.security.tokens import user
 
-    name = station_name(station)
+    kept, name = settings.detector, station_name(station)
+    audit_in(settings.security.audit_dir, "detector").write(now_ns(), act="release", by=user(), station=name)
     Quarantine(kept.state_dir, "release", kept.crash_tries, kept.crash_window_s).release(name)
     print_result({"station": name, "judged": "from the next start on"}, as_json=as_json)
 

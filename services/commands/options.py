@@ -184,6 +184,8 @@ def with_data(settings: "Settings", data: Path | None, otherwise: Path) -> "Sett
         table = getattr(settings, section)
         if data is not None or table.state_dir is None:
             changes[section] = table.model_copy(update={"state_dir": folder / section})
+    if data is not None or settings.security.audit_dir is None:
+        changes["security"] = settings.security.model_copy(update={"audit_dir": folder / "audit"})
     return settings.model_copy(update=changes)
 
 
@@ -316,9 +318,11 @@ def run(settings: "Settings", daemon: Coroutine[Any, Any, None]) -> None:
     from wetwell.services.runtime.health.board import BOARD
     from wetwell.services.runtime.health.page import health_page
     from wetwell.services.runtime.logs import start_logging
+    from wetwell.services.runtime.start import written_down
 
-    start_logging(settings.log, service=sys.argv[1] if len(sys.argv) > 1 else "wetwell")
-    with contextlib.closing(daemon), health_page(settings.health, BOARD):
+    service = sys.argv[1] if len(sys.argv) > 1 else "wetwell"
+    start_logging(settings.log, service)
+    with contextlib.closing(daemon), written_down(settings, service), health_page(settings.health, BOARD):
         asyncio.run(daemon)
 
 

@@ -18,17 +18,25 @@ from starlette.routing import Route
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import SITE
 from wetwell.services.dashboard.assets import Asset, Assets
+from wetwell.services.dashboard.entries import Entries
 from wetwell.services.dashboard.event_streams import EventStreams
 from wetwell.services.dashboard.guard import Guard
 from wetwell.services.dashboard.login import Login, holder_in, while_admitted
-from wetwell.services.dashboard.past.client import act_on_alarm, enter_act, history, recording_pieces, set_plant_clock
+from wetwell.services.dashboard.past.client import (
+    act_on_alarm,
+    enter_act,
+    history,
+    plant_clock_order,
+    recording_pieces,
+    set_plant_clock,
+)
 from wetwell.services.dashboard.past.journal import bands, is_kept, journal
 from wetwell.services.dashboard.past.trends import trends_text
 from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.dashboard.reports import find_report, report_names
 from wetwell.services.dashboard.view.metrics import StationMetrics
 from wetwell.services.dashboard.view.site_view import SiteView
-from wetwell.services.security.attempts import Attempts
+from wetwell.services.security.audit import Audit
 
 GZIP_BYTES = 1000
 GZIP_LEVEL = 5
@@ -63,10 +71,12 @@ class AppState:
         return await is_kept(self.bus, name) if self.bus is not None else None
 
 
-def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_local: bool = True) -> Starlette:
-    """Web application over a state, behind a `Guard`."""
-    attempts = Attempts()
-    pages, answers, login = _Pages(app_state), _Answers(app_state), Login(tokens_file, attempts)
+def dashboard_app(
+    app_state: AppState, tokens_file: Path | None = None, audit: Audit | None = None, *, is_local: bool = True
+) -> Starlette:
+    """Web application over a state, behind a `Guard`; without an audit, who comes in and orders is only logged."""
+    entries = Entries(audit or Audit(None), tokens_file)
+    pages, answers, login = _Pages(app_state), _Answers(app_state, entries), Login(tokens_file, entries)
     shells = ("/", "/alarms", "/reports", "/health")
     return Starlette(
         routes=[
@@ -95,7 +105,7 @@ def dashboard_app(app_state: AppState, tokens_file: Path | None = None, *, is_lo
             Route("/api/reports", answers.reports),
             Route("/reports/{name:path}", answers.report),
         ],
-        middleware=[Middleware(Guard, tokens_file=tokens_file, attempts=attempts, is_local=is_local)],
+        middleware=[Middleware(Guard, tokens_file=tokens_file, entries=entries, is_local=is_local)],
         exception_handlers={RefusalError: _refuse},
     )
 
@@ -128,8 +138,9 @@ class _Pages:
 class _Answers:
     """What is known and what can be asked."""
 
-    def __init__(self, app_state: AppState) -> None:
+    def __init__(self, app_state: AppState, entries: Entries) -> None:
         self._state = app_state
+        self._entries = entries
         self._registry = CollectorRegistry()
         self._registry.register(StationMetrics(app_state.view))
 
@@ -188,8 +199,14 @@ class _Answers:
         return JSONResponse(answer)
 
     async def plant_clock(self, request: Request) -> Response:
-        clock = await set_plant_clock(self._state.asked(), request.path_params["station"], await request.body())
-        return JSONResponse(clock)
+        bus, station = self._state.asked(), request.path_params["station"]
+        order = plant_clock_order(await request.body())
+        changes = order.model_dump(exclude={"schema_name"}, exclude_defaults=True)
+        if changes:
+            await self._entries.order(
+                holder_in(request), request.scope, act="plant clock", station=station, order=changes
+            )
+        return JSONResponse(await set_plant_clock(bus, station, order))
 
     async def history(self, request: Request) -> Response:
         answer = await history(self._state.asked(), request.path_params["station"], request.query_params)

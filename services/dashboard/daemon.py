@@ -15,6 +15,7 @@ from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.health.board import BOARD
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
+from wetwell.services.security.audit import audit_in
 from wetwell.services.security.exposure import check_exposure, is_loopback
 
 log = logging.getLogger(__name__)
@@ -46,14 +47,19 @@ async def _run(settings: Settings, listener: socket.socket) -> None:
     app_state = AppState(SiteView(settings.dashboard.stale_s), EventStreams(), settings.dashboard.reports)
     BOARD.others.append(StationMetrics(app_state.view))
     is_local = tokens_file is None and is_loopback(settings.dashboard.host)
-    app = dashboard_app(app_state, tokens_file, is_local=is_local)
+    audit = audit_in(settings.security.audit_dir, "dashboard")
+    app = dashboard_app(app_state, tokens_file, audit, is_local=is_local)
+
+    def figures() -> dict[str, float]:
+        return feed.figures() | {"audit_errors": float(audit.errors)}
+
     async with web_server(app, listener, app_state.streams):
         log.info("page on http://%s:%d", *listener.getsockname()[:2])
         with await connect(settings) as bus:
             feed, app_state.bus = Feed(bus, app_state.view, app_state.streams), bus
             async with asyncio.TaskGroup() as group:
                 group.create_task(
-                    report_health(bus, SITE, "dashboard", settings.health.period_s, feed.figures),
+                    report_health(bus, SITE, "dashboard", settings.health.period_s, figures),
                     name="dashboard.health",
                 )
                 group.create_task(feed.run(), name="dashboard.feed")

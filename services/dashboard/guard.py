@@ -1,7 +1,5 @@
 """What stands before every answer: whose requests are heard, and what a browser may do with the page."""
 
-import logging
-import time
 from collections.abc import Mapping
 from functools import partial
 from http.cookies import SimpleCookie
@@ -13,12 +11,10 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from wetwell.protocols.errors import ConfigError
+from wetwell.services.dashboard.entries import Entries
 from wetwell.services.dashboard.refusal import RefusalError
-from wetwell.services.security.attempts import Attempts
 from wetwell.services.security.exposure import is_loopback
 from wetwell.services.security.tokens import Holder, holder_of
-
-log = logging.getLogger(__name__)
 
 COOKIE = "wetwell_token"
 MOST_BODY_BYTES = 65_536
@@ -59,16 +55,16 @@ class Guard:
     app : ASGIApp
     tokens_file : Path, optional
         File of tokens.
-    attempts : Attempts
-        Wrong tokens of each address.
+    entries : Entries
+        Hears of each token that is refused.
     is_local : bool
         Whether only names of this machine are heard.
     """
 
-    def __init__(self, app: ASGIApp, tokens_file: Path | None, attempts: Attempts, *, is_local: bool) -> None:
+    def __init__(self, app: ASGIApp, tokens_file: Path | None, entries: Entries, *, is_local: bool) -> None:
         self._app = app
         self._tokens_file = tokens_file
-        self._attempts = attempts
+        self._entries = entries
         self._is_local = is_local
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -93,7 +89,9 @@ class Guard:
             holder, refusal = self._admitted(scope["method"], path, token)
             is_wrong = token and holder is None and path.startswith(_GUARDED) and path != _LOGIN
             if is_wrong and refusal in {None, _NEEDED}:
-                refusal = too_many(self._attempts, scope) or refusal
+                refusal = await self._entries.refuse(token, scope) or refusal
+            elif refusal and holder is not None:
+                await self._entries.forbid(holder, scope)
             state = scope.setdefault("state", {})
             state["holder"] = holder
             state["is_admitted"] = partial(self._is_admitted, path, token)
@@ -137,16 +135,6 @@ def bounded(receive: Receive) -> Receive:
         return message
 
     return receive_bounded
-
-
-def too_many(attempts: Attempts, scope: Scope) -> tuple[int, str] | None:
-    """Count a wrong token, and refuse those of its address where there were too many."""
-    address = (scope.get("client") or ("?", 0))[0]
-    wait_s = attempts.note(address, time.monotonic())
-    if not wait_s:
-        log.warning("a wrong token from %s", address)
-        return None
-    return 429, f"too many wrong tokens from {address}: wait {wait_s:.0f} s"
 
 
 def token_in(headers: Mapping[str, str]) -> str:

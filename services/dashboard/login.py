@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import logging
 import time
 from collections.abc import AsyncGenerator
 from pathlib import Path
@@ -10,11 +9,9 @@ from pathlib import Path
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from wetwell.services.dashboard.guard import COOKIE, too_many
-from wetwell.services.security.attempts import Attempts
+from wetwell.services.dashboard.entries import Entries
+from wetwell.services.dashboard.guard import COOKIE
 from wetwell.services.security.tokens import Holder, holder_of
-
-log = logging.getLogger(__name__)
 
 COOKIE_S = 30 * 24 * 3600
 CHECK_S = 10.0
@@ -24,9 +21,9 @@ CHECK_S = 10.0
 class Login:
     """Answers on who asks; without a file of tokens nobody needs one."""
 
-    def __init__(self, tokens_file: Path | None, attempts: Attempts) -> None:
+    def __init__(self, tokens_file: Path | None, entries: Entries) -> None:
         self._tokens_file = tokens_file
-        self._attempts = attempts
+        self._entries = entries
 
     async def who(self, request: Request) -> Response:
         """Whether a token is needed, and who has brought one."""
@@ -41,13 +38,15 @@ class Login:
         holder = None if self._tokens_file is None else holder_of(self._tokens_file, token)
         answer = JSONResponse(self._told(holder), headers={"cache-control": "no-store"})
         if holder is None:
-            refusal = too_many(self._attempts, request.scope) if token and self._tokens_file else None
+            refusal = await self._entries.refuse(token, request.scope) if token and self._tokens_file else None
             if refusal is not None:
                 status, reason = refusal
                 return JSONResponse({"error": reason}, status)
+            if (gone := holder_in(request)) is not None and not token:
+                await self._entries.leave(gone, request.scope)
             answer.delete_cookie(COOKIE)
         else:
-            log.info("%s has come in as %s", holder.name, holder.role)
+            await self._entries.enter(holder, request.scope)
             secure = request.url.scheme == "https"
             answer.set_cookie(COOKIE, token, max_age=COOKIE_S, httponly=True, samesite="strict", secure=secure)
         return answer

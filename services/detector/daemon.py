@@ -24,6 +24,7 @@ from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.folder_lock import folder_held
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
+from wetwell.services.security.audit import audit_in
 
 if TYPE_CHECKING:
     from wetwell.services.lease.outbox import Outbox
@@ -116,6 +117,7 @@ async def judge_all(
     """
     kept = settings.detector
     outlet: Outlet = bus if turn is None else turn.outbox
+    audit = audit_in(settings.security.audit_dir, "detector")
     quarantine = Quarantine(kept.state_dir, name, kept.crash_tries, kept.crash_window_s)
     async with contextlib.AsyncExitStack() as stack, asyncio.TaskGroup() as group:
         stack.callback(quarantine.close)
@@ -128,7 +130,7 @@ async def judge_all(
             checkpoint = (
                 checkpoint_in(kept.state_dir, station.name) if turn is None else turn.checkpoint(station.name)
             )
-            judge = StationDetector(outlet, station, kept.costs, checkpoint, quarantine)
+            judge = StationDetector(outlet, station, kept.costs, checkpoint, quarantine, audit)
             stack.callback(judge.keep)
             judges.append(judge)
         intake = Intake(bus, judges, None if turn is None else turn.follower)

@@ -22,10 +22,13 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
+from wetwell.protocols.timestamps import to_iso
 from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.maintenance_log import MaintenanceLog
 from wetwell.services.detector.model_publisher import ModelPublisher
 from wetwell.services.detector.quarantine import Quarantine
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.security.audit import Audit
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +53,8 @@ class StationDetector:
         Where the state is kept; what it holds is taken up at once, and its last verdicts are published again.
     quarantine : Quarantine, optional
         What remembers at which station the process has died.
+    audit : Audit, optional
+        Where orders and acts of maintenance are written down; a disk that refuses holds up nothing.
     """
 
     def __init__(
@@ -59,12 +64,14 @@ class StationDetector:
         costs: Costs | None = None,
         checkpoint: Checkpoint | None = None,
         quarantine: Quarantine | None = None,
+        audit: Audit | None = None,
     ) -> None:
         self.station = station.name
         self._place = f"station '{station.name}': "
         self.detector = Detector.of(station, costs)
         self._checkpoint = checkpoint
         self._quarantine = quarantine or Quarantine(None, "", 1, 0.0)
+        self._audit = audit or Audit(None)
         told = None if checkpoint is None else checkpoint.restore(self.detector)
         self.is_restored = told is not None
         self._publishers = [
@@ -132,7 +139,7 @@ class StationDetector:
         """Health figures."""
         counts = {name: float(count) for name, count in (self.detector.counts | self._counts).items()}
         age_s = time.monotonic() - self._heard_s
-        return counts | {"sample_age_s": age_s}
+        return counts | {"sample_age_s": age_s, "audit_errors": float(self._audit.errors)}
 
     def decoded(self, payload: bytes, kind: type[SampleMessage]) -> SampleMessage | None:
         """Message of this station in a payload; one that is none is counted, and None."""
@@ -192,6 +199,7 @@ class StationDetector:
         if order.id in self._answers:
             self._publish(self._answers[order.id])  # sent again because the answer was lost
             return
+        self._audit.note(now_ns(), **order.model_dump(mode="json", exclude={"schema_name", "time"}))
         act = self.detector.rebaseline if order.act == "rebaseline" else self.detector.revert
         verdict = act(order.pump - 1, order.time)
         log.info("station '%s' pump %d: %s by %s", self.station, order.pump, order.act, order.by)
@@ -214,6 +222,9 @@ class StationDetector:
             self._counts["foreign_acts"] += 1
             log.warning("station '%s': act on station '%s' refused", self.station, act.station)
             return
+        if act.id not in self._maintenance.records:
+            fields = act.model_dump(mode="json", exclude={"schema_name", "time", "act"})
+            self._audit.note(now_ns(), act="maintenance", done=act.act, at=act.time and to_iso(act.time), **fields)
         for verdict in self._maintenance.enter(act):
             self._publish(verdict)
         self.keep()  # what was entered must be known after a kill

@@ -76,19 +76,23 @@ def _station(name: str, findings: list[Finding]) -> Station | None:
 
 
 def _disks(settings: Settings) -> list[Finding]:
-    folders = {"detector": settings.detector.state_dir, "alarms": settings.alarms.state_dir}
+    folders = {
+        "detector.state_dir": settings.detector.state_dir,
+        "alarms.state_dir": settings.alarms.state_dir,
+        "security.audit_dir": settings.security.audit_dir,
+    }
     findings = []
-    for service, folder in folders.items():
+    for setting, folder in folders.items():
         if folder is None:
             continue
         try:
             free = shutil.disk_usage(folder).free
         except OSError as error:
-            text = f"{service}.state_dir: {folder}: {error.strerror}"
+            text = f"{setting}: {folder}: {error.strerror}"
             findings.append(Finding("disk", "error", text, "make the folder, or set another"))
             continue
         is_low = free < LEAST_FREE_BYTES
-        text = f"{service}.state_dir: {free / 1e9:.1f} GB free"
+        text = f"{setting}: {free / 1e9:.1f} GB free"
         advice = "make room, before state and audit cannot be written" if is_low else ""
         findings.append(Finding("disk", "warning" if is_low else "ok", text, advice))
     return findings

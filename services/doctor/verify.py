@@ -5,13 +5,13 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from wetwell.services.alarms.audit import Audit, broken_lines, end_of, is_cut_off
-from wetwell.services.alarms.state_file import DamagedStateError, read_state
+from wetwell.services.alarms.state_file import STATE_NAME, DamagedStateError, read_state
 from wetwell.services.detector.checkpoint import is_intact
 from wetwell.services.doctor.finding import Finding
 from wetwell.services.historian.store.archive import Archive
-from wetwell.services.historian.store.live_salvage import damage_of
+from wetwell.services.historian.store.live.salvage import damage_of
 from wetwell.services.runtime.settings import Settings
+from wetwell.services.security.audit_chain import audits_in, broken_lines, is_cut_off
 from wetwell.services.watch.state_file import WATCH_SUFFIX, is_whole
 
 MOST_TOLD = 5
@@ -24,6 +24,7 @@ def verify_kept(settings: Settings) -> list[Finding]:
         *_history(settings),
         *_checkpoints(settings.detector.state_dir),
         *_alarms(settings.alarms.state_dir),
+        *_audits(settings),
         *_watches(settings.watch.state_dir),
     ]
     return findings or [Finding("verify", "warning", "nothing is kept here", "name the folders: --config FILE")]
@@ -52,7 +53,7 @@ def _checkpoints(folder: Path | None) -> Iterator[Finding]:
 def _alarms(folder: Path | None) -> Iterator[Finding]:
     if folder is None:
         return
-    state, audit = folder / "alarms.json", Audit(folder).path
+    state = folder / STATE_NAME
     if state.exists():
         try:
             read_state(state.read_bytes())
@@ -60,7 +61,14 @@ def _alarms(folder: Path | None) -> Iterator[Finding]:
         except (DamagedStateError, ValidationError):
             damage = [state.name]
         yield _finding("alarms", str(state), damage, "they begin anew at their next start; or bring a backup back")
-    if audit is not None and (audit.exists() or end_of(audit).exists()):
+
+
+def _audits(settings: Settings) -> Iterator[Finding]:
+    """Each audit there is: of alarms, of the daemons, of imports, and of tokens beside their file."""
+    tokens_file = settings.security.tokens_file
+    folders = [settings.alarms.state_dir, settings.security.audit_dir, settings.historian.folder]
+    folders += [] if tokens_file is None else [tokens_file.parent]
+    for audit in sorted({path for folder in folders if folder is not None for path in audits_in(folder)}):
         broken = [f"line {number}" for number in broken_lines(audit)]
         broken += ["lines at its end are lost"] if is_cut_off(audit) else []
         yield _finding("audit", str(audit), broken, "compare it with a backup: lines were changed, lost or put in")

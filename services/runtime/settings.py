@@ -350,11 +350,15 @@ class SecuritySettings(Table):
     ----------
     tokens_file : Path, optional
         Tokens of the dashboard, made by `wetwell token`.
+    audit_dir : Path, optional
+        Folder in which each daemon writes down its starts with their settings, logins, writes over Modbus and orders;
+        without it they are only logged.
     insecure : bool
         Whether to listen beyond this machine without asking who comes.
     """
 
     tokens_file: Path | None = None
+    audit_dir: Path | None = None
     insecure: bool = False
 
 

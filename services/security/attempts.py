@@ -11,6 +11,18 @@ MOST_ADDRESSES = 10_000
 """Addresses that are remembered, the last ones; about 1 MB."""
 
 
+def is_news(wait_s: float) -> bool:
+    """Whether a wrong token, after which its sender has to wait so long, is within the limit or the first beyond it.
+
+    Examples
+    --------
+    >>> attempts = Attempts()
+    >>> sum(is_news(attempts.note("192.0.2.7", now_s=0.0)) for _ in range(100))
+    11
+    """
+    return wait_s <= ATTEMPT_S
+
+
 @dataclass(slots=True)
 class Attempts:
     """Wrong tokens of each address, as a bucket that leaks one in `ATTEMPT_S`.

@@ -20,9 +20,11 @@ from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
 from wetwell.services.runtime.sample_sender import SampleSender
 from wetwell.services.runtime.settings import ModbusSettings, Settings
+from wetwell.services.security.audit import Audit, audit_in
 from wetwell.services.security.exposure import is_loopback
 from wetwell.services.simulator.orders import obey
 from wetwell.services.simulator.pace import Pace
+from wetwell.services.simulator.write_log import WriteLog
 from wetwell.simulator.simulation import Simulation
 
 log = logging.getLogger(__name__)
@@ -86,7 +88,8 @@ async def _run(
     name, clock = simulation.station.name, asyncio.get_running_loop().time
     pace, changed = Pace(speed, clock(), is_held=True), asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:
-        sinks = [await _modbus_sink(settings, simulation, stack)] if modbus else []
+        audit = audit_in(settings.security.audit_dir, "simulator")
+        sinks = [await _modbus_sink(settings, simulation, audit, stack)] if modbus else []
         await asyncio.to_thread(_make_ready, simulation, start.begin_s)
         async with asyncio.TaskGroup() as group:
             if zenoh:
@@ -105,6 +108,7 @@ async def _run(
                         "speed": pace.speed,
                         "full_speed": pace.full_speed,
                         "held": float(pace.is_held),
+                        "audit_errors": float(audit.errors),
                     }
 
                 group.create_task(
@@ -171,7 +175,9 @@ def tls_of(modbus: ModbusSettings) -> ssl.SSLContext | None:
     return server_context(tls.certificate, tls.private_key, tls.client_ca, f"Modbus TCP {modbus.host}:{modbus.port}")
 
 
-async def _modbus_sink(settings: Settings, simulation: Simulation, stack: contextlib.AsyncExitStack) -> Sink:
+async def _modbus_sink(
+    settings: Settings, simulation: Simulation, audit: Audit, stack: contextlib.AsyncExitStack
+) -> Sink:
     try:
         server = ModbusServer(
             host=settings.modbus.host,
@@ -181,6 +187,7 @@ async def _modbus_sink(settings: Settings, simulation: Simulation, stack: contex
             pumps=len(simulation.station.pump),
             levels=len(simulation.station.control.start_levels_m),
             on_write=simulation.change_settings,
+            witness=WriteLog(audit, simulation.station.name).note,
             tls=tls_of(settings.modbus),
             write_allow=[WritePermission(rule.client, rule.registers) for rule in settings.modbus.write_allow],
         )

@@ -23,7 +23,7 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, Store, blocks
-from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.live.database import LiveDatabase
 from wetwell.services.historian.store.postgres_store import PostgresStore
 
 pytestmark = pytest.mark.check
@@ -117,7 +117,7 @@ def test_a_historian_that_was_killed_gets_what_it_missed_from_the_publishers(tmp
 UPGRADER = """
 import contextlib, os, signal, sqlite3, sys
 from pathlib import Path
-from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.live.database import LiveDatabase
 
 class Killed(sqlite3.Connection):
     def __init__(self, *arguments, **named):
@@ -140,6 +140,8 @@ def test_an_upgrade_that_is_killed_leaves_the_earlier_database(tmp_path: Path, s
     store.close()
     with contextlib.closing(sqlite3.connect(path)) as database:
         database.executescript(
+            "DROP TRIGGER event_comes; DROP TRIGGER event_goes; DROP TRIGGER event_gets_its_checksum;"
+            "DROP TABLE tally; DROP TABLE head;"
             "CREATE TABLE earlier (station INTEGER NOT NULL, time_ns INTEGER NOT NULL, seq INTEGER NOT NULL, "
             "quality INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (station, time_ns, seq)) WITHOUT ROWID;"
             "INSERT INTO earlier SELECT station, time_ns, seq, quality, data FROM sample;"

@@ -32,7 +32,7 @@ DEFECTS = {
         [Accident("twin", "detector", at_s, 3_000.0) for at_s in EVERY_H],
     ),
     "rows of samples are not checked": (
-        [mock.patch(f"{STORE}.{module}.is_sample_intact", always) for module in ("live_database", "live_salvage")],
+        [mock.patch(f"{STORE}.{module}.is_sample_intact", always) for module in ("live.database", "live.salvage")],
         [Accident("stop", "historian", at_s, 1.0) for at_s in EVERY_H]  # what is in its log comes into the file
         + [Accident("rot", "historian", at_s + number, 1.0, number) for at_s in EVERY_H for number in range(60, 120)],
     ),

@@ -84,18 +84,28 @@ async def enter_act(bus: Bus, station: str, body: bytes, by: str | None = None) 
     return record.model_dump(mode="json")
 
 
-async def set_plant_clock(bus: Bus, station: str, body: bytes) -> dict[str, Any]:
-    """How the clock of a simulated plant stands after an order: a `PlantClockOrder` in JSON.
+def plant_clock_order(body: bytes) -> PlantClockOrder:
+    """Order to the clock of a simulated plant, in JSON.
 
     Raises
     ------
     RefusalError
-        If the body is no order, or nobody answers.
+        If the body is none.
     """
     try:
-        order = PlantClockOrder.model_validate_json(body)
+        return PlantClockOrder.model_validate_json(body)
     except ValidationError as error:
         raise RefusalError(400, first_fault(error)) from error
+
+
+async def set_plant_clock(bus: Bus, station: str, order: PlantClockOrder) -> dict[str, Any]:
+    """How the clock of a simulated plant stands after an order.
+
+    Raises
+    ------
+    RefusalError
+        If it is not carried out, or nobody answers.
+    """
     for payload in await bus.ask(plant_clock_key(station), order.encode(), timeout_s=ANSWER_S):
         try:
             clock = PlantClock.decode(payload)

@@ -7,6 +7,7 @@ columns, of which four are lists as long as `columns_of`, so that a file is read
 
 import logging
 import os
+import time
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -20,11 +21,14 @@ from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.quantities import columns_of, pumps_of, pumps_of_width
 from wetwell.protocols.recordings.origin import Origin
 from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.store.day_ledger import DayLedger
 from wetwell.services.historian.store.interface import DAY_NS, StoreError
 from wetwell.services.historian.summary import Summary
 
 log = logging.getLogger(__name__)
 
+SETTLE_S = 1.0
+"""So long a file and the line about it may be apart. [s]"""
 Form = Literal["samples", "minutes", "tens"]
 _STAMP = pa.timestamp("ns", tz="UTC")
 _SUMMARY = ("count", "mean", "low", "high")
@@ -37,6 +41,7 @@ class Archive:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._ledger = DayLedger(folder)
 
     def stations(self) -> list[str]:
         """Stations of which there is a file."""
@@ -110,6 +115,7 @@ class Archive:
         path = self.path("samples", station, day_ns)
         _write(path, samples.time_ns, values, columns, Origin(station=station))
         _check(path, self.samples(station, day_ns), samples, ("time_ns", "seq", "quality", "values"))
+        self._ledger.note(station, "write", path)
 
     def write_minutes(self, station: str, day_ns: int, minutes: Summary) -> None:
         """Write the minutes of a day, and see that they can be read back."""
@@ -118,6 +124,7 @@ class Archive:
         path = self.path("minutes", station, day_ns)
         _write(path, minutes.time_ns, minutes.columns() | counts, {}, Origin(station=station))
         _check(path, self.minutes(station, day_ns), minutes, ("time_ns", *_SUMMARY))
+        self._ledger.note(station, "write", path)
 
     def write_tens(self, station: str, day_ns: int, tens: Summary) -> None:
         """Write the ten minutes of a day, and see that they can be read back."""
@@ -125,18 +132,46 @@ class Archive:
         lists = {name: _as_lists(getattr(tens, name)) for name in _SUMMARY}
         _write(path, tens.time_ns, {}, lists, Origin(station=station))
         _check(path, self.tens(station, day_ns), tens, ("time_ns", *_SUMMARY))
+        self._ledger.note(station, "write", path)
 
     def damage(self) -> list[str]:
-        """Daily files that cannot be read, or whose pages are not what was written."""
-        told = []
+        """Daily files that are missing, cannot be read, or are not what was written."""
+        unread: dict[Path, str] = {}
         for station in self.stations():
             for form in get_args(Form):
                 for day_ns in self.days_ns(form, station):
                     try:
                         self._read(form, station, day_ns)
                     except StoreError as error:
-                        told.append(str(error))
+                        unread[self.path(form, station, day_ns)] = str(error)
+        told = list(unread.values())
+        for station in self._ledger.stations():
+            if self._ledger.damage(station, unread):
+                time.sleep(SETTLE_S)  # a file may be written just now
+                told += self._ledger.damage(station, unread)
         return told
+
+    def missing(self) -> int:
+        """Tell the daily files that are missing, once; how many."""
+        count = 0
+        for station in self._ledger.stations():
+            for path in self._ledger.missing(station):
+                log.error("%s: is missing", path)
+                self._ledger.note(station, "lose", path)
+                count += 1
+        return count
+
+    def look_at(self, form: Form, station: str, day_ns: int) -> int:
+        """Put the file of a day aside if it cannot be read; tell it once if it is another one; how many damages."""
+        if self.put_aside_damaged(form, station, day_ns):
+            return 1
+        path = self.path(form, station, day_ns)
+        is_changed = self._ledger.is_changed(station, path)
+        if is_changed:
+            log.error("%s: is another one than was written; it can be read, and stays", path)
+        if is_changed or path not in self._ledger.expected(station):
+            self._ledger.note(station, "find", path)
+        return int(is_changed)
 
     def put_aside_damaged(self, form: Form, station: str, day_ns: int) -> bool:
         """Put the file of a day aside if it is not what was written; whether it was."""
@@ -145,6 +180,7 @@ class Archive:
             self._read(form, station, day_ns)
         except StoreError as error:
             aside = path.with_name(f"{path.name}.refused")
+            self._ledger.note(station, "put aside", path)
             try:
                 path.replace(aside)
             except OSError as reason:
@@ -156,10 +192,21 @@ class Archive:
     def delete(self, form: Form, station: str, day_ns: int) -> None:
         """Delete the file of a day."""
         path = self.path(form, station, day_ns)
+        is_noted = self._is_noted(station, path)
         try:
             path.unlink(missing_ok=True)
         except OSError as error:
             raise StoreError(f"{path}: cannot be deleted: {error.strerror or error}") from error
+        if not is_noted:
+            self._ledger.note(station, "delete", path)
+
+    def _is_noted(self, station: str, path: Path) -> bool:
+        """Whether it could be written down that a file goes; a full disk must not keep it."""
+        try:
+            self._ledger.note(station, "delete", path)
+        except StoreError:
+            return False
+        return True
 
     def _read(self, form: Form, station: str, day_ns: int, columns: list[str] | None = None) -> pa.Table | None:
         """Table of a day; None if there is no file.

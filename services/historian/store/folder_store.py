@@ -22,10 +22,12 @@ from wetwell.services.historian.store.interface import (
     day_of,
     maintain_one,
 )
-from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.live.database import LiveDatabase
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
+from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.folder_lock import folder_held
+from wetwell.services.security.audit import audit_in
 
 log = logging.getLogger(__name__)
 
@@ -65,6 +67,9 @@ class FolderStore:
         except OSError as error:
             raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
         self.live = LiveDatabase(folder / "live.sqlite", self.alone)
+        if self.live.replaced is not None:
+            act = "found another database than the last one"
+            audit_in(folder, "history").note(now_ns(), act=act, reason=self.live.replaced)
         self.archive = Archive(folder)
         self._refused_files = 0
         self._adopt()
@@ -197,16 +202,19 @@ class FolderStore:
 
     def scrub(self) -> Iterator[None]:
         """Look through all that is kept, a part at a time; what is damaged is put aside and told."""
+        self.live.mark_end()
         self.live.check()
         yield
         for span in self.stations():
             for day_ns in self.live.days_ns(span.station, -(2**63), 2**63 - 1):
                 self.live.put_aside_damaged(span.station, day_ns, day_ns + DAY_NS)
                 yield
+        self._refused_files += self.archive.missing()
+        yield
         for station in self.archive.stations():
             for form in get_args(Form):
                 for day_ns in self.archive.days_ns(form, station):
-                    self._refused_files += self.archive.put_aside_damaged(form, station, day_ns)
+                    self._refused_files += self.archive.look_at(form, station, day_ns)
                     yield
 
     def figures(self) -> dict[str, float]:

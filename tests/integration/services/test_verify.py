@@ -9,7 +9,6 @@ from memory_bus import MemoryBus
 
 from wetwell.protocols.messages.alarm import AlarmAct
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.services.alarms.audit import Audit, broken_lines, end_of, is_cut_off
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
 from wetwell.services.detector.checkpoint import checkpoint_in
@@ -20,7 +19,16 @@ from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, Batch
-from wetwell.services.runtime.settings import AlarmSettings, DetectorSettings, HistorianSettings, Settings
+from wetwell.services.runtime.settings import (
+    AlarmSettings,
+    DetectorSettings,
+    HistorianSettings,
+    SecuritySettings,
+    Settings,
+)
+from wetwell.services.security.audit import audit_in
+from wetwell.services.security.audit_chain import broken_lines, end_of, is_cut_off
+from wetwell.services.security.tokens import new_token
 from wetwell.services.stations import find_scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -126,7 +134,7 @@ def test_a_line_of_the_audit_that_is_not_as_it_was_shows(kept, tmp_path, damage)
 
 @pytest.mark.parametrize("left", [b"", b"line", None])
 def test_lines_that_are_cut_off_at_the_end_of_the_audit_show_and_stay_told(tmp_path, left):
-    audit = Audit(tmp_path)
+    audit = audit_in(tmp_path, "alarm")
     for number in range(4):
         audit.write(NOW_NS, act="shelve", number=number)
     assert not is_cut_off(audit.path)
@@ -141,20 +149,45 @@ def test_lines_that_are_cut_off_at_the_end_of_the_audit_show_and_stay_told(tmp_p
     (finding,) = verify_kept(settings)
     assert (finding.check, finding.level) == ("audit", "error")
     assert "lines at its end are lost" in finding.text
-    Audit(tmp_path).write(NOW_NS, act="shelve", number=4)
+    audit_in(tmp_path, "alarm").write(NOW_NS, act="shelve", number=4)
     told = [json.loads(line).get("act") for line in audit.path.read_text().splitlines() if line.startswith("{")]
     assert told[-2:] == ["found that lines before this one are lost", "shelve"]
     assert not is_cut_off(audit.path)
 
 
+def test_each_audit_of_a_site_is_checked(tmp_path):
+    tokens_file = tmp_path / "etc" / "tokens.toml"
+    tokens_file.parent.mkdir()
+    new_token(tokens_file, "ada", "operator")
+    new_token(tokens_file, "eve", "viewer")
+    for folder, names in (("alarms", ["alarm"]), ("audit", ["dashboard", "simulator"]), ("history", ["history"])):
+        (tmp_path / folder).mkdir()
+        for name in names:
+            audit = audit_in(tmp_path / folder, name)
+            audit.write(NOW_NS, act="one")
+            audit.write(NOW_NS, act="two")
+    settings = Settings(
+        alarms=AlarmSettings(state_dir=tmp_path / "alarms"),
+        historian=HistorianSettings(folder=tmp_path / "history"),
+        security=SecuritySettings(audit_dir=tmp_path / "audit", tokens_file=tokens_file),
+    )
+    audits = sorted(tmp_path.rglob("*-audit.jsonl"))
+    assert [(finding.level, finding.check) for finding in verify_kept(settings)] == [("ok", "audit")] * 5
+    assert len(audits) == 5
+    for audit in audits:
+        audit.write_text(audit.read_text().split("\n", 1)[1])
+        (finding,) = [finding for finding in verify_kept(settings) if str(audit) in finding.text]
+        assert (finding.level, finding.text) == ("error", f"{audit}: damaged: line 1")
+
+
 def test_an_audit_that_was_killed_before_its_end_was_written_down_is_whole(tmp_path):
-    audit = Audit(tmp_path)
+    audit = audit_in(tmp_path, "alarm")
     audit.write(NOW_NS, act="shelve", number=1)
     end = end_of(audit.path).read_bytes()
     audit.write(NOW_NS, act="shelve", number=2)
     end_of(audit.path).write_bytes(end)
     assert not is_cut_off(audit.path)
-    Audit(tmp_path).write(NOW_NS, act="shelve", number=3)
+    audit_in(tmp_path, "alarm").write(NOW_NS, act="shelve", number=3)
     assert broken_lines(audit.path) == []
     assert len(audit.path.read_text().splitlines()) == 3
 
@@ -163,7 +196,7 @@ def test_the_chain_goes_on_after_a_restart_and_behind_lines_of_an_earlier_versio
     path = tmp_path / "alarm-audit.jsonl"
     path.write_text('{"time": "2026-01-01T00:00:00Z", "act": "acknowledge"}\n')
     for number in range(4):
-        Audit(tmp_path).write(NOW_NS, act="shelve", number=number)
+        audit_in(tmp_path, "alarm").write(NOW_NS, act="shelve", number=number)
     assert broken_lines(path) == []
     lines = path.read_text().splitlines()
     path.write_text("\n".join([lines[0], *lines[2:]]) + "\n")

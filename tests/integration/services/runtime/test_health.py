@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -238,7 +239,8 @@ def test_daemons_tell_systemd_http_and_the_log(tmp_path):
             words.append(receiver.recv(64).decode())
         assert words[-1] == "STOPPING=1"
     assert (lines[0]["level"], lines[0]["service"]) == ("INFO", "router")
-    assert lines[0]["message"] == f"router on tcp/127.0.0.1:{port}"
+    assert lines[0]["message"].startswith("audit: ")
+    assert lines[1]["message"] == f"router on tcp/127.0.0.1:{port}"
 
 
 def test_units_are_alike_and_systemd_finds_no_fault_in_them(tmp_path):
@@ -259,6 +261,9 @@ def test_units_are_alike_and_systemd_finds_no_fault_in_them(tmp_path):
     for unit in units:
         text = unit.read_text()
         name = unit.stem.removeprefix("wetwell-").rstrip("@")
+        state = re.findall(r"^StateDirectory=(.*)", text, re.MULTILINE)
+        assert re.findall(r"AUDIT_DIR=(.*)", text) == [f"%S/{folder}" for folder in state]
+        assert len(state) == 1
         command = {"watch": "gap watch"}.get(name, name)
         assert f"ExecStart=wetwell {command}" in text
         for wanted in ("Type=notify", "WatchdogSec=60", "Restart=always", "DynamicUser=yes", "LoadCredential="):

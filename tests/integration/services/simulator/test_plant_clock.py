@@ -14,7 +14,7 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.alarms.station_watch import Now
-from wetwell.services.dashboard.past.client import set_plant_clock
+from wetwell.services.dashboard.past.client import plant_clock_order, set_plant_clock
 from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.runtime.settings import AlarmSettings, Settings
 from wetwell.services.simulator import daemon
@@ -87,11 +87,11 @@ def test_it_stands_until_it_is_let_go_and_obeys(alpha, bus):
 def test_the_page_sends_the_same_orders_and_says_what_is_wrong(alpha, bus):
     async def run() -> None:
         async with plant(bus, alpha, PlantStart()):
-            assert (await set_plant_clock(bus, "alpha", b'{"is_held": true}'))["is_held"]
+            assert (await set_plant_clock(bus, "alpha", plant_clock_order(b'{"is_held": true}')))["is_held"]
             with pytest.raises(RefusalError, match="speed: got 0"):
-                await set_plant_clock(bus, "alpha", b'{"speed": 0}')
+                plant_clock_order(b'{"speed": 0}')
             with pytest.raises(RefusalError, match="station 'beta' has no simulated plant"):
-                await set_plant_clock(bus, "beta", b"{}")
+                await set_plant_clock(bus, "beta", PlantClockOrder())
 
     asyncio.run(run())
 

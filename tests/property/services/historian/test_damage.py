@@ -12,7 +12,7 @@ from wetwell.services.historian.rows import pack, pack_arrays
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import Batch, EventRow, StoreError
-from wetwell.services.historian.store.live_salvage import damage_of
+from wetwell.services.historian.store.live.salvage import damage_of
 
 PAGE = 4096
 STATIONS = ("alpha", "beta")

@@ -20,7 +20,7 @@ from wetwell.services.historian.samples import Samples, merged
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, Batch, StationSpan, Store, blocks
-from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.live.database import LiveDatabase
 from wetwell.services.historian.store.postgres_store import PostgresStore
 
 NOW_NS = 10 * DAY_NS

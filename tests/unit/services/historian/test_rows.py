@@ -21,7 +21,7 @@ from wetwell.services.historian.service import Historian
 from wetwell.services.historian.spool import Spool
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, DIGEST_BYTES, Batch, StoreError
-from wetwell.services.historian.store.live_database import LiveDatabase
+from wetwell.services.historian.store.live.database import LiveDatabase
 
 VERSION_1 = """
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
@@ -248,6 +248,6 @@ def test_who_may_not_write_the_lock_cannot_upgrade_a_database_of_version_1(tmp_p
 
 def test_a_database_of_a_later_version_is_refused(tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(tmp_path / "live.sqlite")) as database:
-        database.execute("PRAGMA user_version = 4")
-    with pytest.raises(StoreError, match="version 4 is newer than 3"):
+        database.execute("PRAGMA user_version = 5")
+    with pytest.raises(StoreError, match="version 5 is newer than 4"):
         FolderStore(tmp_path)

@@ -81,6 +81,8 @@ def test_the_commands(run_wetwell, tmp_path: Path, capsys: pytest.CaptureFixture
 
     told = run("import", "--recording", source, "--station", "beta")
     assert told == {"station": "beta", "rows": 432, "new": 432, "doubled": 0}
+    entry = json.loads((data / "history-audit.jsonl").read_text())
+    assert (entry["act"], entry["station"], entry["recording"]) == ("import", "beta", str(source))
     told = run("export", "--station", "beta", "--out", out)
     assert told == {"recording": str(out), "station": "beta", "rows": 432}
     assert same(read_recording(out), recording())

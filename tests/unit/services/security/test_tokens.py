@@ -7,9 +7,17 @@ from datetime import timedelta
 import pytest
 from typer.testing import CliRunner
 
-from wetwell.protocols.errors import ConfigError
+from wetwell.protocols.errors import ConfigError, RecordingError
 from wetwell.services.cli import app
-from wetwell.services.security.tokens import holder_of, new_token, read_holders, revoke_token, today
+from wetwell.services.security.tokens import (
+    holder_of,
+    new_token,
+    read_holders,
+    revoke_token,
+    standing_of,
+    today,
+    user,
+)
 
 
 def test_a_token_names_its_holder_until_it_is_revoked(tmp_path):
@@ -40,6 +48,36 @@ def test_a_token_ends_after_its_last_day_and_says_so(tmp_path):
     assert result.stdout == f"ada\toperator\tuntil {today() - timedelta(days=1)}, over\n"
     assert holder_of(file, new_token(file, "eve", "viewer")) is not None
     assert read_holders(file)[1].until is None
+
+
+def test_each_token_that_is_made_or_revoked_is_in_the_audit_beside_the_file_and_none_of_them_itself(tmp_path):
+    file = tmp_path / "tokens.toml"
+    made = [new_token(file, "ada", "operator", days=1), new_token(file, "eve", "viewer")]
+    revoke_token(file, "ada")
+    text = (tmp_path / "tokens-audit.jsonl").read_text()
+    lines = [json.loads(line) for line in text.splitlines()]
+    assert [(line["act"], line["name"], line["by"]) for line in lines] == [
+        ("new token", "ada", user()),
+        ("new token", "eve", user()),
+        ("revoke token", "ada", user()),
+    ]
+    assert (lines[0]["role"], lines[0]["until"]) == ("operator", str(today() + timedelta(days=1)))
+    assert not any(token.removeprefix("wetwell_") in text for token in made)
+    assert not any(holder.sha256 in text for holder in read_holders(file))
+    assert standing_of(file, made[0]) == {"token": "revoked", "name": "ada"}
+
+
+def test_a_token_that_cannot_be_written_down_is_neither_made_nor_revoked(tmp_path):
+    file = tmp_path / "tokens.toml"
+    token = new_token(file, "ada", "operator")
+    (tmp_path / "tokens-audit.jsonl").unlink()
+    (tmp_path / "tokens-audit.jsonl").mkdir()
+    with pytest.raises(RecordingError, match=r"tokens-audit\.jsonl: cannot be written"):
+        new_token(file, "eve", "viewer")
+    with pytest.raises(RecordingError, match=r"tokens-audit\.jsonl: cannot be written"):
+        revoke_token(file, "ada")
+    assert [holder.name for holder in read_holders(file)] == ["ada"]
+    assert holder_of(file, token) is not None
 
 
 @pytest.mark.parametrize("change", [str.upper, str.strip, lambda token: token[:-1], lambda _: "", lambda _: "\udc80"])

@@ -29,10 +29,9 @@ from wetwell.services.historian.store.interface import (
     day_of,
     span_of,
 )
-from wetwell.services.historian.store.live_salvage import salvage
-from wetwell.services.historian.store.live_schema import prepare
-from wetwell.services.historian.store.refused_rows import RefusedRows
-from wetwell.services.historian.store.row_checksum import (
+from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, read_end, write_end
+from wetwell.services.historian.store.live.refused_rows import RefusedRows
+from wetwell.services.historian.store.live.row_checksum import (
     event_checksum,
     hour_checksum,
     is_event_intact,
@@ -40,6 +39,9 @@ from wetwell.services.historian.store.row_checksum import (
     is_sample_intact,
     sample_checksum,
 )
+from wetwell.services.historian.store.live.salvage import salvage
+from wetwell.services.historian.store.live.schema import prepare
+from wetwell.services.historian.store.live.tally import miscounts, settle
 
 log = logging.getLogger(__name__)
 
@@ -95,7 +97,9 @@ class LiveDatabase:
     is_damaged : bool
         Whether the file was found damaged, and not yet put aside.
     damages : int
-        How often something was put aside.
+        How often something was put aside or found missing.
+    replaced : str, optional
+        Why the file is not the one that was here last, such as that of a backup.
     """
 
     def __init__(self, path: Path, alone: Callable[[], contextlib.AbstractContextManager[None]]) -> None:
@@ -106,15 +110,29 @@ class LiveDatabase:
         self._refused = RefusedRows(path)
         self.is_damaged = False
         self.damages = 0
+        self.replaced: str | None = None
         try:
             self._writer = self._open()
+            self.replaced = End.of(self._writer).lost_since(read_end(path))
         except sqlite3.OperationalError as error:
             raise StoreError(f"{path}: {error}") from error
         except sqlite3.DatabaseError as error:
             self._begin_anew(error)
+        if self.replaced is not None:
+            self.damages += 1
+            log.error("%s: %s", path, self.replaced)
+            self.mark_end()
+
+    def mark_end(self) -> None:
+        """Say in a file beside the database how far it has come."""
+        with self._lock, contextlib.suppress(sqlite3.Error):  # its next use says what is wrong
+            end = End.of(self._writer)
+            if end != read_end(self._path):
+                write_end(self._path, end)
 
     def close(self) -> None:
         """Close it; twice is fine."""
+        self.mark_end()
         with self._lock:
             self._writer.close()
 
@@ -137,15 +155,9 @@ class LiveDatabase:
                     )
                     for row in rows
                 ]
-                before = database.total_changes
-                database.executemany(_INSERT_SAMPLE, values)
-                new += size * (database.total_changes - before)
-            before = database.total_changes
-            database.executemany(
-                _INSERT_EVENT,
-                [_event_values(row, ids[row.station]) for row in batch.events],
-            )
-            new += database.total_changes - before
+                new += size * database.executemany(_INSERT_SAMPLE, values).rowcount  # without those of triggers
+            events = [_event_values(row, ids[row.station]) for row in batch.events]
+            new += max(database.executemany(_INSERT_EVENT, events).rowcount, 0)  # -1 where there are none
             database.executemany(
                 "UPDATE station SET first_ns = min(coalesce(first_ns, ?1), ?1), "
                 "last_ns = max(coalesce(last_ns, ?2), ?2) WHERE id = ?3",
@@ -323,7 +335,9 @@ class LiveDatabase:
         return self.damages - damages
 
     def check(self) -> None:
-        """Look through the file, as far as SQLite knows what must be in it; damage is mended by the next writing.
+        """Look through the file, as far as SQLite and the tally know what must be in it.
+
+        Damage is mended by the next writing. What is missing is told, and no longer counted.
 
         Raises
         ------
@@ -332,9 +346,16 @@ class LiveDatabase:
         """
         with self._reading() as database:
             told = [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
+            found = [] if told else list(miscounts(database))
         if told:
             self.is_damaged = True
             raise StoreError(f"{self._path}: {told[0].splitlines()[-1]}")
+        if found:
+            with self._transaction() as database:
+                settle(database, found)
+            for one in found:
+                log.error("%s: %s", self._path, one)
+            self.damages += len(found)
 
     def size_bytes(self) -> int:
         """Size of the file and of its log."""
@@ -363,6 +384,7 @@ class LiveDatabase:
                 self._writer.execute("BEGIN IMMEDIATE")
                 damages = self._refused.put_aside(self._writer)
                 yield self._writer
+                self._writer.execute(COUNT_COMMIT)
                 self._writer.execute("COMMIT")
                 self.damages += damages
             except sqlite3.Error as error:
@@ -395,6 +417,7 @@ class LiveDatabase:
             self._ids.clear()
             self._writer = self._open()
             saved, lost = salvage(aside, self._writer)
+            write_end(self._path, End.of(self._writer))
         except (sqlite3.Error, OSError) as error:
             raise StoreError(f"{self._path}: {error}") from error
         self.is_damaged = False

@@ -7,10 +7,12 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.historian.store.live.end import END_TABLES
+from wetwell.services.historian.store.live.tally import TALLY_TABLES
 
 log = logging.getLogger(__name__)
 
-VERSION = 3
+VERSION = 4
 
 _REFUSED = """
 CREATE TABLE refused (origin TEXT NOT NULL, key TEXT NOT NULL, content BLOB);
@@ -34,6 +36,8 @@ CREATE TABLE hour (
     PRIMARY KEY (station, hour_ns)
 ) WITHOUT ROWID;
 {_REFUSED}
+{TALLY_TABLES}
+{END_TABLES}
 PRAGMA user_version = {VERSION};
 COMMIT;
 """
@@ -58,9 +62,16 @@ ALTER TABLE event ADD COLUMN crc INTEGER;
 PRAGMA user_version = 3;
 COMMIT;
 """,
+    3: f"""
+BEGIN IMMEDIATE;
+{TALLY_TABLES}
+{END_TABLES}
+PRAGMA user_version = 4;
+COMMIT;
+""",
 }
-"""Version 1 had rows of one sample, version 2 no checksums of rows. No row is written anew: a large site has some ten
-gigabytes of them."""
+"""Version 1 had rows of one sample, version 2 no checksums of rows, version 3 no tally. No row is written anew: a
+large site has some ten gigabytes of them. They are counted once, which takes such a site about a minute."""
 
 
 def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], AbstractContextManager[None]]) -> None:

@@ -5,7 +5,7 @@ import sqlite3
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
-from wetwell.services.historian.store.live_schema import VERSION, prepare
+from wetwell.services.historian.store.live.schema import VERSION, prepare
 
 AT_ONCE = 8
 

@@ -7,13 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from wetwell.services.historian.rows import HOUR_NS
-from wetwell.services.historian.store.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
+from wetwell.services.historian.store.live.end import End, read_end
+from wetwell.services.historian.store.live.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
+from wetwell.services.historian.store.live.tally import miscounts
 
 Row = tuple[Any, ...]
 
 _SAMPLE = "station, time_ns, seq, quality, data, size, last_ns, crc"
 CHECKED_VERSION = 3
 """The first one whose rows have checksums."""
+COUNTED_VERSION = 4
+"""The first one that knows how many rows it has."""
 MOST_SKIPPED = 10_000
 """Hours, or hundreds of messages, that are looked for behind the last row that could be read."""
 
@@ -32,6 +36,10 @@ def damage_of(path: Path) -> list[str]:
                 counts["rows of samples"] = sum(not _is_sample(row) for row in samples)
                 hours = database.execute("SELECT station, hour_ns, data, crc FROM hour")
                 counts["hours"] = sum(not _is_hour(row) for row in hours)
+            if version >= COUNTED_VERSION:
+                told += map(str, miscounts(database))
+                known = read_end(path)  # after the database: it only goes on
+                told += [] if (lost := End.of(database).lost_since(known)) is None else [lost]
     except sqlite3.Error as error:
         return [str(error)]
     return [*told, *(f"{count} {what} are not what was written" for what, count in counts.items() if count)]

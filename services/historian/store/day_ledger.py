@@ -1,0 +1,127 @@
+"""Which daily files there must be, and what each holds: a chain of lines a station, so that a missing day shows.
+
+The file `days/NAME-days.jsonl` gets a line with the SHA-256 of a daily file when that is written, and one before it
+is deleted. Files of an earlier version come into it when they are looked through for the first time.
+"""
+
+import hashlib
+import logging
+from collections.abc import Collection
+from pathlib import Path
+from typing import Literal
+
+from wetwell.protocols.errors import RecordingError
+from wetwell.protocols.timestamps import to_iso
+from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.runtime.clock import now_ns
+from wetwell.services.security.audit_chain import broken_lines, entries_of, is_cut_off
+from wetwell.services.security.chain_file import ChainFile
+
+log = logging.getLogger(__name__)
+
+Act = Literal["write", "find", "delete", "put aside", "lose"]
+_SUFFIX = "-days.jsonl"
+
+
+class DayLedger:
+    """The ledgers of a folder of daily files.
+
+    Parameters
+    ----------
+    folder : Path
+        That has the daily files.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def stations(self) -> list[str]:
+        """Stations that have a ledger, or the end of one."""
+        ends = (path.with_suffix(".jsonl") for path in (self._folder / "days").glob("*-days.end"))
+        return sorted({path.name.removesuffix(_SUFFIX) for path in [*ends, *self._folder.glob(f"days/*{_SUFFIX}")]})
+
+    def note(self, station: str, act: Act, file: Path) -> None:
+        """Write down that a file was written or found, or that it goes.
+
+        Raises
+        ------
+        StoreError
+            If it cannot be written, or the file cannot be read.
+        """
+        path = self._path(station)
+        entry: dict[str, object] = {"time": to_iso(now_ns()), "act": act, "file": self._name(file)}
+        try:
+            if act in {"write", "find"}:
+                entry["sha256"] = sum_of(file)
+            path.parent.mkdir(exist_ok=True)
+            ChainFile(path).append(entry)
+        except RecordingError as error:
+            raise StoreError(str(error)) from error
+        except OSError as error:
+            raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+    def expected(self, station: str) -> dict[Path, str]:
+        """Files that must be there, with their SHA-256."""
+        sums: dict[Path, str] = {}
+        for entry in entries_of(self._path(station)):
+            file = self._folder / str(entry.get("file", ""))
+            if "sha256" in entry:
+                sums[file] = str(entry["sha256"])
+            else:
+                sums.pop(file, None)
+        return sums
+
+    def missing(self, station: str) -> list[Path]:
+        """Files that must be there and are not."""
+        return [file for file in self.expected(station) if not file.exists()]
+
+    def is_changed(self, station: str, file: Path) -> bool:
+        """Whether a file is another one than was written; one that nobody has noted is not.
+
+        Raises
+        ------
+        StoreError
+            If it cannot be read.
+        """
+        expected = self.expected(station).get(file)
+        try:
+            return expected is not None and sum_of(file) != expected
+        except OSError as error:
+            raise StoreError(f"{file}: cannot be read: {error.strerror or error}") from error
+
+    def damage(self, station: str, told_of: Collection[Path] = ()) -> list[str]:
+        """What is wrong with the ledger of a station, and the files that are missing or others than were written.
+
+        Of files that are `told_of` already nothing is said.
+        """
+        path = self._path(station)
+        told = [f"{path}: line {number} is not what was written" for number in broken_lines(path)]
+        told += [f"{path}: lines at its end are lost"] if is_cut_off(path) else []
+        for file, expected in self.expected(station).items():
+            if file in told_of:
+                continue
+            try:
+                told += [] if sum_of(file) == expected else [f"{file}: is another one than was written"]
+            except FileNotFoundError:
+                told.append(f"{file}: is missing")
+            except OSError as error:
+                told.append(f"{file}: cannot be read: {error.strerror or error}")
+        return told
+
+    def _path(self, station: str) -> Path:
+        return self._folder / "days" / f"{station}{_SUFFIX}"
+
+    def _name(self, file: Path) -> str:
+        return file.relative_to(self._folder).as_posix()
+
+
+def sum_of(file: Path) -> str:
+    """SHA-256 of a file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
