@@ -171,6 +171,16 @@ def test_a_backup_that_is_brought_back_and_another_database_are_told_once(path, 
     assert [line["reason"] for line in lines] == [told, "it is not the one that was here before"]
 
 
+def test_who_only_reads_leaves_what_is_said_of_a_database_to_who_writes(path):
+    end = path.with_suffix(".end")
+    before = end.read_bytes()
+    with contextlib.closing(FolderStore(path.parent)) as writer:
+        writer.write(batch(120, 130))
+        FolderStore(path.parent).close()
+        assert end.read_bytes() == before
+    assert end.read_bytes() != before
+
+
 def test_a_database_that_was_killed_is_not_behind_what_is_said_of_it(path):
     store = FolderStore(path.parent)
     store.write(batch(120, 140))
