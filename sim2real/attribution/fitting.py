@@ -1,6 +1,6 @@
 """Bounded least squares under the asinh loss, for any set of effects at once."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,8 @@ DAMPINGS = 5
 """Steps of a round, each damped more, of which one has to lead down."""
 LONGEST_STEP = 0.3
 SETTLED = 1e-3
+LEAST_REACH = 1e-9
+"""Of a direction, as a share of the largest: under it is rounding. [1]"""
 MOST_AWAY = 2
 """Points of a grid, each worse than the best before, after which it is left."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
@@ -50,6 +52,10 @@ class Fit:
     def split(self, position: Floats) -> tuple[Floats, ...]:
         """Points of the candidates in a position."""
         return tuple(np.split(position, np.cumsum([point.size for point in self.points])[:-1]))
+
+
+Start = tuple[Fit | None, float]
+"""A fit from which a search may begin, and the sum of squares that it promises; None where there is none."""
 
 
 class Fitter:
@@ -92,31 +98,55 @@ class Fitter:
 
     def without(self, fit: Fit, member: int) -> Fit | None:
         """A fit without one of its effects, the others where they stand."""
-        kept = [k for k in range(len(fit.candidates)) if k != member]
-        return self.at([fit.candidates[k] for k in kept], [fit.points[k] for k in kept])
+        return self._some(fit, [k for k in range(len(fit.candidates)) if k != member])
+
+    def only(self, fit: Fit, names: Collection[str]) -> Fit | None:
+        """A fit with some of its effects, by name, where they stand."""
+        return self._some(fit, [k for k, name in enumerate(fit.names) if name in names])
+
+    def _some(self, fit: Fit, members: Sequence[int]) -> Fit | None:
+        return self.at([fit.candidates[k] for k in members], [fit.points[k] for k in members])
 
     def cost(self, fit: Fit | None) -> float:
         """Sum of squares over the bins that are fitted."""
         return float("inf") if fit is None else float(np.sum(fit.residuals[self.rows] ** 2))
 
+    def reach(self, fit: Fit) -> Floats:
+        """(fitted bins, directions) orthonormal: where the parameters of a fit can move its residuals."""
+        left, sizes, _ = np.linalg.svd(self.slopes(fit)[self.rows], full_matrices=False)
+        return np.asarray(left[:, sizes > LEAST_REACH * sizes.max(initial=0.0)], dtype=np.float64)
+
+    def cost_beside(self, fit: Fit | None, reach: Floats) -> float:
+        """Sum of squares that is left once what others can reach is fitted again, as if all were linear."""
+        along = np.zeros(0) if fit is None else reach.T @ fit.residuals[self.rows]
+        return self.cost(fit) - float(along @ along)
+
     def first(
-        self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]], others: Fit | None = None
-    ) -> Fit | None:
-        """Best of several starts, without refinement; a grid is left when it has led away from the recording."""
-        best: Fit | None = None
-        before = self.plain if others is None else others
+        self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]], others: Fit, reach: Floats
+    ) -> Start:
+        """Best of several starts beside others, without refinement; a grid is left when it has led away.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        start_grids : sequence of sequence of (parameters,) array
+        others : Fit
+        reach : (fitted bins, directions) array
+            Of the others: `reach`.
+        """
+        best, least = None, float("inf")
         for grid in start_grids:
             lowest, away = float("inf"), 0
             for start in grid:
-                tried = self.at((*before.candidates, candidate), (*before.points, start))
-                cost = self.cost(tried)
+                tried = self.at((*others.candidates, candidate), (*others.points, start))
+                cost = self.cost_beside(tried, reach)
                 away = away + 1 if cost > lowest else 0
                 lowest = min(lowest, cost)
-                if tried is not None and (best is None or cost < self.cost(best)):
-                    best = tried
+                if tried is not None and cost < least:
+                    best, least = tried, cost
                 if away == MOST_AWAY:
                     break
-        return best
+        return best, least
 
     def refine(self, fit: Fit) -> Fit:
         """Levenberg and Marquardt's method from where a fit stands, within the ranges."""

@@ -7,7 +7,13 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.presence import are_there, is_only_late, strengths_of, time_constant_s
+from wetwell.sim2real.attribution.presence import (
+    are_there,
+    is_only_late,
+    own_signature,
+    strengths_of,
+    time_constant_s,
+)
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import GOOD, POOR_FORM, Form, no_form
@@ -20,23 +26,42 @@ from wetwell.simulator.effects.effect import Effect
 
 HOPELESS = (0.5, 50.0)
 """Share of what the best of some fits explains, and sum of squares beyond that, by which a fit may be behind it."""
+MOST_COMPANIONS = 1
+"""Effects of a set that are too small to be told: the inertia of the water beside a lag."""
 FLEXED = 4
 """Sets, the best first, beside which something unknown is weighed: it needs what explains most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hypothesis:
-    """A fit with its evidence; `is_possible` tells whether each of its effects matters, and is not neutral."""
+    """A fit with its evidence.
+
+    Attributes
+    ----------
+    fit : Fit
+    evidence : Evidence
+    form : Form
+    is_there : bool
+        Whether none of its effects may be neutral, and none that is told could do another's work.
+    told : tuple of str
+        Its effects that matter, in order of the alphabet. The others are companions: too small to be told.
+    """
 
     fit: Fit
     evidence: Evidence
     form: Form
-    is_possible: bool
+    is_there: bool
+    told: tuple[str, ...]
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of its effects, in order of the alphabet."""
         return tuple(sorted(self.fit.names))
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether it may be the answer: each of its effects is there and matters."""
+        return self.is_there and self.told == self.effects
 
 
 class Hypotheses:
@@ -55,7 +80,7 @@ class Hypotheses:
         self._fitter, self._cells, self._each = fitter, cells, each
         self._plain = self._means(fitter.plain)
         none = evidence_of_none(cells, self._plain)
-        self._none = Hypothesis(fit=fitter.plain, evidence=none, form=no_form(cells), is_possible=True)
+        self._none = Hypothesis(fit=fitter.plain, evidence=none, form=no_form(cells), is_there=True, told=())
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
         self._factors: dict[tuple[str, ...], float] = {}
 
@@ -65,13 +90,28 @@ class Hypotheses:
         found = [one for one in self._best.values() if one.is_possible]
         return sorted(found, key=lambda one: -one.evidence.log)
 
+    @property
+    def weighed(self) -> list[Hypothesis]:
+        """Those that tell a possible answer, with one companion at most, the most probable recording first."""
+        answers = {one.told for one in self._best.values() if one.is_possible}
+        found = [
+            one
+            for one in self._best.values()
+            if one.is_there and one.told in answers and len(one.effects) - len(one.told) <= MOST_COMPANIONS
+        ]
+        return sorted(found, key=lambda one: -one.evidence.log)
+
     def add(self, fits: Sequence[Fit]) -> None:
         """Weigh fits, but for those that explain far less than others, and keep the best of each set of names."""
         costs = [self._fitter.cost(fit) for fit in fits]
         least, plain = min(costs, default=0.0), self._fitter.cost(self._fitter.plain)
         most = min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain)
         hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
-        for one in self._each(self._weighed, hopeful):
+        found = list(self._each(self._weighed, hopeful))
+        is_known = {*self._best, *(one.effects for one in found)}
+        alone = [self._fitter.only(one.fit, one.told) for one in found if one.is_there and one.told not in is_known]
+        refined = self._each(self._fitter.refine, [fit for fit in alone if fit is not None])
+        for one in [*found, *self._each(self._weighed, refined)]:
             known = self._best.get(one.effects)
             if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
                 self._best[one.effects] = one
@@ -82,13 +122,18 @@ class Hypotheses:
 
     def weights(self) -> list[Weight]:
         """What the posterior is made of."""
-        possible = self.possible
-        flexed = [*possible[:FLEXED], *(one for one in possible[FLEXED:] if one is self._none)]
+        weighed = self.weighed
+        flexed = [*weighed[:FLEXED], *(one for one in weighed[FLEXED:] if one is self._none)]
         flexed = [one for one in flexed if one.effects not in self._factors]
         self._factors |= zip((one.effects for one in flexed), self._each(self._flexible, flexed), strict=True)
         return [
-            Weight(effects=one.effects, log=one.evidence.log, log_flexible=self._factors.get(one.effects, -np.inf))
-            for one in possible
+            Weight(
+                effects=one.told,
+                acting=one.effects,
+                log=one.evidence.log,
+                log_flexible=self._factors.get(one.effects, -np.inf),
+            )
+            for one in weighed
         ]
 
     def _flexible(self, one: Hypothesis) -> float:
@@ -107,16 +152,21 @@ class Hypotheses:
         ]
         slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
         form = self._form(fit, signatures, self._plain - residuals, late)
-        found = evidence(
-            cells, residuals, np.array([cells.means(column) for column in slopes.T]).T, form, strengths_of(fit)
-        )
-        is_possible = are_there(fit, found) and all(
-            one is not None
-            and not is_only_late(fit, member, self._fitter.station.materiality.time_s)
+        slopes = np.array([cells.means(column) for column in slopes.T]).T
+        found = evidence(cells, residuals, slopes, form, strengths_of(fit))
+        told = [
+            member
+            for member, (signature, its) in enumerate(zip(signatures, late, strict=True))
+            if not is_only_late(fit, member, self._fitter.station.materiality.time_s)
             and self._matters(signature, form, form.late - its)
-            for member, (one, signature, its) in enumerate(zip(fewer, signatures, late, strict=True))
+        ]
+        return Hypothesis(
+            fit=fit,
+            evidence=found,
+            form=form,
+            is_there=None not in fewer and are_there(fit, found) and self._are_apart(fit, told, signatures, slopes),
+            told=tuple(sorted(fit.names[member] for member in told)),
         )
-        return Hypothesis(fit=fit, evidence=found, form=form, is_possible=is_possible)
 
     def _form(self, fit: Fit, signatures: Sequence[Floats], explained: Floats, late: Sequence[Floats]) -> Form:
         swings = np.zeros(self._cells.group.size)
@@ -134,6 +184,17 @@ class Hypotheses:
         explained = residuals_of(fewer.residuals) - residuals_of(fit.residuals)
         time_s = np.hypot(self._fitter.station.materiality.time_s, POOR_FORM * time_constant_s(fit, member))
         return np.asarray(time_s * self._cells.means(rate_of(self._fitter.bins, explained)), dtype=np.float64)
+
+    def _are_apart(self, fit: Fit, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats) -> bool:
+        """Whether each effect that is told does more than is allowed that the others that are told cannot do."""
+        of_member = np.repeat(np.arange(len(fit.points)), [point.size for point in fit.points])
+        least = self._cells.group_squares(self._cells.allowed)
+        for member in told:
+            others = slopes[:, np.isin(of_member, told) & (of_member != member)]
+            own = own_signature(signatures[member], others, self._cells.allowed)
+            if not np.any(self._cells.group_squares(own) > least):
+                return False
+        return True
 
     def _matters(self, signature: Floats, form: Form, late: Floats) -> bool:
         """Whether an effect does more in some group than what is allowed, and than the others may have wrong there.

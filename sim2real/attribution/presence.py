@@ -54,6 +54,26 @@ def strengths_of(fit: Fit) -> list[dict[int, float]]:
     return found
 
 
+def own_signature(signature: Floats, others: Floats, allowed: Floats) -> Floats:
+    r"""What of an effect's signature is left once the others of its set are fitted in its place.
+
+    $$f - J \hat x, \qquad \hat x = \arg\min_x \sum_i \left(\frac{f_i - (J x)_i}{a_i}\right)^2$$
+
+    A friction that is too high beside a lift that is too low may do next to nothing, though each does much.
+
+    Parameters
+    ----------
+    signature : (cells,) array
+        f, what the effect explains.
+    others : (cells, parameters) array
+        J, change of the residuals with each parameter of the others.
+    allowed : (cells,) array
+        a, size under which a difference is none.
+    """
+    change = np.linalg.lstsq(others / allowed[:, None], signature / allowed, rcond=None)[0]
+    return np.asarray(signature - others @ change, dtype=np.float64)
+
+
 def time_constant_s(fit: Fit, member: int) -> float:
     """Seconds of the longest strength of an effect that is a time, such as a lag; 0 without any."""
     return max(_times_s(fit, member), default=0.0)

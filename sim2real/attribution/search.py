@@ -4,13 +4,15 @@ from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.trials import Trials
 
-MOST_EFFECTS = 3
+MOST_EFFECTS = 4
+"""Effects of a set: three, and the inertia that the water of each main has."""
 
 
 def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
     """Weigh sets of effects until no neighbour of the most probable one is left to try.
 
-    Greedy choices are taken back: each effect of a set makes room for every other, the rest kept.
+    Greedy choices are taken back: each effect of a set makes room for every other, the rest kept. A set may have a
+    companion that is too small to be told.
 
     Parameters
     ----------
@@ -21,7 +23,7 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
     """
     tried: set[frozenset[str]] = {frozenset()}
     while True:
-        best = hypotheses.possible[0].fit
+        best = hypotheses.weighed[0].fit
         bases = [best] if len(best.names) < MOST_EFFECTS else []
         if len(best.names) > 1:
             bases += [base for k in range(len(best.names)) if (base := fitter.without(best, k)) is not None]

@@ -10,7 +10,7 @@ from wetwell.sim2real.attribution.fitting import Fit, Fitter
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Applies a function to items, in order, as `map` does: perhaps side by side."""
 
-PROBES = (0.02,)
+PROBES = (0.002, 0.02)
 """Strengths, as shares of the range, by which a further effect is judged before it is fitted."""
 MOST_FITTED = 8
 """Further effects that are fitted, the most promising first."""
@@ -51,8 +51,12 @@ class Trials:
         """Single effects, each with the pump or channel that fits best; the best effect first."""
         fitter, before = self._fitter, self._fitter.cost(self._fitter.plain)
         firsts: list[Fit] = []
-        tried = self._each(lambda candidate: fitter.first(candidate, self._start_grids(candidate)), self._guesses)
-        for k, fit in enumerate(tried):
+        reach = fitter.reach(fitter.plain)
+        tried = self._each(
+            lambda candidate: fitter.first(candidate, self._start_grids(candidate), fitter.plain, reach),
+            self._guesses,
+        )
+        for k, (fit, _) in enumerate(tried):
             firsts += [fit] if fit is not None else []
             self._progress(0.3 * (k + 1) / len(self._guesses))
         most = max((before - fitter.cost(fit) for fit in firsts), default=0.0)
@@ -71,17 +75,18 @@ class Trials:
     def with_one_more(self, current: Fit) -> list[Fit]:
         """Fits of the current effects with one more, the most promising ones, each as the pump or channel it fits."""
         fitter = self._fitter
+        reach = fitter.reach(current)
         free = [c for c in self._guesses if c.name not in current.names]
-        promises = list(self._each(lambda candidate: self._promise(candidate, current), free))
+        promises = list(self._each(lambda candidate: self._promise(candidate, current, reach), free))
         promising: dict[str, tuple[float, Candidate]] = {}
         for promise, candidate in zip(promises, free, strict=True):
             if promise > max(LEAST_PROMISED, promising.get(candidate.name, (0.0, candidate))[0]):
                 promising[candidate.name] = (promise, candidate)
         likely = [one for _, one in sorted(promising.values(), key=lambda pair: -pair[0])][:MOST_FITTED]
         tried = self._each(
-            lambda candidate: fitter.first(candidate, self._start_grids(candidate), others=current), likely
+            lambda candidate: fitter.first(candidate, self._start_grids(candidate), current, reach), likely
         )
-        firsts = sorted((fit for fit in tried if fit is not None), key=fitter.cost)
+        firsts = [fit for fit, _ in sorted(tried, key=lambda start: start[1]) if fit is not None]
         return list(self._each(fitter.refine, firsts[:MOST_REFINED]))
 
     def _start_grids(self, candidate: Candidate, strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
@@ -89,15 +94,19 @@ class Trials:
         grids = [grid for guess in self._guesses[candidate] for grid in candidate.start_grids(guess, strengths)]
         return list({b"".join(point.tobytes() for point in grid): grid for grid in grids}.values())
 
-    def _promise(self, candidate: Candidate, current: Fit) -> float:
-        """Drop of the sum of squares that one trial of each strength promises, as if all were linear in it."""
+    def _promise(self, candidate: Candidate, current: Fit, reach: Floats) -> float:
+        """Drop of the sum of squares that small trials of each strength promise, as if all were linear.
+
+        What the current effects can reach they are fitted to again: a lag gives way to the inertia beside it.
+        """
         rows = self._fitter.rows
         before = current.residuals[rows]
         most = 0.0
-        for (start,) in self._start_grids(candidate, PROBES):
+        for start in (point for grid in self._start_grids(candidate, PROBES) for point in grid):
             tried = self._fitter.at((*current.candidates, candidate), (*current.points, start))
             if tried is not None:
                 change = tried.residuals[rows] - before
+                change -= reach @ (reach.T @ change)
                 along = max(-float(change @ before), 0.0)
                 most = max(most, along**2 / max(float(change @ change), 1e-12))
         return most

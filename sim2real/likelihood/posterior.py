@@ -37,7 +37,9 @@ class Weight:
     Attributes
     ----------
     effects : tuple of str
-        In order of the alphabet.
+        That it tells, in order of the alphabet.
+    acting : tuple of str
+        All that act in it: those, and companions that are too small to be told.
     log : float
         Logarithm of its evidence.
     log_flexible : float
@@ -46,6 +48,7 @@ class Weight:
     """
 
     effects: tuple[str, ...]
+    acting: tuple[str, ...]
     log: float
     log_flexible: float
 
@@ -60,7 +63,8 @@ def posterior_of(
     \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
 
     with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q,
-    n effects in the library, the sum Z of the numerators, and `MISSED` ε.
+    n effects in the library, the sum Z of the numerators, and `MISSED` ε. The probability of an answer is the sum
+    over all sets S that tell it.
 
     Parameters
     ----------
@@ -73,22 +77,23 @@ def posterior_of(
 
     Examples
     --------
-    >>> far = Weight(effects=("ragging",), log=-90.0, log_flexible=0.0)
-    >>> best = posterior_of([Weight(effects=(), log=0.0, log_flexible=-9.0), far], 25)[0]
+    >>> far = Weight(effects=("ragging",), acting=("ragging",), log=-90.0, log_flexible=0.0)
+    >>> best = posterior_of([Weight(effects=(), acting=(), log=0.0, log_flexible=-9.0), far], 25)[0]
     >>> best.verdict, round(best.probability, 2)
     ('none', 0.85)
     """
-    priors = np.array([_log_prior(weight.effects, library, log_share) for weight in weights])
+    priors = np.array([_log_prior(weight.acting, library, log_share) for weight in weights])
     sets = priors + np.array([weight.log for weight in weights])
     unknown = priors + np.array([weight.log + weight.log_flexible for weight in weights])
     logs = np.r_[np.log(1.0 - UNKNOWN_PRIOR) + sets, np.log(UNKNOWN_PRIOR) + logsumexp(unknown)]
     shares = (1.0 - MISSED) * np.exp(logs - logsumexp(logs))
     shares[-1] += MISSED
+    answers: dict[tuple[str, ...], float] = {}
+    for weight, share in zip(weights, shares[:-1], strict=True):
+        answers[weight.effects] = answers.get(weight.effects, 0.0) + float(share)
     found = [
-        SetProbability(
-            effects=weight.effects, verdict="effect" if weight.effects else "none", probability=float(share)
-        )
-        for weight, share in zip(weights, shares[:-1], strict=True)
+        SetProbability(effects=effects, verdict="effect" if effects else "none", probability=probability)
+        for effects, probability in answers.items()
     ]
     found.append(SetProbability(effects=(), verdict="unknown", probability=float(shares[-1])))
     return tuple(sorted(found, key=lambda one: -one.probability))

@@ -40,8 +40,10 @@ LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
 STORED_STEPS = (0.01, 0.005, 0.001)
 """Steps in which a historian stores what came in coarser ones. [m]"""
-COARSE = 2.5
-"""Steps of storage that a coarser one has at least, to be told from it."""
+COARSE = 1.99
+"""Steps of storage that lie between two levels at least where the sensor's step is coarser: two, but for rounding."""
+FINENESS = 0.05
+"""Of the steps that are tried: how far they shift the last level, over the step of storage."""
 USUAL_STEP_M = 0.0101
 """Historians store a level to the millimetre or the centimetre: nobody's fault. [m]"""
 STRENGTH = 12.0
@@ -212,11 +214,25 @@ def _lattice(values: Floats) -> float:
     off = np.abs(steps / step - np.round(steps / step))
     if float(np.mean(off < 0.02)) > LATTICE_SHARE:
         return step
+    return _coarse_step(levels, float(steps.min()))
+
+
+def _coarse_step(levels: Floats, least: float) -> float:
+    """Largest step that all levels lie on within half of the step in which they were stored, 0 without one.
+
+    Two levels are at least two steps of storage apart; else what is stored tells of no coarser step.
+    """
     stored = _stored_step(levels)
-    place = np.r_[0.0, np.cumsum(np.round(steps / step))]
-    step, first = (float(one) for one in np.polyfit(place, levels, 1))
-    is_coarse = step > COARSE * stored and float(np.max(np.abs(levels - first - step * place))) < 0.75 * stored
-    return step if is_coarse else 0.0
+    if stored == 0.0 or least < COARSE * stored:
+        return 0.0
+    finest = FINENESS * stored * least / float(levels[-1] - levels[0])
+    for step in np.arange(least + stored, max(least - stored, COARSE * stored), -finest):
+        turns = np.exp(2j * np.pi * levels / step)
+        off = np.angle(turns / np.mean(turns)) / (2.0 * np.pi) * step
+        if 0.5 * float(np.ptp(off)) < (0.5 + FINENESS) * stored:
+            place = np.round((levels - off - levels[0] + off[0]) / step)
+            return float(np.polyfit(place, levels, 1)[0])
+    return 0.0
 
 
 def _stored_step(levels: Floats) -> float:

@@ -5,7 +5,7 @@ import pytest
 
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fit
-from wetwell.sim2real.attribution.presence import are_there
+from wetwell.sim2real.attribution.presence import are_there, own_signature
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 
@@ -44,3 +44,14 @@ def test_two_strengths_that_take_each_others_place_are_there_together():
 def test_a_limit_without_a_slope_is_there_where_it_is_not_neutral():
     assert are_there(fit_of("flow_low_cutoff", [0.2]), found(np.zeros((1, 1))))
     assert not are_there(fit_of("flow_low_cutoff", [0.0]), found(np.zeros((1, 1))))
+
+
+def test_of_two_effects_that_undo_each_other_neither_has_anything_of_its_own():
+    rng = np.random.default_rng(6)
+    form, allowed = rng.normal(size=50), rng.uniform(0.5, 2.0, 50)
+    small = 0.01 * rng.normal(size=50)
+    left = own_signature(40.0 * form + small, -form[:, None], allowed)
+    assert np.linalg.norm(left) <= 1.01 * np.linalg.norm(small) * allowed.max() / allowed.min()
+    apart = rng.normal(size=50)
+    assert np.linalg.norm(own_signature(apart, -form[:, None], allowed)) > 0.8 * np.linalg.norm(apart)
+    assert np.array_equal(own_signature(apart, np.zeros((50, 0)), allowed), apart)

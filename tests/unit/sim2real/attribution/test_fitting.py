@@ -1,0 +1,66 @@
+"""Fits of effects beside others that are fitted again."""
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.station.station_file import EffectTable
+from wetwell.sim2real.attribution.candidates import candidates_of
+from wetwell.sim2real.attribution.fitting import Fitter
+from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
+
+TRUTH = (EFFECTS["flow_meter_lag"](lag_s=4.0), EFFECTS["water_inertia"](inertia_s2_m2=400.0))
+
+
+def candidate(alpha, name):
+    return next(one for one in candidates_of(len(alpha.pump), 1, only=[name]) if set(dict(one.fixed).values()) <= {0})
+
+
+@pytest.fixture(scope="module")
+def fitter(alpha):
+    station = alpha.model_copy(
+        update={"effect": tuple(EffectTable.model_validate(one.model_dump()) for one in TRUTH)}
+    )
+    traces = traces_of(Simulation(station, Scenario(name="plain"), 5, 0).advance(14_400), alpha)
+    regimes = regimes_of(traces, alpha)
+    replay = Replay(traces, alpha)
+    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt())
+    return Fitter(replay, residuals, np.ones(residuals.bins.signal.size, dtype=np.bool_))
+
+
+@pytest.fixture(scope="module")
+def lag(fitter, alpha):
+    """The lag alone, which has taken the place of the inertia as far as it can."""
+    one = candidate(alpha, "flow_meter_lag")
+    return fitter.refine(fitter.at([one], [np.array([0.05])]))
+
+
+def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
+    inertia = candidate(alpha, "water_inertia")
+    reach = fitter.reach(lag)
+    start, promised = fitter.first(inertia, inertia.start_grids({}), lag, reach)
+    assert fitter.cost(start) > fitter.cost(lag), "beside the lag as it stands nothing is gained"
+    assert promised < 0.9 * fitter.cost(lag)
+    both = fitter.refine(start)
+    assert fitter.cost(both) == pytest.approx(promised, rel=0.3)
+    found = {effect.name: effect.model_dump() for effect in both.effects}
+    assert found["flow_meter_lag"]["lag_s"] == pytest.approx(4.0, abs=0.2)
+    assert found["water_inertia"]["inertia_s2_m2"] == pytest.approx(400.0, rel=0.2)
+
+
+def test_reach_is_that_of_least_squares(fitter, lag):
+    rng = np.random.default_rng(4)
+    slopes = fitter.slopes(lag)[fitter.rows]
+    wanted = lag.residuals + slopes @ np.array([0.01]) + rng.normal(0.0, 0.1, lag.residuals.size)
+    moved = type(lag)(candidates=lag.candidates, points=lag.points, residuals=wanted)
+    _, left, _, _ = np.linalg.lstsq(slopes, wanted, rcond=None)
+    assert fitter.cost_beside(moved, fitter.reach(lag)) == pytest.approx(float(left[0]))
+
+
+def test_nothing_can_be_reached_without_effects(fitter):
+    assert fitter.reach(fitter.plain).shape == (int(fitter.rows.sum()), 0)
