@@ -99,6 +99,21 @@ class FolderStore:
                 raise StoreError(str(error)) from error
             yield
 
+    @contextlib.contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Hold the folder as its one historian, and say at the end how far the database has come.
+
+        Raises
+        ------
+        StoreError
+            As `alone`.
+        """
+        with self.alone():
+            try:
+                yield
+            finally:
+                self.live.mark_end()
+
     def write(self, batch: Batch) -> int:
         """Keep a batch in the database."""
         return self.live.write(batch)

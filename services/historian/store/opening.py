@@ -38,6 +38,6 @@ def open_store(settings: HistorianSettings, *, alone: bool = True, must_exist: b
         from wetwell.services.historian.store.folder_store import FolderStore  # noqa: PLC0415
 
         store = folder = FolderStore(settings.folder, **limits)
-        lock = folder.alone() if alone else lock
+        lock = folder.at_work() if alone else lock
     with contextlib.closing(store), lock:
         yield store

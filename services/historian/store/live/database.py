@@ -108,7 +108,6 @@ class LiveDatabase:
         self._lock = threading.Lock()
         self._ids: dict[str, int] = {}
         self._refused = RefusedRows(path)
-        self._is_end_marked = True
         self.is_damaged = False
         self.damages = 0
         self.replaced: str | None = None
@@ -122,19 +121,17 @@ class LiveDatabase:
         if self.replaced is not None:
             self.damages += 1
             log.error("%s: %s", path, self.replaced)
-            self._is_end_marked = False
             self.mark_end()
 
     def mark_end(self) -> None:
-        """Say in a file beside the database how far it has come; who only reads leaves that to who writes."""
+        """Say in a file beside the database how far it has come, as the one historian that works on it."""
         with self._lock, contextlib.suppress(sqlite3.Error):  # its next use says what is wrong
-            if not self._is_end_marked:
-                write_end(self._path, End.of(self._writer))
-                self._is_end_marked = True
+            end = End.of(self._writer)
+            if end != read_end(self._path):
+                write_end(self._path, end)
 
     def close(self) -> None:
         """Close it; twice is fine."""
-        self.mark_end()
         with self._lock:
             self._writer.close()
 
@@ -388,7 +385,6 @@ class LiveDatabase:
                 yield self._writer
                 self._writer.execute(COUNT_COMMIT)
                 self._writer.execute("COMMIT")
-                self._is_end_marked = False
                 self.damages += damages
             except sqlite3.Error as error:
                 self._note(error)

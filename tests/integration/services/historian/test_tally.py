@@ -64,7 +64,7 @@ def behind_its_back(path, *statements):
 
 @pytest.fixture
 def path(tmp_path):
-    with contextlib.closing(FolderStore(tmp_path)) as store:
+    with contextlib.closing(FolderStore(tmp_path)) as store, store.at_work():
         store.write(batch(0, 100))
         store.write(batch(50, 120))  # half of it comes again
     assert damage_of(tmp_path / "live.sqlite") == []
@@ -152,7 +152,7 @@ def test_a_database_of_version_3_is_counted_when_it_is_opened(tmp_path):
 
 def test_a_backup_that_is_brought_back_and_another_database_are_told_once(path, caplog):
     shutil.copy(path, path.with_name("backup"))
-    with contextlib.closing(FolderStore(path.parent)) as store:
+    with contextlib.closing(FolderStore(path.parent)) as store, store.at_work():
         store.write(batch(120, 130))
     for suffix in ("-wal", "-shm"):
         path.with_name(f"live.sqlite{suffix}").unlink(missing_ok=True)
@@ -171,13 +171,14 @@ def test_a_backup_that_is_brought_back_and_another_database_are_told_once(path, 
     assert [line["reason"] for line in lines] == [told, "it is not the one that was here before"]
 
 
-def test_who_only_reads_leaves_what_is_said_of_a_database_to_who_writes(path):
+def test_only_the_one_historian_says_how_far_a_database_has_come(path):
     end = path.with_suffix(".end")
     before = end.read_bytes()
-    with contextlib.closing(FolderStore(path.parent)) as writer:
-        writer.write(batch(120, 130))
-        FolderStore(path.parent).close()
-        assert end.read_bytes() == before
+    with contextlib.closing(FolderStore(path.parent)) as importer:
+        importer.write(batch(120, 130))
+    assert end.read_bytes() == before
+    with contextlib.closing(FolderStore(path.parent)) as historian, historian.at_work():
+        pass
     assert end.read_bytes() != before
 
 
