@@ -8,7 +8,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.curve_fit import fit_error_m
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.station_file import Station
-from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h, pump_head_m
+from wetwell.simulator.hydraulics import main_flows, pump_head_m
 from wetwell.simulator.parameters import PlantParameters, PumpParameters, plant_parameters
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw, loaded_power_kw, shaft_power_kw
 
@@ -53,36 +53,43 @@ def _check_levels(place: str, parameters: PlantParameters) -> None:
         )
 
 
-def duty_flows_m3h(parameters: PlantParameters, speed_ratio: Floats, level_m: float) -> Floats:
+def duty_flows_m3h(parameters: PlantParameters, speed_ratio: Floats, level_m: float | Floats) -> Floats:
     """Duty flows of pumps at their speeds, each main for itself; without air, inertia or faults.
 
     Parameters
     ----------
     parameters : PlantParameters
-    speed_ratio : (pumps,) array
+    speed_ratio : (..., pumps) array
         Speed over nominal speed; 0 stands. [1]
-    level_m : float
-        Level in the wet well. [m]
+    level_m : (...) array or float
+        Level in the wet well; NaN where nobody knows it. [m]
 
     Returns
     -------
-    flow_m3h : (pumps,) array
-        [m³/h]
+    flow_m3h : (..., pumps) array
+        NaN where a lift depends on a level that nobody knows. [m³/h]
     """
-    flow_m3h = np.zeros(len(parameters.pumps))
+    speeds = speed_ratio.reshape(-1, len(parameters.pumps))
+    levels_m = np.broadcast_to(level_m, len(speeds))
+    flow_m3h = np.full(speeds.shape, np.nan)
     for m, main in enumerate(parameters.mains):
-        static_head_m, curves = main.static_head_at_m(level_m), parameters.curves
         pumps = np.flatnonzero([pump.main == m for pump in parameters.pumps])
-        if main.is_common_header:
-            curves[:, 2] -= main.friction_h2_m5 * (1.0 - main.shared_friction)
-            shared_h2_m5 = main.friction_h2_m5 * main.shared_friction
-            common_flows(pumps, curves, speed_ratio, static_head_m, shared_h2_m5, 0.0, flow_m3h)
-        else:
-            for i in pumps:
-                flow_m3h[i] = individual_flow_m3h(
-                    curves[i], speed_ratio[i], static_head_m, main.friction_h2_m5, 0.0, 0.0
-                )
-    return flow_m3h
+        lift_m = main.static_heads_m(levels_m)
+        known = np.isfinite(lift_m)
+        flows = np.zeros((np.count_nonzero(known), speeds.shape[1]))
+        main_flows(
+            pumps,
+            parameters.curves,
+            np.ascontiguousarray(speeds[known]),
+            lift_m[known],
+            main.own_h2_m5,
+            main.friction_h2_m5 - main.own_h2_m5,
+            main.linear_flow_m3h,
+            main.is_common_header,
+            flows,
+        )
+        flow_m3h[np.ix_(known, pumps)] = flows[:, pumps]
+    return flow_m3h.reshape(speed_ratio.shape)
 
 
 def duty_table(station: Station) -> dict[str, object]:

@@ -47,15 +47,21 @@ def pump_head_m(c0: float, c1: float, c2: float, speed_ratio: float, flow_m3h: f
 
 @compiled
 def flow_at_head_m3h(
-    c0: float, c1: float, c2: float, speed_ratio: float, head_m: float, inertia_m_m3h: float = 0.0
+    c0: float,
+    c1: float,
+    c2: float,
+    speed_ratio: float,
+    head_m: float,
+    inertia_m_m3h: float = 0.0,
+    loss_m_m3h: float = 0.0,
 ) -> float:
     r"""Flow at which a pump makes a given head; zero behind a closed check valve.
 
-    The positive root of $c_2 Q^2 + (c_1 N - j) Q + c_0 N^2 - H = 0$ in the form that loses no digits,
+    The positive root of $c_2 Q^2 + (c_1 N - j - l) Q + c_0 N^2 - H = 0$ in the form that loses no digits,
 
-    $$Q = \frac{2 \ell}{b + \sqrt{b^2 + 4 a \ell}}, \qquad \ell = c_0 N^2 - H,\ a = -c_2,\ b = j - c_1 N$$
+    $$Q = \frac{2 \ell}{b + \sqrt{b^2 + 4 a \ell}}, \qquad \ell = c_0 N^2 - H,\ a = -c_2,\ b = j + l - c_1 N$$
 
-    With c2 − k for c2 and the static head for H this is the duty point against H_s + k Q².
+    With c2 − k for c2, k s for l and the static head for H this is the duty point against H_s + k Q (Q + s).
 
     Parameters
     ----------
@@ -67,6 +73,8 @@ def flow_at_head_m3h(
         Head against which the pump works. [m]
     inertia_m_m3h : float
         j, see `individual_flow_m3h`. [m/(m³/h)]
+    loss_m_m3h : float
+        l, head lost in proportion to the flow on the way. [m/(m³/h)]
 
     Returns
     -------
@@ -83,7 +91,7 @@ def flow_at_head_m3h(
     lift_m = c0 * speed_ratio**2 - head_m
     if lift_m <= 0.0 or (speed_ratio <= 0.0 and inertia_m_m3h <= 0.0):
         return 0.0
-    b = inertia_m_m3h - c1 * speed_ratio
+    b = inertia_m_m3h + loss_m_m3h - c1 * speed_ratio
     divisor = b + math.sqrt(b * b - 4.0 * c2 * lift_m)
     return 2.0 * lift_m / divisor if divisor > 0.0 else 0.0  # 0 / 0 where the lift underflows
 
@@ -94,6 +102,7 @@ def individual_flow_m3h(
     speed_ratio: float,
     static_head_m: float,
     friction_h2_m5: float,
+    linear_flow_m3h: float,
     inertia_m_m3h: float,
     before_m3h: float,
 ) -> float:
@@ -101,7 +110,7 @@ def individual_flow_m3h(
 
     With inertia the column of water has to be accelerated; one implicit step of
 
-    $$j\,(Q - Q_\text{before}) = H_\text{pump}(Q) - H_s - k Q^2, \qquad Q \ge 0$$
+    $$j\,(Q - Q_\text{before}) = H_\text{pump}(Q) - H_s - k Q (Q + s), \qquad Q \ge 0$$
 
     is again a quadratic equation, so that a step of any length is stable. With j = 0 it is the duty point.
 
@@ -111,8 +120,8 @@ def individual_flow_m3h(
         c0, c1, c2. [m, m/(m³/h), m/(m³/h)²]
     speed_ratio : float
         [1]
-    static_head_m, friction_h2_m5 : float
-        System curve H = H_s + k Q². [m, h²/m⁵]
+    static_head_m, friction_h2_m5, linear_flow_m3h : float
+        System curve H = H_s + k Q (Q + s). [m, h²/m⁵, m³/h]
     inertia_m_m3h : float
         j: head that changes the flow by 1 m³/h within the step. [m/(m³/h)]
     before_m3h : float
@@ -130,6 +139,7 @@ def individual_flow_m3h(
         speed_ratio,
         static_head_m - inertia_m_m3h * before_m3h,
         inertia_m_m3h,
+        friction_h2_m5 * linear_flow_m3h,
     )
 
 
@@ -139,7 +149,9 @@ def common_flows(
     curves: Floats,
     speed_ratio: Floats,
     static_head_m: float,
-    friction_h2_m5: float,
+    own_h2_m5: float,
+    shared_h2_m5: float,
+    linear_flow_m3h: float,
     inertia_m_m3h: float,
     flow_m3h: Floats,
 ) -> None:
@@ -147,7 +159,9 @@ def common_flows(
 
     The total flow Q solves
 
-    $$\sum_i Q_i(H) = Q, \qquad H = H_s + k Q^2 + j\,(Q - Q_\text{before})$$
+    $$\sum_i Q_i(H) = Q, \qquad H = H_s + k Q (Q + s) + j\,(Q - Q_\text{before})$$
+
+    and each pump loses $k_\text{own} Q_i (Q_i + s)$ on its own way to the header.
 
     The left side falls and the right side rises with Q, so that there is one root; Newton's method finds it, kept
     inside a bracket by bisection. One running pump is solved in closed form. A pump whose shut-off head lies under
@@ -161,8 +175,10 @@ def common_flows(
         c0, c1, c2 of each pump. [m, m/(m³/h), m/(m³/h)²]
     speed_ratio : (pumps,) array
         [1]
-    static_head_m, friction_h2_m5, inertia_m_m3h : float
-        As in `individual_flow_m3h`; friction and inertia act on the total flow.
+    static_head_m, linear_flow_m3h, inertia_m_m3h : float
+        As in `individual_flow_m3h`; inertia acts on the total flow.
+    own_h2_m5, shared_h2_m5 : float
+        Friction of each pump's own pipe, and of the one that all share. [h²/m⁵]
     flow_m3h : (pumps,) array
         Flows before the step, replaced by those after it. [m³/h]
     """
@@ -179,17 +195,27 @@ def common_flows(
     if running == 0:
         return
     if running == 1:
-        flow_m3h[alone] = individual_flow_m3h(
-            curves[alone], speed_ratio[alone], static_head_m, friction_h2_m5, inertia_m_m3h, before_m3h
+        flow_m3h[alone] = flow_at_head_m3h(
+            curves[alone, 0],
+            curves[alone, 1],
+            curves[alone, 2] - own_h2_m5 - shared_h2_m5,
+            speed_ratio[alone],
+            static_head_m - inertia_m_m3h * before_m3h,
+            inertia_m_m3h,
+            (own_h2_m5 + shared_h2_m5) * linear_flow_m3h,
         )
         return
+    own_loss_m_m3h = own_h2_m5 * linear_flow_m3h
+    rise_m_m3h = inertia_m_m3h + shared_h2_m5 * linear_flow_m3h
     lowest_head_m = static_head_m - inertia_m_m3h * before_m3h
     low_m3h = 0.0
-    high_m3h = _flows_at_head(pumps, curves, speed_ratio, lowest_head_m, flow_m3h)[0]
+    high_m3h = _flows_at_head(pumps, curves, speed_ratio, lowest_head_m, own_h2_m5, own_loss_m_m3h, flow_m3h)[0]
     total_m3h = high_m3h / (1.0 + running)
     for _ in range(MAX_ITERATIONS):
-        head_m = lowest_head_m + (inertia_m_m3h + friction_h2_m5 * total_m3h) * total_m3h
-        pumped_m3h, steepness = _flows_at_head(pumps, curves, speed_ratio, head_m, flow_m3h)
+        head_m = lowest_head_m + (rise_m_m3h + shared_h2_m5 * total_m3h) * total_m3h
+        pumped_m3h, steepness = _flows_at_head(
+            pumps, curves, speed_ratio, head_m, own_h2_m5, own_loss_m_m3h, flow_m3h
+        )
         excess_m3h = pumped_m3h - total_m3h
         if excess_m3h > 0.0:
             low_m3h = total_m3h
@@ -197,21 +223,67 @@ def common_flows(
             high_m3h = total_m3h
         if abs(excess_m3h) <= FLOW_TOLERANCE_M3H or high_m3h - low_m3h <= FLOW_TOLERANCE_M3H:
             return
-        total_m3h -= excess_m3h / (steepness * (inertia_m_m3h + 2.0 * friction_h2_m5 * total_m3h) - 1.0)
+        total_m3h -= excess_m3h / (steepness * (rise_m_m3h + 2.0 * shared_h2_m5 * total_m3h) - 1.0)
         if not low_m3h < total_m3h < high_m3h:
             total_m3h = 0.5 * (low_m3h + high_m3h)
 
 
 @compiled
+def main_flows(
+    pumps: Integers,
+    curves: Floats,
+    speed_ratio: Floats,
+    static_head_m: Floats,
+    own_h2_m5: float,
+    shared_h2_m5: float,
+    linear_flow_m3h: float,
+    is_common: bool,
+    flow_m3h: Floats,
+) -> None:
+    """Set the (n, pumps) duty flows of pumps of a main at n points, without inertia.
+
+    Parameters
+    ----------
+    pumps : (m,) array
+        Places of the pumps that the main has; all others are left as they are.
+    curves : (pumps, 3) array
+        c0, c1, c2 of each pump. [m, m/(m³/h), m/(m³/h)²]
+    speed_ratio, static_head_m : (n, pumps) and (n,) arrays
+        At each point. [1, m]
+    own_h2_m5, shared_h2_m5, linear_flow_m3h : float
+        As in `common_flows`. [h²/m⁵, m³/h]
+    is_common : bool
+        Whether pumps share the main, or have a pipe each that loses as much as both parts together.
+    flow_m3h : (n, pumps) array
+        Out. [m³/h]
+    """
+    for point in range(static_head_m.size):
+        speed, lift_m, flow = speed_ratio[point], static_head_m[point], flow_m3h[point]
+        if is_common:
+            common_flows(pumps, curves, speed, lift_m, own_h2_m5, shared_h2_m5, linear_flow_m3h, 0.0, flow)
+            continue
+        for i in pumps:
+            friction_h2_m5 = own_h2_m5 + shared_h2_m5
+            flow[i] = individual_flow_m3h(curves[i], speed[i], lift_m, friction_h2_m5, linear_flow_m3h, 0.0, 0.0)
+
+
+@compiled
 def _flows_at_head(
-    pumps: Integers, curves: Floats, speed_ratio: Floats, head_m: float, flow_m3h: Floats
+    pumps: Integers,
+    curves: Floats,
+    speed_ratio: Floats,
+    head_m: float,
+    own_h2_m5: float,
+    own_loss_m_m3h: float,
+    flow_m3h: Floats,
 ) -> tuple[float, float]:
     """Set the flow of each pump at the header's head; sum of the flows and of their slopes over the head."""
     total_m3h = 0.0
     steepness = 0.0
     for i in pumps:
-        flow_m3h[i] = flow_at_head_m3h(curves[i, 0], curves[i, 1], curves[i, 2], speed_ratio[i], head_m, 0.0)
+        c1, c2 = curves[i, 1], curves[i, 2] - own_h2_m5
+        flow_m3h[i] = flow_at_head_m3h(curves[i, 0], c1, c2, speed_ratio[i], head_m, 0.0, own_loss_m_m3h)
         if flow_m3h[i] > 0.0:
             total_m3h += flow_m3h[i]
-            steepness += 1.0 / (curves[i, 1] * speed_ratio[i] + 2.0 * curves[i, 2] * flow_m3h[i])
+            steepness += 1.0 / (c1 * speed_ratio[i] - own_loss_m_m3h + 2.0 * c2 * flow_m3h[i])
     return total_m3h, steepness

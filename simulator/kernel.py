@@ -230,20 +230,23 @@ def _solve_flows(
         at = pumps[0]
         lift_m = max(static_head_m + state.pumps[at].air_m + state.correction[STATIC_HEAD, at], 0.0)
         friction_h2_m5 *= 1.0 + state.correction[HEAD_LOSS, at]
-        own_h2_m5 = friction_h2_m5 * (1.0 - main.shared_friction)
-        for i in pumps:
-            curves[i, 2] -= own_h2_m5
         common_flows(
-            pumps, curves, state.speed_ratio, lift_m, friction_h2_m5 * main.shared_friction, inertia_m_m3h, flow_m3h
+            pumps,
+            curves,
+            state.speed_ratio,
+            lift_m,
+            friction_h2_m5 * (1.0 - main.shared_friction),
+            friction_h2_m5 * main.shared_friction,
+            main.linear_flow_m3h,
+            inertia_m_m3h,
+            flow_m3h,
         )
-        for i in pumps:
-            curves[i, 2] += own_h2_m5
         return
     for i in pumps:
         lift_m = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
         own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
         flow_m3h[i] = individual_flow_m3h(
-            curves[i], state.speed_ratio[i], lift_m, own_h2_m5, inertia_m_m3h, flow_m3h[i]
+            curves[i], state.speed_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
         )
 
 
@@ -276,7 +279,8 @@ def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, seco
             if plant.mains[m].is_common_header:
                 pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
                 friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
-                head_m += friction_h2_m5 * sum_of(state.mean_flow_m3h, pumps) ** 2
+                total_m3h = sum_of(state.mean_flow_m3h, pumps)
+                head_m += friction_h2_m5 * total_m3h * (total_m3h + plant.mains[m].linear_flow_m3h)
             back_m3h += leak_m3h * math.sqrt(head_m)
     return back_m3h
 

@@ -57,14 +57,16 @@ class MainParameters:
     """A rising main.
 
     Its static head is that at level 0 of the wet well and falls by `level_slope` for each metre of level, and by
-    `lift_slope` for each metre above `lift_reference_m`. On a common header, the share `shared_friction` of k acts on
-    the total flow, the rest on each pump's own. `inertia_s2_m2` = length / (g area). Air grows idle and purges
-    running: in a common header for all pumps, else for each by itself or, where `is_air_shared`, at one high point.
+    `lift_slope` for each metre above `lift_reference_m`. It loses k Q (Q + s) with s = `linear_flow_m3h`: 0 where it
+    is rough. On a common header, the share `shared_friction` of k acts on the total flow, the rest on that of each
+    pump. `inertia_s2_m2` = length / (g area). Air grows idle and purges running: in a common header for all pumps, else
+    for each by itself or, where `is_air_shared`, at one high point.
     """
 
     static_head_m: float
     level_slope: float
     friction_h2_m5: float
+    linear_flow_m3h: float = 0.0
     is_common_header: bool
     shared_friction: float = 1.0
     lift_slope: float = 0.0
@@ -77,8 +79,23 @@ class MainParameters:
 
     def static_head_at_m(self, level_m: float) -> float:
         """Static head with the wet well at a level, without air; never negative. [m]."""
+        return float(self.static_heads_m(np.array([level_m]))[0])
+
+    def static_heads_m(self, level_m: Floats) -> Floats:
+        """The same at levels; NaN where it goes by a level that is NaN. [m]."""
+        if self.level_slope == 0.0 == self.lift_slope:
+            return np.full(level_m.shape, max(self.static_head_m, 0.0))
         falling_m = self.level_slope * level_m + self.lift_slope * (level_m - self.lift_reference_m)
-        return max(self.static_head_m - falling_m, 0.0)
+        return np.maximum(self.static_head_m - falling_m, 0.0)
+
+    @property
+    def own_h2_m5(self) -> float:
+        """Friction of what each pump has for itself of a common header; 0 where it has a whole main. [h²/m⁵]."""
+        return self.friction_h2_m5 * (1.0 - self.shared_friction) if self.is_common_header else 0.0
+
+    def friction_m(self, flow_m3h: Floats) -> Floats:
+        """Head that the whole main loses to friction at total flows. [m]."""
+        return self.friction_h2_m5 * flow_m3h * (flow_m3h + self.linear_flow_m3h)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

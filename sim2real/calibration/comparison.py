@@ -8,10 +8,10 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.calibration.fit.main_model import FRICTION, MainModel
 from wetwell.sim2real.calibration.fit.power_fit import PowerLines
 from wetwell.sim2real.calibration.steady import RAMP_STEP, Running, running_of
 from wetwell.sim2real.recording.checks import check_pumps, check_rising
+from wetwell.simulator.duty import duty_flows_m3h
 from wetwell.simulator.effects import effective_parameters
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.power import INRUSH_LIMIT
@@ -166,31 +166,9 @@ def _shares(speed: Floats, steady: Flags, running: Running) -> tuple[Floats, Flo
 
 def _signals(parameters: PlantParameters, speed: Floats, level_m: Floats) -> dict[AnalogueQuantity, Floats]:
     """(pumps, n) flow, head and power at speeds and levels; NaN where a level is needed and missing."""
-    flow_m3h, head_m = np.zeros_like(speed), np.zeros_like(speed)
-    for m, main in enumerate(parameters.mains):
-        members = [i for i, pump in enumerate(parameters.pumps) if pump.main == m]
-        falling = main.level_slope + main.lift_slope
-        level = np.nan_to_num(level_m) if falling == 0.0 else level_m
-        lift_m = main.static_head_m - main.level_slope * level - main.lift_slope * (level - main.lift_reference_m)
-        curves = parameters.curves[members]
-        if main.is_common_header:
-            curves[:, 2] -= main.friction_h2_m5 * (1.0 - main.shared_friction)
-        friction = main.friction_h2_m5 * (main.shared_friction if main.is_common_header else 1.0)
-        known = np.isfinite(lift_m)
-        model = MainModel(
-            curves=curves,
-            is_common=main.is_common_header,
-            speed_ratio=np.ascontiguousarray(speed[members][:, known].T),
-            lift_m=np.maximum(lift_m[known], 0.0),
-        )
-        plain = np.concatenate([np.ones(2 * len(members)), np.zeros(2)])
-        plain[FRICTION] = friction
-        flow, _ = model.duties(plain)
-        for k, i in enumerate(members):
-            pump = parameters.pumps[i]
-            flow_m3h[i] = np.nan
-            flow_m3h[i, known] = flow[:, k]
-            head_m[i] = pump.c0 * speed[i] ** 2 + pump.c1 * speed[i] * flow_m3h[i] + pump.c2 * flow_m3h[i] ** 2
+    flow_m3h = duty_flows_m3h(parameters, speed.T, level_m).T
+    c0, c1, c2 = parameters.curves.T[:, :, None]
+    head_m = c0 * speed**2 + c1 * speed * flow_m3h + c2 * flow_m3h**2
     return {"flow_m3h": flow_m3h, "head_m": head_m, "power_kw": _power_kw(parameters, speed, flow_m3h)}
 
 

@@ -64,7 +64,7 @@ def _curves(station: Station, pump: int, speed_hz: float, level_m: float, highes
     main = plant.mains[own.main]
     ratio, flow_m3h = speed_hz / own.nominal_frequency_hz, np.linspace(0.0, highest_m3h, CURVE_POINTS)
     head_m = own.c0 * ratio**2 + own.c1 * ratio * flow_m3h + own.c2 * flow_m3h**2
-    lost_m = main.static_head_at_m(level_m) + main.friction_h2_m5 * flow_m3h**2
+    lost_m = main.static_head_at_m(level_m) + main.friction_m(flow_m3h)
     return {"pump curve": Series("", flow_m3h, head_m), "system curve": Series("", flow_m3h, lost_m)}
 
 

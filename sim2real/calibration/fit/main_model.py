@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats, Integers
-from wetwell.protocols.jit import compiled
-from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h
+from wetwell.protocols.arrays import Floats
+from wetwell.simulator.hydraulics import main_flows
 
 SHIFT, FRICTION = -2, -1
 """Places of the shift of the lift and of the friction in the parameters of a main; before them the pumps' scales."""
@@ -53,8 +52,9 @@ class MainModel:
         curves = np.ascontiguousarray(self.changed_curves(parameters))
         flow_m3h = np.zeros_like(self.speed_ratio)
         lift_m = self.lift_m + parameters[SHIFT]
+        friction_h2_m5 = float(parameters[FRICTION])
         pumps = np.arange(self.pumps)
-        _solve(pumps, curves, self.speed_ratio, lift_m, float(parameters[FRICTION]), self.is_common, flow_m3h)
+        main_flows(pumps, curves, self.speed_ratio, lift_m, 0.0, friction_h2_m5, 0.0, self.is_common, flow_m3h)
         speed = self.speed_ratio
         head_m = curves[:, 0] * speed**2 + curves[:, 1] * speed * flow_m3h + curves[:, 2] * flow_m3h**2
         return flow_m3h, np.where(flow_m3h > 0.0, head_m, 0.0)
@@ -95,24 +95,3 @@ class MainModel:
         of_head /= (1.0 - 2.0 * friction * loaded_m3h * softness)[:, :, None]
         of_head *= gives[:, :, None]
         return own + steepness[:, :, None] * of_head, of_head
-
-
-@compiled
-def _solve(
-    pumps: Integers,
-    curves: Floats,
-    speed_ratio: Floats,
-    lift_m: Floats,
-    friction_h2_m5: float,
-    is_common: bool,
-    flow_m3h: Floats,
-) -> None:
-    """Set the (n, pumps) duty flows of each point."""
-    for point in range(lift_m.size):
-        if is_common:
-            common_flows(pumps, curves, speed_ratio[point], lift_m[point], friction_h2_m5, 0.0, flow_m3h[point])
-            continue
-        for i in range(pumps.size):
-            flow_m3h[point, i] = individual_flow_m3h(
-                curves[i], speed_ratio[point, i], lift_m[point], friction_h2_m5, 0.0, 0.0
-            )

@@ -74,6 +74,26 @@ def test_biases_of_the_main_move_the_duty_point(quiet_alpha, effect, static_m, f
     np.testing.assert_allclose(flow_m3h, duty_m3h(static_m, friction), atol=EXACT)
 
 
+@pytest.mark.parametrize("exponent", [1.75, 1.852, 1.95])
+def test_a_smooth_main_touches_the_power_law_at_the_rated_flow(quiet_alpha, exponent):
+    """Value and slope there are those of k Q^n; at a lower flow it is off by 3 % of the loss there."""
+    rated_m3h = duty_m3h()
+    law = FRICTION * rated_m3h ** (2.0 - exponent)
+    smooth = {"name": "friction_bias", "factor": 1.0, "loss_exponent": exponent}
+    rows = run(quiet_alpha, smooth)
+    np.testing.assert_allclose(rows["pump1_flow_m3h"][steady(rows)], rated_m3h, atol=EXACT)
+    rise_m = 1e-3
+    rows = run(quiet_alpha, smooth, {"name": "static_head_bias", "offset_m": rise_m})
+    expected = brentq(lambda q: head_m(1.0, q) - STATIC_M - rise_m - law * q**exponent, 0.0, 1e3, xtol=1e-12)
+    np.testing.assert_allclose(rows["pump1_flow_m3h"][steady(rows)], expected, atol=1e-6)
+    rows = run(quiet_alpha, smooth, {"name": "static_head_bias", "offset_m": 12.0})
+    flow_m3h = rows["pump1_flow_m3h"][steady(rows)]
+    assert 0.5 * rated_m3h < flow_m3h.min() < 0.9 * rated_m3h
+    lost_m = head_m(1.0, flow_m3h) - STATIC_M - 12.0
+    np.testing.assert_allclose(lost_m, law * flow_m3h**exponent, atol=0.03 * FRICTION * rated_m3h**2)
+    assert (lost_m > FRICTION * flow_m3h**2 * 1.01).all()
+
+
 def test_lift_follows_the_level(quiet_alpha):
     rows = run(quiet_alpha, {"name": "level_dependent_static_head", "slope": 1.5, "reference_level_m": 1.2})
     seconds = np.flatnonzero(steady(rows))[::20]

@@ -22,14 +22,18 @@ TOLERANCE_M3H = 1e-8
 
 def individual_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
     pumps = zip(np.array(curves), speed_ratio, strict=True)
-    flows = [individual_flow_m3h(curve, ratio, static_head_m, friction_h2_m5, 0.0, 0.0) for curve, ratio in pumps]
+    flows = [
+        individual_flow_m3h(curve, ratio, static_head_m, friction_h2_m5, 0.0, 0.0, 0.0) for curve, ratio in pumps
+    ]
     return np.array(flows)
 
 
 def header_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
     flow_m3h = np.zeros(len(curves))
     pumps = np.arange(len(curves))
-    common_flows(pumps, np.array(curves), np.array(speed_ratio), static_head_m, friction_h2_m5, 0.0, flow_m3h)
+    common_flows(
+        pumps, np.array(curves), np.array(speed_ratio), static_head_m, 0.0, friction_h2_m5, 0.0, 0.0, flow_m3h
+    )
     return flow_m3h
 
 
@@ -111,6 +115,39 @@ def test_header_against_brentq(curves, speed_ratio, friction_h2_m5):
     expected = brentq_header(curves, speed_ratio, 2.0, friction_h2_m5)
     flows = header_flows(curves, speed_ratio, 2.0, friction_h2_m5)
     assert flows == pytest.approx(expected, abs=TOLERANCE_M3H)
+
+
+@pytest.mark.parametrize("linear_flow_m3h", [20.0, 400.0])
+def test_a_loss_that_is_in_part_linear_against_brentq(linear_flow_m3h):
+    """A shared main and a pipe of each pump's own, both with a loss k Q (Q + s)."""
+    curves, speed_ratio, own, shared = [PAPER_CURVE, SMALL_CURVE, FLAT_CURVE], [1.0, 0.9, 0.95], 2e-4, 1e-4
+
+    def flows(head_m):
+        return [
+            brentq_flow_m3h(curve, ratio, lambda flow: head_m + own * flow * (flow + linear_flow_m3h))
+            for curve, ratio in zip(curves, speed_ratio, strict=True)
+        ]
+
+    def surplus_m(head_m):
+        total = sum(flows(head_m))
+        return head_m - 2.0 - shared * total * (total + linear_flow_m3h)
+
+    expected = flows(brentq(surplus_m, 2.0, 36.0, xtol=1e-13, rtol=1e-14))
+    flow_m3h = np.zeros(3)
+    common_flows(
+        np.arange(3), np.array(curves), np.array(speed_ratio), 2.0, own, shared, linear_flow_m3h, 0.0, flow_m3h
+    )
+    assert flow_m3h == pytest.approx(expected, abs=TOLERANCE_M3H)
+    (expected_m3h,) = (
+        brentq_flow_m3h(PAPER_CURVE, 1.0, lambda flow: 2.0 + (own + shared) * flow * (flow + linear_flow_m3h)),
+    )
+    alone = individual_flow_m3h(np.array(PAPER_CURVE), 1.0, 2.0, own + shared, linear_flow_m3h, 0.0, 0.0)
+    assert alone == pytest.approx(expected_m3h, abs=TOLERANCE_M3H)
+    one = np.zeros(3)
+    common_flows(
+        np.arange(3), np.array(curves), np.array([1.0, 0.0, 0.0]), 2.0, own, shared, linear_flow_m3h, 0.0, one
+    )
+    assert one.tolist() == [pytest.approx(expected_m3h, abs=TOLERANCE_M3H), 0.0, 0.0]
 
 
 @pytest.mark.parametrize("layout", [individual_flows, header_flows])
