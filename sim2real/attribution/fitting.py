@@ -1,6 +1,6 @@
 """Bounded least squares under the asinh loss, for any set of effects at once."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -202,8 +202,8 @@ class Fitter:
                         best = tried
         return best
 
-    def slopes(self, fit: Fit) -> Floats:
-        """(bins, parameters) change of the residuals with each parameter, over its range."""
+    def slopes(self, fit: Fit, of: Callable[[Floats], Floats] = np.asarray) -> Floats:
+        """(bins, parameters) change of the losses, or of something of them, with each parameter, over its range."""
         x = fit.position
         slopes = np.zeros((self.rows.size, x.size))
         for k in range(x.size):
@@ -212,6 +212,6 @@ class Fitter:
                 moved[k] += step
                 beside = self.at(fit.candidates, fit.split(moved))
                 if beside is not None:
-                    slopes[:, k] = (beside.residuals - fit.residuals) / step
+                    slopes[:, k] = (of(beside.residuals) - of(fit.residuals)) / step
                     break
         return slopes

@@ -20,7 +20,7 @@ from wetwell.sim2real.likelihood.covariance import GOOD, POOR_FORM, Form, no_for
 from wetwell.sim2real.likelihood.evidence import Evidence, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
-from wetwell.sim2real.residuals.asinh_loss import residuals_of, slopes_of
+from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.rates import rate_of
 from wetwell.simulator.effects.effect import Effect
 
@@ -150,7 +150,7 @@ class Hypotheses:
             np.zeros(residuals.size) if one is None else self._late(fit, member, one)
             for member, one in enumerate(fewer)
         ]
-        slopes = slopes_of(self._fitter.slopes(fit), fit.residuals)
+        slopes = self._fitter.slopes(fit, residuals_of)
         form = self._form(fit, signatures, self._plain - residuals, late)
         slopes = np.array([cells.means(column) for column in slopes.T]).T
         found = evidence(cells, residuals, slopes, form, strengths_of(fit))

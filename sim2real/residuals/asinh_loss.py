@@ -26,8 +26,3 @@ def squares_of(losses: Floats) -> Floats:
 def residuals_of(losses: Floats) -> Floats:
     """Residuals themselves, from what `asinh_loss` made of them."""
     return np.asarray(ASINH_SCALE * np.sinh(losses / ASINH_SCALE), dtype=np.float64)
-
-
-def slopes_of(slopes: Floats, losses: Floats) -> Floats:
-    """(bins, parameters) slopes of the residuals themselves, from those of their losses."""
-    return np.asarray(slopes * np.cosh(losses / ASINH_SCALE)[:, None], dtype=np.float64)

@@ -6,9 +6,11 @@ import pytest
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fitter
-from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.regimes import STEADY, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.asinh_loss import residuals_of
+from wetwell.sim2real.residuals.bins import HEAD
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.scenario import Scenario
@@ -60,6 +62,17 @@ def test_reach_is_that_of_least_squares(fitter, lag):
     moved = type(lag)(candidates=lag.candidates, points=lag.points, residuals=wanted)
     _, left, _, _ = np.linalg.lstsq(slopes, wanted, rcond=None)
     assert fitter.cost_beside(moved, fitter.reach(lag)) == pytest.approx(float(left[0]))
+
+
+def test_slopes_of_residuals_know_nothing_of_the_noise(fitter, alpha):
+    """Else a lift up and a friction down, which cancel each other, leave some of the noise, and explain it."""
+    bins, lift = fitter.bins, candidate(alpha, "static_head_bias")
+    fit = fitter.at([lift], [np.array([lift.free[0].normalised(0.0)])])
+    steady = (bins.signal == HEAD) & (bins.regime == STEADY)
+    assert np.std(residuals_of(fit.residuals)[steady]) > 0.5
+    moved_m = fitter.slopes(fit, residuals_of)[steady, 0] * bins.deviation[steady]
+    assert moved_m == pytest.approx(moved_m.mean(), rel=1e-6)
+    assert moved_m.mean() < -1.0
 
 
 def test_nothing_can_be_reached_without_effects(fitter):
