@@ -59,8 +59,8 @@ class MainParameters:
     Its static head is that at level 0 of the wet well and falls by `level_slope` for each metre of level, and by
     `lift_slope` for each metre above `lift_reference_m`. It loses k Q (Q + s) with s = `linear_flow_m3h`: 0 where it
     is rough. On a common header, the share `shared_friction` of k acts on the total flow, the rest on that of each
-    pump. `inertia_s2_m2` = length / (g area). Air grows idle and purges running: in a common header for all pumps, else
-    for each by itself or, where `is_air_shared`, at one high point.
+    pump. `inertia_s2_m2` = length / (g area). Air grows idle and purges running: in a common header for all pumps,
+    else for each by itself or, where `is_air_shared`, at one high point.
     """
 
     static_head_m: float
