@@ -34,7 +34,7 @@ class Ragging(Effect):
 
     name: Literal["ragging"] = "ragging"
     speed_loss: Annotated[float, limits(0.0, 0.5, "1")]
-    growth_s: Annotated[float, limits(10.0, 1.0e5, "s")] = 600.0
+    growth_s: Annotated[float, limits(30.0, 1.0e5, "s")] = 600.0
     pump: PumpNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
