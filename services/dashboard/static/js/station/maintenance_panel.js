@@ -12,6 +12,7 @@ import { severityWords } from "./severity.js";
 
 const NAME = "operator";
 const AGAIN_MS = 30_000;
+const SOON_MS = 500; // until the historian has kept the act that was entered
 const ACTS = { pump: [t("pulled"), t("cleaned"), t("impeller replaced"), t("wear ring replaced")], main: [t("flushed"), t("vented"), t("valve opened")], sensor: [t("calibrated"), t("replaced"), t("cleaned")] };
 const ENGLISH = { pump: ["pulled", "cleaned", "impeller replaced", "wear ring replaced"], main: ["flushed", "vented", "valve opened"], sensor: ["calibrated", "replaced", "cleaned"] };
 const RESULTS = {
@@ -38,6 +39,7 @@ export function maintenancePanel({ station }) {
   element.classList.add("is-maintenance");
   let shown = "";
   let asked = -Infinity;
+  let awaited = null;
 
   const kind = () => asset.value.split(":")[0];
 
@@ -66,7 +68,10 @@ export function maintenancePanel({ station }) {
       const answer = await fetch(`/api/stations/${encodeURIComponent(station.name)}/maintenance`, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
       const result = await answer.json().catch(() => ({ error: answer.statusText }));
       say(told, answer.ok && !result.error ? t("Entered.") : t("Not entered: {reason}", { reason: result.error ?? answer.statusText }));
-      if (answer.ok) found.value = "";
+      if (answer.ok) {
+        found.value = "";
+        awaited = result.id;
+      }
       load();
     } catch {
       say(told, t("No connection: nothing was entered."));
@@ -77,6 +82,7 @@ export function maintenancePanel({ station }) {
     asked = performance.now();
     try {
       const acts = await actsOf(station.name);
+      if (acts.some(({ id }) => id === awaited)) awaited = null;
       log.hidden = acts.length === 0;
       list.replaceChildren(...[...acts].reverse().map((each) => html("tr", {},
         html("td", {}, moment(millis(each.time))), html("td", {}, assetWords(each.asset, (number) => station.called(number))), html("td", {}, t(each.act)), html("td", {}, each.found),
@@ -96,7 +102,7 @@ export function maintenancePanel({ station }) {
     element,
     update(changed) {
       if (station.pumps) showAssets();
-      if (station.begun && (changed.has("begin") || performance.now() - asked > AGAIN_MS)) load();
+      if (station.begun && (changed.has("begin") || performance.now() - asked > (awaited ? SOON_MS : AGAIN_MS))) load();
     },
   };
 }
