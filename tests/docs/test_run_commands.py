@@ -18,6 +18,8 @@ ROOT = Path(__file__).parents[2]
 PORTS = ("7447", "8080", "5020", "5021", "9100")
 """Of the bus, the control-room page, two PLCs and the figures; a walk has its own."""
 PATIENCE_S = 240
+AGAIN_S = 2.0
+"""Between two tries of a command; each starts a process."""
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?")
 """A number; not one that is part of a name."""
 
@@ -198,4 +200,4 @@ def run(line: str, folder: Path, environment: dict[str, str], code: int = 0, pat
         if done.returncode == code:
             return done.stdout
         assert time.monotonic() < deadline, f"{line}\n{done.stdout}{done.stderr}"
-        time.sleep(0.5)
+        time.sleep(AGAIN_S)
