@@ -7,18 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SAID = {
-    "detection": (
-        "<td>pump:2</td><td>pump_fault</td>",
-        "<td>main</td><td>system_fault</td>",
-        "<svg",
-        "'state': 'learning'",
-    ),
-    "data_sets": ("truth_fault", "'blockage', ", "(51840, 'alpha')"),
-    "gap": ("flow_meter_gain: gap ", "{'factor': 1.1", "<svg", "'none'"),
-    "own_method": ("<td>wetwell</td>", "<td>three sigma</td>", "<svg"),
-}
-"""What the outputs of each notebook hold: the claims of its texts."""
+NAMES = ["data_sets", "detection", "gap", "own_method"]
 
 
 @pytest.fixture(scope="module")
@@ -29,18 +18,8 @@ def hook():
 
 def test_every_notebook_is_known_and_kept_without_outputs(hook):
     paths = sorted(hook.NOTEBOOKS.glob("*.ipynb"))
-    assert [path.stem for path in paths] == sorted(SAID)
+    assert [path.stem for path in paths] == NAMES
     assert all('"outputs": []' in path.read_text() and '"output_type"' not in path.read_text() for path in paths)
-
-
-@pytest.mark.check
-@pytest.mark.timeout(900)
-@pytest.mark.filterwarnings("default")  # those of Jupyter are not ours
-@pytest.mark.parametrize("name", SAID)
-def test_a_notebook_says_what_its_texts_say(name, hook):
-    page = hook.notebook_page(hook.run_notebook(hook.NOTEBOOKS / f"{name}.ipynb"))
-    code = "".join(page.split("```python")[1:])
-    assert [text for text in SAID[name] if text not in code] == []
 
 
 @pytest.mark.check
