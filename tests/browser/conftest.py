@@ -46,7 +46,7 @@ def site(tmp_path_factory):
 @pytest.fixture
 def clogged_site(tmp_path):
     """A site of its own for one test, which may kill its parts: its main clogs after seven hours of its time."""
-    with whole_site(tmp_path, CLOGGING) as place:
+    with whole_site(tmp_path, CLOGGING, stale_s=4.0) as place:
         yield place
 
 

@@ -16,7 +16,7 @@ import pytest
 DEADLINE_S = 180.0
 SCENARIO = """
 name = "quick-blockage"
-clock_speed = 2400
+clock_speed = 6000
 
 [inflow]
 kind = "empirical"
@@ -74,7 +74,7 @@ def until(is_so):
         with contextlib.suppress(httpx.TransportError):
             if is_so():
                 return
-        time.sleep(0.05)
+        time.sleep(0.2)
     pytest.fail(f"was not so within {DEADLINE_S:g} s")
 
 
@@ -119,7 +119,7 @@ class Site:
 
 
 @contextlib.contextmanager
-def whole_site(folder, scenario_text):
+def whole_site(folder, scenario_text, stale_s=10.0):
     """All daemons of a site, and a simulated station; its level is always too high."""
     scenario = folder / "quick.toml"
     scenario.write_text(scenario_text)
@@ -136,6 +136,7 @@ def whole_site(folder, scenario_text):
     with contextlib.ExitStack() as stack:
         for name, command in commands.items():
             if name == "simulator":
-                place.processes["dashboard"] = stack.enter_context(place.dashboard(place.port))
+                page = place.dashboard(place.port, WETWELL_DASHBOARD__STALE_S=str(stale_s))
+                place.processes["dashboard"] = stack.enter_context(page)
             place.processes[name] = stack.enter_context(wetwell(*command, **(of_alarms if name == "alarms" else {})))
         yield place
