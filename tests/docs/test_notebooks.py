@@ -1,4 +1,4 @@
-"""The notebooks of the docs run from the top, and say what their texts say."""
+"""The notebooks of the docs are kept without outputs; running one tells of a cell that fails."""
 
 import importlib
 import sys
@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-NAMES = ["data_sets", "detection", "gap", "own_method"]
 
 
 @pytest.fixture(scope="module")
@@ -16,9 +15,8 @@ def hook():
     return importlib.import_module("notebooks")
 
 
-def test_every_notebook_is_known_and_kept_without_outputs(hook):
+def test_every_notebook_is_kept_without_outputs(hook):
     paths = sorted(hook.NOTEBOOKS.glob("*.ipynb"))
-    assert [path.stem for path in paths] == NAMES
     assert all('"outputs": []' in path.read_text() and '"output_type"' not in path.read_text() for path in paths)
 
 

@@ -58,6 +58,8 @@ def test_nothing_is_loaded_from_elsewhere(site):
 
 
 def test_a_notebook_says_what_its_texts_say(site):
+    notebooks = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+    assert [notebook.stem for notebook in notebooks] == sorted(SAID)
     for name, said in SAID.items():
         page = (site / "notebooks" / f"{name.replace('_', '-')}.html").read_text(encoding="utf-8")
         shown = page[page.index('<div class="highlight">') : page.index("</article>")]
