@@ -4,7 +4,6 @@ Each item is three files: the recording, its station file, its scenario file. `m
 their checksums, and appears when all are there; until then `manifest.part.jsonl` remembers which are done.
 """
 
-import hashlib
 import json
 from collections import Counter
 from collections.abc import Sequence
@@ -23,6 +22,7 @@ from wetwell.protocols.station.table import Table
 from wetwell.services.batch.journal import Journal, open_journal
 from wetwell.services.batch.parallel import Failure, refuse_if_all, work_through
 from wetwell.services.batch.simulation import write_simulated
+from wetwell.services.security.file_sum import file_sum
 from wetwell.simulator.dataset import Item, item_of, labels
 from wetwell.simulator.simulation import Simulation
 
@@ -145,7 +145,7 @@ def check_dataset(folder: Path) -> dict[str, object]:
                     faults.append(f"{folder / MANIFEST}: '{name}' is not a file of this folder")
                 elif not path.is_file():
                     faults.append(f"{path}: is missing")
-                elif _sha256(path) != item["sha256"][key]:
+                elif file_sum(path) != item["sha256"][key]:
                     faults.append(f"{path}: is not what the manifest says, its SHA-256 differs")
     except (KeyError, TypeError) as error:
         raise RecordingError(f"{folder / MANIFEST}: is not a manifest of '{DATASET_SCHEMA}': {error}") from error
@@ -164,11 +164,6 @@ def _plain(table: Table) -> dict[str, Any]:
     """A table as TOML and JSON can hold it."""
     plain: dict[str, Any] = table.model_dump(mode="json", exclude_none=True)
     return plain
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
@@ -234,7 +229,7 @@ def _make(plan: Plan, folder: Path, task: tuple[int, Entry | None]) -> tuple[Ent
     _write_toml(folder / entry["station_file"], item.station)
     _write_toml(folder / entry["scenario_file"], item.scenario)
     write_simulated(simulation, plan.length_s, folder / entry["file"])
-    return entry | {"sha256": {key: _sha256(folder / entry[key]) for key in FILES}}, False
+    return entry | {"sha256": {key: file_sum(folder / entry[key]) for key in FILES}}, False
 
 
 def _entry(item: Item, plan: Plan) -> Entry:
@@ -256,7 +251,7 @@ def _entry(item: Item, plan: Plan) -> Entry:
 def _is_whole(folder: Path, entry: Entry, known: Entry) -> bool:
     sums = known.get("sha256", {})
     return known == entry | {"sha256": sums} and all(
-        (folder / entry[key]).is_file() and _sha256(folder / entry[key]) == sums.get(key) for key in FILES
+        (folder / entry[key]).is_file() and file_sum(folder / entry[key]) == sums.get(key) for key in FILES
     )
 
 

@@ -1,6 +1,5 @@
 """Methods of one's own beside those that come with the package: a class in a file, by `FILE.py:CLASS`."""
 
-import hashlib
 import sys
 from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
@@ -10,6 +9,7 @@ from typing import Any
 from wetwell.detector.curves.datasheet import Datasheet
 from wetwell.detector.evaluation.methods import StreamDetector, detector_class
 from wetwell.protocols.errors import ConfigError
+from wetwell.services.security.file_sum import file_sum
 
 Method = Callable[[str, Datasheet], StreamDetector]
 """What makes a detector of a station's name and its datasheet curves."""
@@ -37,7 +37,7 @@ def method_identity(name: str) -> str:
     """What changes when a method does: its name, and for one of a file also what the file holds."""
     if ".py:" not in name:
         return name
-    return f"{name} {hashlib.sha256(Path(name.rpartition(':')[0]).read_bytes()).hexdigest()}"
+    return f"{name} {file_sum(Path(name.rpartition(':')[0]))}"
 
 
 def _module(path: Path, name: str) -> Any:

@@ -12,6 +12,7 @@ from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.audit import audit_in
 from wetwell.services.security.audit_chain import entries_of
+from wetwell.services.security.file_sum import file_sum
 
 
 @contextlib.contextmanager
@@ -58,7 +59,7 @@ def sum_of_state(settings: Settings, service: str) -> str | None:
     state = hashlib.sha256()
     for file in files:
         with contextlib.suppress(OSError):
-            state.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+            state.update(file.name.encode() + bytes.fromhex(file_sum(file)))
     return state.hexdigest()
 
 

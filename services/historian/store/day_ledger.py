@@ -4,7 +4,6 @@ The file `days/NAME-days.jsonl` gets a line with the SHA-256 of a daily file whe
 is deleted. Files of an earlier version come into it when they are looked through for the first time.
 """
 
-import hashlib
 import logging
 from collections.abc import Collection
 from pathlib import Path
@@ -16,6 +15,7 @@ from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.security.audit_chain import broken_lines, entries_of, is_cut_off
 from wetwell.services.security.chain_file import ChainFile
+from wetwell.services.security.file_sum import file_sum
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class DayLedger:
         entry: dict[str, object] = {"time": to_iso(now_ns()), "act": act, "file": self._name(file)}
         try:
             if act in {"write", "find"}:
-                entry["sha256"] = sum_of(file)
+                entry["sha256"] = file_sum(file)
             path.parent.mkdir(exist_ok=True)
             ChainFile(path).append(entry)
         except RecordingError as error:
@@ -85,7 +85,7 @@ class DayLedger:
         """
         expected = self.expected(station).get(file)
         try:
-            return expected is not None and sum_of(file) != expected
+            return expected is not None and file_sum(file) != expected
         except OSError as error:
             raise StoreError(f"{file}: cannot be read: {error.strerror or error}") from error
 
@@ -101,7 +101,7 @@ class DayLedger:
             if file in told_of:
                 continue
             try:
-                told += [] if sum_of(file) == expected else [f"{file}: is another one than was written"]
+                told += [] if file_sum(file) == expected else [f"{file}: is another one than was written"]
             except FileNotFoundError:
                 told.append(f"{file}: is missing")
             except OSError as error:
@@ -113,15 +113,3 @@ class DayLedger:
 
     def _name(self, file: Path) -> str:
         return file.relative_to(self._folder).as_posix()
-
-
-def sum_of(file: Path) -> str:
-    """SHA-256 of a file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
-    with file.open("rb") as content:
-        return hashlib.file_digest(content, "sha256").hexdigest()
