@@ -11,7 +11,7 @@ from wetwell.services.doctor.finding import Finding
 from wetwell.services.historian.store.archive import Archive
 from wetwell.services.historian.store.live.salvage import damage_of
 from wetwell.services.runtime.settings import Settings
-from wetwell.services.security.audit_chain import audits_in, broken_lines, is_cut_off
+from wetwell.services.security.audit_chain import audits_in, damage_in
 from wetwell.services.watch.state_file import WATCH_SUFFIX, is_whole
 
 MOST_TOLD = 5
@@ -69,9 +69,8 @@ def _audits(settings: Settings) -> Iterator[Finding]:
     folders = [settings.alarms.state_dir, settings.security.audit_dir, settings.historian.folder]
     folders += [] if tokens_file is None else [tokens_file.parent]
     for audit in sorted({path for folder in folders if folder is not None for path in audits_in(folder)}):
-        broken = [f"line {number}" for number in broken_lines(audit)]
-        broken += ["lines at its end are lost"] if is_cut_off(audit) else []
-        yield _finding("audit", str(audit), broken, "compare it with a backup: lines were changed, lost or put in")
+        advice = "compare it with a backup: lines were changed, lost or put in"
+        yield _finding("audit", str(audit), damage_in(audit), advice)
 
 
 def _watches(folder: Path | None) -> Iterator[Finding]:

@@ -44,11 +44,19 @@ def is_cut_off(path: Path) -> bool:
     OSError
         If a file cannot be read.
     """
-    try:
-        end = end_of(path).read_text(encoding="utf-8", errors="replace")
-    except FileNotFoundError:
-        return False  # of an earlier version, or of an audit that has not begun
-    return end not in _links(path)
+    return end_found(path)[1]
+
+
+def damage_in(path: Path) -> list[str]:
+    """What is wrong with an audit: lines that are not what was written, and whether some at its end are lost.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    told = [f"line {number} is not what was written" for number in broken_lines(path)]
+    return [*told, "lines at its end are lost"] if is_cut_off(path) else told
 
 
 def broken_lines(path: Path) -> list[int]:
@@ -81,16 +89,22 @@ def broken_among(lines: Iterable[str]) -> list[int]:
     return broken
 
 
-def last_link(path: Path) -> str:
-    """Link of the last line that has one; empty where none has.
+def end_found(path: Path) -> tuple[str, bool]:
+    """Link of the last line that has one, empty where none has, and whether lines behind it are lost.
 
     Raises
     ------
     OSError
-        If the file cannot be read.
+        If a file cannot be read.
     """
     links = _links(path)
-    return links[-1] if links else ""
+    try:
+        end = end_of(path).read_text(encoding="utf-8", errors="replace")
+    except FileNotFoundError:
+        is_lost = False  # of an earlier version, or of an audit that has not begun
+    else:
+        is_lost = end not in links
+    return links[-1] if links else "", is_lost
 
 
 def entries_of(path: Path) -> list[dict[str, object]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
-from wetwell.services.security.audit_chain import LINK, end_of, is_cut_off, last_link, link_of
+from wetwell.services.security.audit_chain import LINK, end_found, end_of, link_of
 
 log = logging.getLogger(__name__)
 
@@ -48,9 +48,9 @@ class ChainFile:
     def _append(self, file: io.FileIO, entry: dict[str, object]) -> None:
         path, size = self._path, os.fstat(file.fileno()).st_size
         known, self._known = self._known, None  # as long as it is not on the disk nobody knows
-        link = known[1] if known is not None and known[0] == size else last_link(path)
+        link, is_lost = (known[1], False) if known is not None and known[0] == size else end_found(path)
         entries = [entry]
-        if known is None and is_cut_off(path):
+        if is_lost:
             log.error("%s: lines at its end are lost", path)
             entries.insert(0, {"time": entry["time"], "act": "found that lines before this one are lost"})
         lines = []

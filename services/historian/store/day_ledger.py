@@ -13,7 +13,7 @@ from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.runtime.clock import now_ns
-from wetwell.services.security.audit_chain import broken_lines, entries_of, is_cut_off
+from wetwell.services.security.audit_chain import damage_in, entries_of
 from wetwell.services.security.chain_file import ChainFile
 from wetwell.services.security.file_sum import file_sum
 
@@ -95,8 +95,7 @@ class DayLedger:
         Of files that are `told_of` already nothing is said.
         """
         path = self._path(station)
-        told = [f"{path}: line {number} is not what was written" for number in broken_lines(path)]
-        told += [f"{path}: lines at its end are lost"] if is_cut_off(path) else []
+        told = [f"{path}: {what}" for what in damage_in(path)]
         for file, expected in self.expected(station).items():
             if file in told_of:
                 continue

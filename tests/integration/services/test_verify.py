@@ -177,7 +177,7 @@ def test_each_audit_of_a_site_is_checked(tmp_path):
     for audit in audits:
         audit.write_text(audit.read_text().split("\n", 1)[1])
         (finding,) = [finding for finding in verify_kept(settings) if str(audit) in finding.text]
-        assert (finding.level, finding.text) == ("error", f"{audit}: damaged: line 1")
+        assert (finding.level, finding.text) == ("error", f"{audit}: damaged: line 1 is not what was written")
 
 
 def test_an_audit_that_was_killed_before_its_end_was_written_down_is_whole(tmp_path):
