@@ -34,6 +34,7 @@ class DayLedger:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._chains: dict[str, ChainFile] = {}
 
     def stations(self) -> list[str]:
         """Stations that have a ledger, or the end of one."""
@@ -54,7 +55,7 @@ class DayLedger:
             if act in {"write", "find"}:
                 entry["sha256"] = file_sum(file)
             path.parent.mkdir(exist_ok=True)
-            ChainFile(path).append(entry)
+            self._chains.setdefault(station, ChainFile(path)).append(entry)
         except RecordingError as error:
             raise StoreError(str(error)) from error
         except OSError as error:
