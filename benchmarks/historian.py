@@ -53,7 +53,7 @@ def rows_of(recording: Recording, *, in_blocks: bool) -> list[SampleRow]:
 def days_of(store: FolderStore, folder: Path, rows: list[SampleRow], start_ns: int, days: int) -> dict[str, object]:
     """Questions to days of one station, before and after they have become files; their sizes."""
     write(store, rows)
-    live = store.live.size_bytes() / days
+    live = store.file.size_bytes() / days
     figures: dict[str, object] = {"live": questions(store, start_ns + (days - 1) * DAY_NS)}
     rolled = 0
     started_s, cpu_s = time.perf_counter(), time.process_time()

@@ -61,14 +61,14 @@ PAST_DEFECTS = (
     PastDefect(
         "a database found damaged while it is used stays in use",
         "41fcdb9",
-        f"{STORE}/live/database.py",
+        f"{STORE}/live/file.py",
         '        if getattr(error, "sqlite_errorcode", None) in _DAMAGE:\n            self.is_damaged = True',
         "        return",
     ),
     PastDefect(
         "nothing is saved of a damaged database",
         "41fcdb9",
-        f"{STORE}/live/database.py",
+        f"{STORE}/live/file.py",
         "saved, lost = salvage(aside, self._writer)",
         "saved, lost = 0, 0",
     ),

@@ -117,7 +117,7 @@ def test_a_historian_that_was_killed_gets_what_it_missed_from_the_publishers(tmp
 UPGRADER = """
 import contextlib, os, signal, sqlite3, sys
 from pathlib import Path
-from wetwell.services.historian.store.live.database import LiveDatabase
+from wetwell.services.historian.store.live.file import LiveFile
 
 class Killed(sqlite3.Connection):
     def __init__(self, *arguments, **named):
@@ -126,7 +126,7 @@ class Killed(sqlite3.Connection):
 
 connect = sqlite3.connect
 sqlite3.connect = lambda *arguments, **named: connect(*arguments, factory=Killed, **named)
-LiveDatabase(Path(sys.argv[1]), contextlib.nullcontext)
+LiveFile(Path(sys.argv[1]), contextlib.nullcontext)
 """
 
 

@@ -23,6 +23,7 @@ from wetwell.services.historian.store.interface import (
     maintain_one,
 )
 from wetwell.services.historian.store.live.database import LiveDatabase
+from wetwell.services.historian.store.live.file import LiveFile
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
 from wetwell.services.runtime.clock import now_ns
@@ -66,10 +67,11 @@ class FolderStore:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
-        self.live = LiveDatabase(folder / "live.sqlite", self.alone)
-        if self.live.replaced is not None:
+        self.file = LiveFile(folder / "live.sqlite", self.alone)
+        self.live = LiveDatabase(self.file)
+        if self.file.replaced is not None:
             act = "found another database than the last one"
-            audit_in(folder, "history").note(now_ns(), act=act, reason=self.live.replaced)
+            audit_in(folder, "history").note(now_ns(), act=act, reason=self.file.replaced)
         self.archive = Archive(folder)
         self._refused_files = 0
         self._adopt()
@@ -77,11 +79,11 @@ class FolderStore:
     @property
     def damages(self) -> int:
         """How often something damaged was put aside."""
-        return self.live.damages + self._refused_files
+        return self.file.damages + self._refused_files
 
     def close(self) -> None:
         """Close the database."""
-        self.live.close()
+        self.file.close()
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
@@ -112,7 +114,7 @@ class FolderStore:
             try:
                 yield
             finally:
-                self.live.mark_end()
+                self.file.mark_end()
 
     def write(self, batch: Batch) -> int:
         """Keep a batch in the database."""
@@ -217,8 +219,8 @@ class FolderStore:
 
     def scrub(self) -> Iterator[None]:
         """Look through all that is kept, a part at a time; what is damaged is put aside and told."""
-        self.live.mark_end()
-        self.live.check()
+        self.file.mark_end()
+        self.file.check()
         yield
         for span in self.stations():
             for day_ns in self.live.days_ns(span.station, -(2**63), 2**63 - 1):
@@ -238,7 +240,7 @@ class FolderStore:
             free = shutil.disk_usage(self._folder).free
         except OSError as error:
             raise StoreError(f"{self._folder}: {error.strerror or error}") from error
-        return {"live_bytes": float(self.live.size_bytes()), "disk_free_bytes": float(free)}
+        return {"live_bytes": float(self.file.size_bytes()), "disk_free_bytes": float(free)}
 
     def _adopt(self) -> None:
         """Know the stations of the files, even if the database is new."""
@@ -250,7 +252,7 @@ class FolderStore:
         try:
             self.live.adopt(spans)
         except StoreError:
-            if not self.live.is_damaged:
+            if not self.file.is_damaged:
                 raise
             self.live.adopt(spans)  # into the new one
 

@@ -1,18 +1,10 @@
-"""The SQLite database of the live days, of verdicts, alarms and figures.
+"""What the SQLite database of the live days holds: samples, verdicts, alarms and figures of hours."""
 
-A write-ahead log with `synchronous=FULL`: when `write` returns, the batch is on the disk and survives `kill -9` and
-a power failure. One connection writes; each reading has a connection of its own and sees one moment.
-"""
-
-import contextlib
 import itertools
-import logging
 import operator
 import sqlite3
-import threading
 import zlib
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any, get_args
 
 from wetwell.protocols.quantities import pumps_of_width
@@ -25,12 +17,10 @@ from wetwell.services.historian.store.interface import (
     EventKind,
     EventRow,
     StationSpan,
-    StoreError,
     day_of,
     span_of,
 )
-from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, read_end, write_end
-from wetwell.services.historian.store.live.refused_rows import RefusedRows
+from wetwell.services.historian.store.live.file import LiveFile
 from wetwell.services.historian.store.live.row_checksum import (
     event_checksum,
     hour_checksum,
@@ -39,18 +29,9 @@ from wetwell.services.historian.store.live.row_checksum import (
     is_sample_intact,
     sample_checksum,
 )
-from wetwell.services.historian.store.live.salvage import salvage
-from wetwell.services.historian.store.live.schema import prepare
-from wetwell.services.historian.store.live.tally import miscounts, settle
-
-log = logging.getLogger(__name__)
 
 MOST_EVENTS = 1_000_000
 """Messages of one kind that are looked through at once: more than a station tells in a day."""
-BUSY_S = 10.0
-"""So long one process waits for another that writes."""
-
-_DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 _SIZE = operator.attrgetter("size")
 _SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
@@ -78,66 +59,24 @@ _PACKED = "time_ns, seq, size, quality, data, station, crc, (SELECT id FROM stat
 
 
 class LiveDatabase:
-    """A file of SQLite, made if it is not there, upgraded if it is of an earlier version.
+    """Samples, verdicts, alarms and figures in a file of SQLite.
 
     Parameters
     ----------
-    path : Path
-    alone : function
-        Context in which no historian works on the file, for the upgrade.
+    file : LiveFile
 
     Raises
     ------
     StoreError
-        Here and from every method, if the file cannot be used now. A file that is damaged is put aside, and told,
-        by the next writing; what can be read of it and is what was written goes into a new one.
-
-    Attributes
-    ----------
-    is_damaged : bool
-        Whether the file was found damaged, and not yet put aside.
-    damages : int
-        How often something was put aside or found missing.
-    replaced : str, optional
-        Why the file is not the one that was here last, such as that of a backup.
+        From every method, if the file cannot be used now.
     """
 
-    def __init__(self, path: Path, alone: Callable[[], contextlib.AbstractContextManager[None]]) -> None:
-        self._path = path
-        self._alone = alone
-        self._lock = threading.Lock()
-        self._ids: dict[str, int] = {}
-        self._refused = RefusedRows(path)
-        self.is_damaged = False
-        self.damages = 0
-        self.replaced: str | None = None
-        try:
-            self._writer = self._open()
-            self.replaced = End.of(self._writer).lost_since(read_end(path))
-        except sqlite3.OperationalError as error:
-            raise StoreError(f"{path}: {error}") from error
-        except sqlite3.DatabaseError as error:
-            self._begin_anew(error)
-        if self.replaced is not None:
-            self.damages += 1
-            log.error("%s: %s", path, self.replaced)
-            self.mark_end()
-
-    def mark_end(self) -> None:
-        """Say in a file beside the database how far it has come, as the one historian that works on it."""
-        with self._lock, contextlib.suppress(sqlite3.Error):  # its next use says what is wrong
-            end = End.of(self._writer)
-            if end != read_end(self._path):
-                write_end(self._path, end)
-
-    def close(self) -> None:
-        """Close it; twice is fine."""
-        with self._lock:
-            self._writer.close()
+    def __init__(self, file: LiveFile) -> None:
+        self._file = file
 
     def write(self, batch: Batch) -> int:
         """Keep a batch whole or not at all, and return how many samples, verdicts and alarms of it were new."""
-        with self._transaction() as database:
+        with self._file.transaction() as database:
             ids = self._stations(database, batch)
             new = 0
             for size, rows in itertools.groupby(sorted(batch.samples, key=_SIZE_AND_KEY), _SIZE):
@@ -162,12 +101,12 @@ class LiveDatabase:
                 "last_ns = max(coalesce(last_ns, ?2), ?2) WHERE id = ?3",
                 [(*span, ids[station]) for station, span in span_of(batch.samples).items()],
             )
-        self._ids |= ids
+        self._file.ids |= ids
         return new
 
     def adopt(self, spans: Sequence[StationSpan]) -> None:
         """Take stations into the list that are not in it, or of which older or newer samples are kept elsewhere."""
-        with self._transaction() as database:
+        with self._file.transaction() as database:
             database.executemany(
                 "INSERT INTO station (name, first_ns, last_ns) VALUES (?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
                 "first_ns = min(coalesce(first_ns, excluded.first_ns), excluded.first_ns), "
@@ -177,7 +116,7 @@ class LiveDatabase:
 
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
-        with self._reading() as database:
+        with self._file.reading() as database:
             rows = database.execute(
                 "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM station ORDER BY 1"
             )
@@ -185,7 +124,7 @@ class LiveDatabase:
 
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
         """Samples from `start_ns` until before `end_ns`."""
-        with self._reading() as database:
+        with self._file.reading() as database:
             rows = database.execute(f"SELECT {_PACKED} {_TOUCHING}", _span(station, start_ns, end_ns)).fetchall()
         return Samples.of_rows(self._intact(rows)).between(start_ns, end_ns)
 
@@ -194,7 +133,7 @@ class LiveDatabase:
         if end_ns - start_ns < HOUR_NS:  # it may lie between two samples of a row
             samples = self.samples(station, start_ns, end_ns)
             return samples.pumps if len(samples) else None
-        with self._reading() as database:
+        with self._file.reading() as database:
             (width,) = database.execute(
                 f"SELECT max(length(data) / size / 8 - CASE size WHEN 1 THEN 0 ELSE 2 END) {_TOUCHING}",
                 _span(station, start_ns, end_ns),
@@ -204,7 +143,7 @@ class LiveDatabase:
     def next_time_ns(self, station: str, start_ns: int) -> int | None:
         """Time of the first sample from `start_ns` on."""
         span = _span(station, start_ns, start_ns)
-        with self._reading() as database:
+        with self._file.reading() as database:
             begun = database.execute(f"SELECT {_PACKED} {_TOUCHING}", span).fetchall()
             (time_ns,) = database.execute(f"SELECT min(time_ns) {_OF_STATION} AND time_ns >= :start", span).fetchone()
         times_ns = Samples.of_rows(self._intact(begun)).time_ns
@@ -213,7 +152,7 @@ class LiveDatabase:
 
     def newest_times_ns(self, station: str, most: int) -> list[int]:
         """Times of the samples in the newest rows, at most so many rows, the newest first; each sample once."""
-        with self._reading() as database:
+        with self._file.reading() as database:
             rows = database.execute(
                 f"SELECT {_PACKED} {_OF_STATION} ORDER BY time_ns DESC LIMIT :most",
                 {"station": station, "most": most},
@@ -233,7 +172,7 @@ class LiveDatabase:
     def count(self, station: str, start_ns: int, end_ns: int, most: int) -> int:
         """Number of samples of a span, up to `most`; one that came alone and in a row of several counts twice."""
         span = _span(station, start_ns, end_ns)
-        with self._reading() as database:
+        with self._file.reading() as database:
             (whole,) = database.execute(
                 f"SELECT coalesce(sum(size), 0) FROM (SELECT size {_OF_STATION} "  # noqa: S608 - as above
                 f"AND time_ns >= :start AND time_ns < :end AND {_LAST} < :end LIMIT :most)",
@@ -251,7 +190,7 @@ class LiveDatabase:
         if not len(samples):
             return
         span = _span(station, int(samples.time_ns[0]), int(samples.time_ns[-1]) + 1)
-        with self._transaction() as database:
+        with self._file.transaction() as database:
             (count,) = database.execute(f"SELECT sum(size) {_TOUCHING}", span).fetchone()
             if count == len(samples):
                 database.execute(f"DELETE {_TOUCHING}", span)
@@ -271,7 +210,7 @@ class LiveDatabase:
 
     def events(self, kind: EventKind, station: str, start_ns: int, end_ns: int, last: int) -> list[bytes]:
         """The last so many verdicts or alarms, oldest first."""
-        with self._reading() as database:
+        with self._file.reading() as database:
             rows = database.execute(
                 "SELECT kind, station, time_ns, digest, payload, crc, id FROM event WHERE kind = ? "
                 "AND station = (SELECT id FROM station WHERE name = ?) "
@@ -281,16 +220,16 @@ class LiveDatabase:
         intact = []
         for *row, number in reversed(rows):
             if row[0] != kind or not start_ns <= row[2] < end_ns:
-                self.is_damaged = True  # a page in the place of another
+                self._file.is_damaged = True  # a page in the place of another
             elif is_event_intact(*row):
                 intact.append(row[4])
             else:
-                self._refused.note("event", number)
+                self._file.refused.note("event", number)
         return intact
 
     def delete_events(self, station: str, end_ns: int) -> int:
         """Delete verdicts and alarms from before `end_ns`, but not what changed when; returns how many."""
-        with self._transaction() as database:
+        with self._file.transaction() as database:
             return database.execute(
                 "DELETE FROM event WHERE station = (SELECT id FROM station WHERE name = ?) AND time_ns < ? "
                 "AND kind != 'changes'",
@@ -299,7 +238,7 @@ class LiveDatabase:
 
     def hours(self, station: str, start_ns: int, end_ns: int) -> Hours:
         """Figures that `write_hours` has kept."""
-        with self._reading() as database:
+        with self._file.reading() as database:
             rows = database.execute(
                 "SELECT hour_ns, data, station, crc FROM hour "
                 "WHERE station = (SELECT id FROM station WHERE name = ?) AND hour_ns >= ? AND hour_ns < ? ORDER BY 1",
@@ -310,12 +249,12 @@ class LiveDatabase:
             if is_hour_intact(number, hour_ns, data, crc):
                 intact.append((hour_ns, data))
             else:
-                self._refused.note("hour", number, hour_ns)
+                self._file.refused.note("hour", number, hour_ns)
         return Hours.of_rows(intact)
 
     def write_hours(self, station: str, hours: Hours) -> None:
         """Keep figures of hours, in place of earlier ones."""
-        with self._transaction() as database:
+        with self._file.transaction() as database:
             (number,) = database.execute("SELECT id FROM station WHERE name = ?", (station,)).fetchone()
             database.executemany(
                 "REPLACE INTO hour VALUES (?, ?, ?, ?)",
@@ -328,132 +267,31 @@ class LiveDatabase:
         self.hours(station, start_ns, end_ns)
         for kind in get_args(EventKind):
             self.events(kind, station, start_ns, end_ns, MOST_EVENTS)
-        damages = self.damages
-        with self._transaction():
+        damages = self._file.damages
+        with self._file.transaction():
             pass
-        return self.damages - damages
-
-    def check(self) -> None:
-        """Look through the file, as far as SQLite and the tally know what must be in it.
-
-        Damage is mended by the next writing. What is missing is told, and no longer counted.
-
-        Raises
-        ------
-        StoreError
-            If it is damaged, or cannot be read now.
-        """
-        with self._reading() as database:
-            told = [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
-            found = [] if told else list(miscounts(database))
-        if told:
-            self.is_damaged = True
-            raise StoreError(f"{self._path}: {told[0].splitlines()[-1]}")
-        if found:
-            with self._transaction() as database:
-                settle(database, found)
-            for one in found:
-                log.error("%s: %s", self._path, one)
-            self.damages += len(found)
-
-    def size_bytes(self) -> int:
-        """Size of the file and of its log."""
-        sizes = 0
-        for path in (self._path, self._path.with_name(f"{self._path.name}-wal")):
-            with contextlib.suppress(OSError):
-                sizes += path.stat().st_size
-        return sizes
+        return self._file.damages - damages
 
     def _stations(self, database: sqlite3.Connection, batch: Batch) -> dict[str, int]:
         """Number of each station in a batch; unknown ones get one."""
         names = {row.station for row in batch.samples} | {row.station for row in batch.events}
-        ids = {name: self._ids[name] for name in names if name in self._ids}
+        ids = {name: self._file.ids[name] for name in names if name in self._file.ids}
         for name in sorted(names - ids.keys()):
             database.execute("INSERT OR IGNORE INTO station (name) VALUES (?)", (name,))
             (ids[name],) = database.execute("SELECT id FROM station WHERE name = ?", (name,)).fetchone()
         return ids
-
-    @contextlib.contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        with self._lock:
-            if self.is_damaged:
-                self._writer.close()
-                self._begin_anew("damaged")
-            try:
-                self._writer.execute("BEGIN IMMEDIATE")
-                damages = self._refused.put_aside(self._writer)
-                yield self._writer
-                self._writer.execute(COUNT_COMMIT)
-                self._writer.execute("COMMIT")
-                self.damages += damages
-            except sqlite3.Error as error:
-                self._note(error)
-                raise StoreError(f"{self._path}: {error}") from error
-            finally:
-                if self._writer.in_transaction:
-                    with contextlib.suppress(sqlite3.Error):
-                        self._writer.execute("ROLLBACK")
-
-    @contextlib.contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
-        try:
-            with contextlib.closing(sqlite3.connect(self._path, timeout=BUSY_S)) as database:
-                database.execute("PRAGMA query_only = 1")
-                yield database
-        except sqlite3.Error as error:
-            self._note(error)
-            raise StoreError(f"{self._path}: {error}") from error
-
-    def _note(self, error: sqlite3.Error) -> None:
-        """Know from now on that the file is damaged, if that is what the error says."""
-        if getattr(error, "sqlite_errorcode", None) in _DAMAGE:
-            self.is_damaged = True
-
-    def _begin_anew(self, reason: object) -> None:
-        """Put the file aside, and begin a new one with what can be read of it and is what was written."""
-        try:
-            aside = _put_aside(self._path)
-            self._ids.clear()
-            self._writer = self._open()
-            saved, lost = salvage(aside, self._writer)
-            write_end(self._path, End.of(self._writer))
-        except (sqlite3.Error, OSError) as error:
-            raise StoreError(f"{self._path}: {error}") from error
-        self.is_damaged = False
-        self.damages += 1
-        log.error(
-            "%s: %s; kept as %s, a new one is begun with %d rows of it; at least %d are lost",
-            self._path,
-            reason,
-            aside.name,
-            saved,
-            lost,
-        )
 
     def _intact(self, rows: Sequence[tuple[Any, ...]]) -> list[PackedSamples]:
         """Rows that are what was written; the others are told, and left out."""
         intact: list[PackedSamples] = []
         for time_ns, seq, size, quality, data, station, crc, asked in rows:
             if station != asked:
-                self.is_damaged = True  # a page in the place of another
+                self._file.is_damaged = True  # a page in the place of another
             elif is_sample_intact(station, time_ns, seq, quality, size, data, crc):
                 intact.append((time_ns, seq, size, quality, data))
             else:
-                self._refused.note("sample", station, time_ns, seq)
+                self._file.refused.note("sample", station, time_ns, seq)
         return intact
-
-    def _open(self) -> sqlite3.Connection:
-        database = sqlite3.connect(self._path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
-        try:
-            database.execute("PRAGMA journal_mode = WAL")
-            database.execute("PRAGMA synchronous = FULL")
-            database.create_function("is_intact", 7, is_sample_intact, deterministic=True)
-            prepare(database, self._path, self._alone)
-            database.execute("SELECT count(*) FROM station").fetchone()
-        except BaseException:
-            database.close()
-            raise
-        return database
 
 
 def _span(station: str, start_ns: int, end_ns: int) -> dict[str, str | int]:
@@ -470,14 +308,3 @@ def _event_values(row: EventRow, station: int) -> tuple[str, int, int, bytes, by
 def _key(row: SampleRow) -> int:
     """Number of a sample, or of several samples one below 0 from all of their times and numbers."""
     return row.seq if row.size == 1 else -1 - zlib.crc32(row.data[-16 * row.size :])
-
-
-def _put_aside(path: Path) -> Path:
-    """Rename a database and its log, so that they can be looked at."""
-    number = 1
-    while (aside := path.with_name(f"{path.name}.refused-{number}")).exists():
-        number += 1
-    for suffix in ("", "-wal", "-shm"):
-        with contextlib.suppress(FileNotFoundError):
-            path.with_name(path.name + suffix).replace(aside.with_name(aside.name + suffix))
-    return aside

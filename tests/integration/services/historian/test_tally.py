@@ -185,10 +185,10 @@ def test_only_the_one_historian_says_how_far_a_database_has_come(path):
 def test_a_database_that_was_killed_is_not_behind_what_is_said_of_it(path):
     store = FolderStore(path.parent)
     store.write(batch(120, 140))
-    store.live.mark_end()
+    store.file.mark_end()
     store.write(batch(140, 160))
     assert damage_of(path) == []
-    store.live._writer.close()  # as a kill: nothing is said
+    store.file._writer.close()  # as a kill: nothing is said
     with contextlib.closing(FolderStore(path.parent)) as again:
         assert again.damages == 0
 

@@ -46,7 +46,7 @@ def content(tmp_path_factory) -> bytes:
         for station in STATIONS:
             store.write(batch(station, 0, TIMES))
     with contextlib.closing(FolderStore(folder)) as store:
-        store.live._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        store.file._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     return (folder / "live.sqlite").read_bytes()
 
 
@@ -144,7 +144,7 @@ def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(changed)
     with contextlib.closing(FolderStore(tmp_path)) as store:
         assert store.live.put_aside_damaged("alpha", 0, 2**62) == 2
-        refused = store.live._writer.execute("SELECT origin, content FROM refused ORDER BY origin").fetchall()
+        refused = store.file._writer.execute("SELECT origin, content FROM refused ORDER BY origin").fetchall()
         assert [origin for origin, _ in refused] == ["event", "sample"]
         assert all(content in changed for _, content in refused)
         assert len(store.samples("alpha", 0, 2**62)) == TIMES - 1
@@ -155,7 +155,7 @@ def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
 def test_a_message_whose_place_was_changed_is_not_told_twice_when_it_comes_again(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
-        store.live._writer.execute("UPDATE event SET time_ns = 1231 WHERE payload = ?", (payload("alpha", 1_230),))
+        store.file._writer.execute("UPDATE event SET time_ns = 1231 WHERE payload = ?", (payload("alpha", 1_230),))
         store.write(batch("alpha", 0, TIMES))
         told = [payload("alpha", number) for number in range(0, TIMES, 10)]
         assert store.events("verdicts", "alpha", 0, 2**62, 10_000) == told

@@ -21,6 +21,7 @@ from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, Batch, StationSpan, Store, blocks
 from wetwell.services.historian.store.live.database import LiveDatabase
+from wetwell.services.historian.store.live.file import LiveFile
 from wetwell.services.historian.store.postgres_store import PostgresStore
 
 NOW_NS = 10 * DAY_NS
@@ -191,7 +192,8 @@ def test_each_span_of_a_live_database_begins_and_ends_within_rows(pool: list[Sam
     sent = [chosen(pool, act) for act in acts]
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "live.sqlite"
-        with contextlib.closing(LiveDatabase(path, contextlib.nullcontext)) as database:
+        with contextlib.closing(LiveFile(path, contextlib.nullcontext)) as file:
+            database = LiveDatabase(file)
             for samples in sent:
                 database.write(Batch(samples=pack_block(SampleBlock.of(samples))))
             kept = {(sample.time, sample.seq): sample for samples in sent for sample in samples}

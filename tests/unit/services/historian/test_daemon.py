@@ -44,7 +44,7 @@ def test_what_was_lost_comes_again_from_the_publishers(tmp_path, caplog):
             publisher.put(Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode())
         await asyncio.sleep(5.0)
         with contextlib.closing(FolderStore(tmp_path)) as store:
-            store.live._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            store.file._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         damage(path)
         await asyncio.sleep(60.0)  # looks through what it has kept
         for number in range(SAMPLES, SAMPLES + 2):

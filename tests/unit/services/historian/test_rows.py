@@ -22,6 +22,7 @@ from wetwell.services.historian.spool import Spool
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, DIGEST_BYTES, Batch, StoreError
 from wetwell.services.historian.store.live.database import LiveDatabase
+from wetwell.services.historian.store.live.file import LiveFile
 
 VERSION_1 = """
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
@@ -65,8 +66,8 @@ def sizes(rows: list[SampleRow]) -> list[int]:
 
 @pytest.fixture
 def live(tmp_path: Path) -> Iterator[LiveDatabase]:
-    with contextlib.closing(LiveDatabase(tmp_path / "live.sqlite", contextlib.nullcontext)) as live:
-        yield live
+    with contextlib.closing(LiveFile(tmp_path / "live.sqlite", contextlib.nullcontext)) as file:
+        yield LiveDatabase(file)
 
 
 def seqs(live: LiveDatabase) -> list[int]:
@@ -231,7 +232,7 @@ def test_a_database_of_version_1_is_not_upgraded_beside_its_historian(tmp_path: 
     with contextlib.closing(FolderStore(tmp_path / "other")) as other, other.alone():
         (tmp_path / "live.sqlite").rename(tmp_path / "other" / "old.sqlite")
         with pytest.raises(StoreError, match="another historian works here"):
-            LiveDatabase(tmp_path / "other" / "old.sqlite", other.alone)
+            LiveFile(tmp_path / "other" / "old.sqlite", other.alone)
     with contextlib.closing(sqlite3.connect(tmp_path / "other" / "old.sqlite")) as database:
         assert database.execute("PRAGMA user_version").fetchone() == (1,)
 
