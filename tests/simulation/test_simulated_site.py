@@ -13,7 +13,7 @@ from site_kinds import alpha_site
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2, 3))])
 def test_a_site_that_is_asked_each_ten_seconds_tells_and_keeps_all_whatever_befalls_it(folder, seed):
     assert broken_rules(alpha_site(seed, 2, 1.0, 10, folder)) == []
 

@@ -120,7 +120,7 @@ def of_running(columns, quantity):
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", DEVIATIONS)
 def test_a_deviation_shows_where_it_must(name, seed):
     with_it, without = drawn(name, seed)
