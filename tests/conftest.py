@@ -17,6 +17,14 @@ from wetwell.services.stations import find_station
 settings.register_profile("wetwell", deadline=None)
 settings.load_profile("wetwell")
 
+LONGEST = ("test_site.py", "test_wheel.py", "test_kill.py", "test_run_commands.py")
+"""Files with the tests that take longest."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest tests, so that at the end no worker waits for another."""
+    items.sort(key=lambda item: item.path.name not in LONGEST)
+
 
 @pytest.fixture(scope="session")
 def alpha() -> Station:
