@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: help up test check long soak lint types imports kernels format docs requirements clean sbom audit release sign verify image
+.PHONY: help up test check browser others long soak lint types imports kernels format docs requirements clean sbom audit release sign verify image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -26,8 +26,13 @@ test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard ea
 	$(PYTEST) -m "not check and not long and not soak"
 
 check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
-	$(BIN)/pytest -q --durations=10 -m "check and not long and not soak" tests/browser  # alone: a page that is watched must keep up with its site
-	$(PYTEST) -m "check and not long and not soak" --ignore=tests/browser
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync browser others
+
+browser: $(VENV)/.dev  ## What of `make check` looks at the page, one test after the other: a page that is watched must keep up with its site
+	$(BIN)/pytest -q --durations=10 -m "check and not long and not soak" tests/browser
+
+others: $(VENV)/.dev  ## What of `make check` looks at no page; it gives way to the browser
+	nice -n 5 $(PYTEST) -m "check and not long and not soak" --ignore=tests/browser
 
 long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each other Python
 	$(PYTEST) -m "long and not soak"
