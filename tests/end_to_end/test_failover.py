@@ -55,6 +55,7 @@ def test_of_two_detectors_one_tells_each_verdict_once_whatever_happens_to_it(pos
         async with site.running("a", "b"), player.playing(site.bus, site.endpoint):
             await asyncio.sleep(SETTLE_S)  # real processes: there is no virtual time here
             taken = await accidents(site, "freeze", "cut", "clock", "kill")
+            await until(lambda: sum(len(one.verdicts) for one in player.heard.values()) > PUMPS * len(stations))
             await player.end_of_samples()
             await player.all_heard()
             await asyncio.sleep(SETTLE_S)
