@@ -30,9 +30,13 @@ end_s = 27_000
 after = "hold"
 """
 
-CLOGGING = (
-    SCENARIO.partition("[[fault]]")[0]
-    + """
+CLOGGING = """
+name = "quick-clogging"
+clock_speed = 2400  # its page is watched from the start
+
+[inflow]
+kind = "empirical"
+
 [[fault]]
 kind = "pipe_clogging"
 friction_rise = 0.5
@@ -41,7 +45,6 @@ start_s = 25_200
 end_s = 27_000
 after = "hold"
 """
-)
 
 
 def free_port():
