@@ -208,6 +208,7 @@ def test_axe_finds_nothing_serious(site, open_page, axe, path, scheme) -> None:
     page = open_page(site.url + path, color_scheme=scheme)
     expect(page.get_by_role("heading", level=1)).to_be_visible()
     expect(page.locator("#link")).to_have_text("live", timeout=SLOW_MS)
+    expect(page.locator("svg.well:empty, #plane-words:empty")).to_have_count(0)
     serious = axe(page)
     assert serious == [], json.dumps(serious, indent=1)
 
