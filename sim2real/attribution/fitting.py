@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.sim2real.residuals.asinh_loss import asinh_loss
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, steepness
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects.effect import Effect
 
@@ -113,7 +113,7 @@ class Fitter:
 
     def reach(self, fit: Fit) -> Floats:
         """(fitted bins, directions) orthonormal: where the parameters of a fit can move its residuals."""
-        left, sizes, _ = np.linalg.svd(self.slopes(fit)[self.rows], full_matrices=False)
+        left, sizes, _ = np.linalg.svd(self.loss_slopes(fit)[self.rows], full_matrices=False)
         return np.asarray(left[:, sizes > LEAST_REACH * sizes.max(initial=0.0)], dtype=np.float64)
 
     def cost_beside(self, fit: Fit | None, reach: Floats) -> float:
@@ -154,7 +154,7 @@ class Fitter:
             return fit
         current, damping = fit, 1e-2
         for _ in range(ROUNDS):
-            slopes = self.slopes(current)[self.rows]
+            slopes = self._differences(current, np.asarray)[self.rows]
             gradient = slopes.T @ current.residuals[self.rows]
             squares = slopes.T @ slopes
             x = current.position
@@ -202,8 +202,19 @@ class Fitter:
                         best = tried
         return best
 
-    def slopes(self, fit: Fit, of: Callable[[Floats], Floats] = np.asarray) -> Floats:
-        """(bins, parameters) change of the losses, or of something of them, with each parameter, over its range."""
+    def slopes(self, fit: Fit) -> Floats:
+        """(bins, parameters) change of the residuals themselves with each parameter, over its range.
+
+        The noise is no part of it: what was measured is the same on both sides of a difference.
+        """
+        return self._differences(fit, residuals_of)
+
+    def loss_slopes(self, fit: Fit) -> Floats:
+        """(bins, parameters) change of the losses with each parameter, over its range."""
+        return np.asarray(self.slopes(fit) * steepness(fit.residuals)[:, None], dtype=np.float64)
+
+    def _differences(self, fit: Fit, of: Callable[[Floats], Floats]) -> Floats:
+        """(bins, parameters) differences of something of the losses, over steps of the parameters."""
         x = fit.position
         slopes = np.zeros((self.rows.size, x.size))
         for k in range(x.size):

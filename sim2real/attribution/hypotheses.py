@@ -150,7 +150,7 @@ class Hypotheses:
             np.zeros(residuals.size) if one is None else self._late(fit, member, one)
             for member, one in enumerate(fewer)
         ]
-        slopes = self._fitter.slopes(fit, residuals_of)
+        slopes = self._fitter.slopes(fit)
         form = self._form(fit, signatures, self._plain - residuals, late)
         slopes = np.array([cells.means(column) for column in slopes.T]).T
         found = evidence(cells, residuals, slopes, form, strengths_of(fit))

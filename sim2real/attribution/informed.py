@@ -26,7 +26,7 @@ def informed(fitter: Fitter, fit: Fit, priors: Priors) -> Fit:
     known, x = known_of(fit, priors), fit.position
     if not known.precision.any():
         return fit
-    covariance = covariance_of(fitter, fit, fitter.bins, fitter.slopes(fit)[fitter.rows])
+    covariance = covariance_of(fitter, fit, fitter.bins, fitter.loss_slopes(fit)[fitter.rows])
     known = agreeing(known, x, covariance)
     step = narrowed(covariance, known) @ (known.precision * (known.mean - x))
     moved = fitter.at(fit.candidates, fit.split(np.clip(x + step, 0.0, 1.0)))

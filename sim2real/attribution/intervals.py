@@ -60,7 +60,7 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
     x = fit.position
     if x.size == 0:
         return np.zeros((0, 2))
-    slopes = fitter.slopes(fit)[fitter.rows]
+    slopes = fitter.loss_slopes(fit)[fitter.rows]
     covariance = covariance_of(fitter, fit, bins, slopes)
     known = agreeing(known_of(fit, priors), x, covariance)
     spread = TWO_SIDED * np.sqrt(np.maximum(np.diag(narrowed(covariance, known)), 0.0))

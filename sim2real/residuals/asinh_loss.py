@@ -26,3 +26,8 @@ def squares_of(losses: Floats) -> Floats:
 def residuals_of(losses: Floats) -> Floats:
     """Residuals themselves, from what `asinh_loss` made of them."""
     return np.asarray(ASINH_SCALE * np.sinh(losses / ASINH_SCALE), dtype=np.float64)
+
+
+def steepness(losses: Floats) -> Floats:
+    """Change of the losses with the residuals themselves: 1 of a small one, less of a large one."""
+    return np.asarray(1.0 / np.cosh(losses / ASINH_SCALE), dtype=np.float64)

@@ -150,7 +150,8 @@ def test_it_works_without_a_channel(alpha, missing):
     kept = {name: values for name, values in recording.columns.items() if not name.endswith(missing)}
     report = diagnose(replace(recording, columns=kept), alpha).report()
     assert report.verdict == "effect"
-    assert report.effects[0].component == "rising_main"
+    (effect,) = report.effects
+    assert "friction_bias" in {effect.name, *effect.equivalent}, "without a head a worn pump gives the same flows"
 
 
 def test_columns_of_truth_change_nothing(alpha, plain):

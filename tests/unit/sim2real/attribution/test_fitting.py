@@ -57,7 +57,7 @@ def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
 
 def test_reach_is_that_of_least_squares(fitter, lag):
     rng = np.random.default_rng(4)
-    slopes = fitter.slopes(lag)[fitter.rows]
+    slopes = fitter.loss_slopes(lag)[fitter.rows]
     wanted = lag.residuals + slopes @ np.array([0.01]) + rng.normal(0.0, 0.1, lag.residuals.size)
     moved = type(lag)(candidates=lag.candidates, points=lag.points, residuals=wanted)
     _, left, _, _ = np.linalg.lstsq(slopes, wanted, rcond=None)
@@ -70,7 +70,7 @@ def test_slopes_of_residuals_know_nothing_of_the_noise(fitter, alpha):
     fit = fitter.at([lift], [np.array([lift.free[0].normalised(0.0)])])
     steady = (bins.signal == HEAD) & (bins.regime == STEADY)
     assert np.std(residuals_of(fit.residuals)[steady]) > 0.5
-    moved_m = fitter.slopes(fit, residuals_of)[steady, 0] * bins.deviation[steady]
+    moved_m = fitter.slopes(fit)[steady, 0] * bins.deviation[steady]
     assert moved_m == pytest.approx(moved_m.mean(), rel=1e-6)
     assert moved_m.mean() < -1.0
 
