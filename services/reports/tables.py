@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.text_table import SCREEN_WIDTH, shown, text_table
+from wetwell.services.reports.text_table import SCREEN_WIDTH, folded, shown, text_table
 
 if TYPE_CHECKING:
     from wetwell.protocols.recordings.kpi import Kpis
@@ -41,7 +41,7 @@ def as_lines(result: Mapping[str, object], indent: str = "") -> str:
             table = text_table(value, SCREEN_WIDTH - len(indent) - 2)
             lines += [f"{indent}{key}:", *(f"{indent}  {line}" for line in table)]
         else:
-            lines.append(f"{indent}{key}: {shown(value)}")
+            lines.append(folded(f"{indent}{key}: {shown(value)}"))
     return "\n".join(lines)
 
 
