@@ -92,7 +92,7 @@ def up(
         "historian": ["historian"],
         "dashboard": ["dashboard"],
         "detector": ["detector", "--station", station],
-        "alarms": ["alarms", "--station", station],
+        "alarms": ["alarms", "--station", station, "--held"],
         "watch": ["gap", "watch", "--station", station],
         "simulator": ["simulator", *live, *(["--stand-at-end"] if is_shown else [])],
     }
