@@ -66,12 +66,12 @@ def list_command(
     from wetwell.services.alarms.client import ask_alarms, list_alarms
     from wetwell.services.alarms.tables import alarm_lines
 
-    name, labels = station_and_names(station)
+    name, title, labels = station_and_names(station)
     found = asyncio.run(ask_alarms(settings_of(config, zenoh), lambda bus: list_alarms(bus, name)))
     if as_json:
         print_result({"alarms": [alarm.model_dump(mode="json") for alarm in found]}, as_json=True)
     else:
-        typer.echo(alarm_lines(found, labels))
+        typer.echo(alarm_lines(found, labels, title))
 
 
 @app.command()

@@ -61,6 +61,17 @@ def named(key: object, labels: Sequence[str]) -> object:
     return key if label == number else f"{key} ({label})"
 
 
+def titled(key: str, title: str | None) -> str:
+    """Key of a station, and beside it what people call it, where that is known.
+
+    Examples
+    --------
+    >>> titled("sued", "Pumpwerk Süd"), titled("sued", None)
+    ('sued (Pumpwerk Süd)', 'sued')
+    """
+    return key if title is None else f"{key} ({title})"
+
+
 def kpi_table(figures: "Kpis", labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:
     """Figures of a recording by day and in total, and by hour where asked for; what is not known is None.
 
