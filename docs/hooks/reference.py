@@ -1,7 +1,5 @@
 """Reference pages made from the code: commands, settings, messages, registers, effects, faults, inflow models."""
 
-import importlib
-import pkgutil
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, get_args, get_origin
 
@@ -11,12 +9,9 @@ import schemas
 import typer
 from pydantic import BaseModel
 
-import wetwell.protocols.messages
-from wetwell.protocols.messages.message import Message
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.services.cli import app
-from wetwell.services.schemas.described import described_schema
-from wetwell.services.schemas.examples import add_examples, examples_of
+from wetwell.services.schemas.messages import message_models, message_schema
 from wetwell.services.schemas.registry import schema_named
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.faults import FAULTS
@@ -72,20 +67,16 @@ def _default(option: Any) -> str:
 
 def _messages() -> str:
     text = ["# Messages", "", "JSON on the bus. A key that is not listed is ignored; a new one has a default.", ""]
-    for model in _message_models():
-        schema = described_schema(model, mode="serialization")
-        add_examples(schema, examples_of(model.__name__.lower()))
+    models = list(message_models())
+    shown = {model.__name__ for model in models} | {"Station", *schema_named("station")["$defs"]}
+    for model in models:
+        schema = message_schema(model)
         text += [f"## {model.__name__}", "", schema["description"], "", schemas.key_table(schema, schema)]
+        for name, part in schema.get("$defs", {}).items():
+            if "properties" in part and name not in shown:
+                text += [f"### {name}", "", part["description"], "", schemas.key_table(schema, part)]
+                shown.add(name)
     return "\n".join(text)
-
-
-def _message_models() -> Iterator[type[Message]]:
-    for name in sorted(name for _, name, _ in pkgutil.iter_modules(wetwell.protocols.messages.__path__)):
-        module = importlib.import_module(f"wetwell.protocols.messages.{name}")
-        for model in vars(module).values():
-            is_own = isinstance(model, type) and model.__module__ == module.__name__
-            if is_own and issubclass(model, Message) and model is not Message:
-                yield model
 
 
 def _registers() -> str:

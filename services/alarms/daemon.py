@@ -41,7 +41,7 @@ PACE_S = 0.1
 SAVE_S = 60.0
 
 
-async def serve_alarms(settings: Settings, stations: Sequence[Station]) -> None:
+async def serve_alarms(settings: Settings, stations: Sequence[Station], *, is_held: bool = False) -> None:
     """Keep the alarms of a site until stopped. A router that is away is waited for.
 
     Parameters
@@ -49,23 +49,26 @@ async def serve_alarms(settings: Settings, stations: Sequence[Station]) -> None:
     settings : Settings
     stations : sequence of Station
         Whose files are known; others are taken from the bus, without limits of the level.
+    is_held : bool
+        Whether they are simulated plants that stand until all parts are ready: until one is let go, nothing of it is
+        missed.
 
     Raises
     ------
     ConfigError
         If the folder of the state cannot be used.
     """
-    await run_until_stopped(_run(settings, stations), "alarms.run")
+    await run_until_stopped(_run(settings, stations, is_held=is_held), "alarms.run")
 
 
-async def _run(settings: Settings, stations: Sequence[Station]) -> None:
+async def _run(settings: Settings, stations: Sequence[Station], *, is_held: bool) -> None:
     if settings.lease.url is not None:
-        await _keep_in_turn(settings, stations)
+        await _keep_in_turn(settings, stations, is_held=is_held)
     with await connect(settings) as bus:
-        await keep_alone(settings, bus, stations)
+        await keep_alone(settings, bus, stations, is_held=is_held)
 
 
-async def _keep_in_turn(settings: Settings, stations: Sequence[Station]) -> None:
+async def _keep_in_turn(settings: Settings, stations: Sequence[Station], *, is_held: bool) -> None:
     """Keep the alarms of a site for ever while this process owns the role; stand by while it does not."""
     from wetwell.services.lease.membership import Membership  # noqa: PLC0415
     from wetwell.services.lease.outbox import KeptRequest, Outbox, OutboxPlace  # noqa: PLC0415 - only pairs need it
@@ -79,7 +82,7 @@ async def _keep_in_turn(settings: Settings, stations: Sequence[Station]) -> None
                     kept = Kept(
                         KeptSite(OutboxPlace(outbox, "alarms")), LineAudit(outbox.last_line, outbox.write_down)
                     )
-                    service = AlarmService(outbox, settings.alarms, stations, clocks, kept)
+                    service = AlarmService(outbox, settings.alarms, stations, clocks, kept, is_held=is_held)
                     try:
                         await keep(bus, service, settings.health.period_s, lambda one: KeptRequest(one, outbox))
                     finally:
@@ -88,7 +91,7 @@ async def _keep_in_turn(settings: Settings, stations: Sequence[Station]) -> None
                 await role.act(bus, work)
 
 
-async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) -> None:
+async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station], *, is_held: bool = False) -> None:
     """Keep the alarms of a site for ever, as the one who keeps their state in this folder; it is saved at the end.
 
     Raises
@@ -98,7 +101,7 @@ async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station]) 
     """
     kept = settings.alarms
     with folder_held(kept.state_dir, "alarms.state_dir", "alarms"):
-        service = AlarmService(bus, kept, stations, clocks)
+        service = AlarmService(bus, kept, stations, clocks, is_held=is_held)
         try:
             if kept.state_dir is None:
                 log.info("alarms.state_dir is not set: acts are only logged, and the state ends with the process")

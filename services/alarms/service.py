@@ -58,7 +58,8 @@ class Kept:
 class AlarmService:
     """The alarms of a site on a bus. Synchronous; `now` gives the clocks.
 
-    Without `kept`, state and audit are in the folder of the settings.
+    Without `kept`, state and audit are in the folder of the settings. Plants that are held (`is_held`) are not missed
+    until they are let go.
 
     Raises
     ------
@@ -73,6 +74,8 @@ class AlarmService:
         stations: Sequence[Station],
         now: Callable[[], Now],
         kept: Kept | None = None,
+        *,
+        is_held: bool = False,
     ) -> None:
         self._bus = bus
         self._settings = settings
@@ -89,7 +92,9 @@ class AlarmService:
         self.stations: dict[str, StationWatch] = {}
         self._restore(self._file.load() or SiteState())
         for station in stations:
-            self._watch(station.name).has_samples = True  # it is missed from the beginning
+            watch = self._watch(station.name)
+            watch.has_samples = True  # it is missed from the beginning
+            watch.is_held = is_held
         self._watch(SITE)
 
     def handle_sample(self, payload: bytes) -> None:

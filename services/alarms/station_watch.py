@@ -87,7 +87,7 @@ class StationWatch:
     older: int = 0
     has_samples: bool = False
     is_held: bool = False
-    """Whether it is a simulated plant that stands until it is let go: then no samples are missed."""
+    """Whether it is a simulated plant that stands until it is let go: then nothing of it is missed."""
     verdicts: dict[int, PumpVerdicts] = field(default_factory=dict)
     gone_s: dict[str, float | None] = field(default_factory=dict)
 
@@ -210,7 +210,7 @@ class StationWatch:
         """Look for what does not come any more."""
         time_ns = self.clock_ns(now)
         if self.is_held:
-            self.missed_s = now.steady_s
+            self.begin_again(now)
         if self.has_samples:
             self.gone_s.setdefault("detector", now.steady_s)
             age_s = now.steady_s - self.missed_s
@@ -221,7 +221,7 @@ class StationWatch:
             registry.observe(self.name, self.services[service], is_silent, time_ns, now.wall_ns)
 
     def begin_again(self, now: Now) -> None:
-        """Count silence from now on: until now it was that of the bus."""
+        """Count silence from now on: until now the bus was silent, or the plant stood."""
         self.missed_s = now.steady_s
         self.gone_s = {service: None if gone_s is None else now.steady_s for service, gone_s in self.gone_s.items()}
 

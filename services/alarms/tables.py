@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from wetwell.protocols.messages.alarm import Alarm, AlarmReport
-from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.tables import as_lines, named
+from wetwell.protocols.timestamps import NS_PER_S, to_iso
+from wetwell.services.reports.tables import as_lines, named, titled
 
 TARGETS: Mapping[str, str] = {
     "alarms_10min": "1 wanted, 2 at most in the long run, 10 at most ever",
@@ -17,8 +17,8 @@ TARGETS: Mapping[str, str] = {
 """What ISA-18.2 and EEMUA 191 want for one operator."""
 
 
-def alarm_lines(alarms: Sequence[Alarm], labels: Sequence[str] = ()) -> str:
-    """A table of alarms for people; where `labels` say what they call the pumps, with that.
+def alarm_lines(alarms: Sequence[Alarm], labels: Sequence[str] = (), title: str | None = None) -> str:
+    """A table of alarms for people; where `labels` and `title` say what they call pumps and station, with that.
 
     Examples
     --------
@@ -33,11 +33,11 @@ def alarm_lines(alarms: Sequence[Alarm], labels: Sequence[str] = ()) -> str:
     rows = [
         {
             "priority": alarm.priority,
-            "station": alarm.station,
+            "station": titled(alarm.station, title),
             "alarm": alarm.id,
             **({"pump": named(alarm.pump or "", labels)} if labels else {}),
             "state": alarm.state if alarm.until is None else f"shelved until {to_iso(alarm.until)}",
-            "raised": "" if alarm.raised is None else to_iso(alarm.raised),
+            "raised": "" if alarm.raised is None else to_iso(alarm.raised // NS_PER_S * NS_PER_S),
             "text": alarm.text,
             "advice": alarm.advice,
         }

@@ -34,6 +34,9 @@ def alarms(
         list[str] | None,
         typer.Option("--station", metavar="FILE", help="Station file, for limits of the level; may be given again."),
     ] = None,
+    held: Annotated[
+        bool, typer.Option("--held", help="Miss nothing of the stations until their simulated plants are let go.")
+    ] = False,
     zenoh: ZenohOption = None,
     config: ConfigOption = None,
 ) -> None:
@@ -45,7 +48,7 @@ def alarms(
     settings = settings_of(config, zenoh)
     from wetwell.services.alarms.daemon import serve_alarms
 
-    run(settings, serve_alarms(settings, [find_station(name) for name in station or []]))
+    run(settings, serve_alarms(settings, [find_station(name) for name in station or []], is_held=held))
 
 
 @app.command("list", cls=about("--station"))
@@ -63,12 +66,12 @@ def list_command(
     from wetwell.services.alarms.client import ask_alarms, list_alarms
     from wetwell.services.alarms.tables import alarm_lines
 
-    name, labels = station_and_names(station)
+    name, title, labels = station_and_names(station)
     found = asyncio.run(ask_alarms(settings_of(config, zenoh), lambda bus: list_alarms(bus, name)))
     if as_json:
         print_result({"alarms": [alarm.model_dump(mode="json") for alarm in found]}, as_json=True)
     else:
-        typer.echo(alarm_lines(found, labels))
+        typer.echo(alarm_lines(found, labels, title))
 
 
 @app.command()

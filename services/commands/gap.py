@@ -305,7 +305,9 @@ def gap_watch(
             for each in stations
             if (message := watch_history(store, each, settings.watch.state_dir, progress=progress)) is not None
         ]
-    return typer.echo(json.dumps([one.model_dump(mode="json") for one in told]) if as_json else watch_lines(told))
+    if as_json:
+        return typer.echo(json.dumps([one.model_dump(mode="json") for one in told]))
+    return typer.echo(watch_lines(told, {each.name: each.label for each in stations}))
 
 
 @app.command("fleet", cls=about("--diagnoses"))

@@ -78,7 +78,7 @@ def history(
     from wetwell.services.historian.client import ask_history
     from wetwell.services.historian.tables import history_table
 
-    name, labels = station_and_names(station)
+    name, title, labels = station_and_names(station)
     asking = ask_history(
         settings,
         SITE if kind == "stations" else name,
@@ -92,7 +92,7 @@ def history(
     if as_json:
         typer.echo(answer.encode().decode())
     else:
-        print_result(history_table(answer, labels), as_json=False)
+        print_result(history_table(answer, labels, title), as_json=False)
 
 
 @app.command(cls=about("--station"), rich_help_panel=RECORD)
@@ -210,7 +210,7 @@ def list_maintenance(
     from wetwell.services.historian.client import ask_history
     from wetwell.services.historian.tables import history_table
 
-    span, (name, labels) = (-LONGEST_NS, LONGEST_NS), station_and_names(station)
+    span, (name, _, labels) = (-LONGEST_NS, LONGEST_NS), station_and_names(station)
     asking = ask_history(
         settings_of(config, zenoh),
         name,

@@ -36,6 +36,7 @@ app.add_typer(config_app, name="config", rich_help_panel=ADMINISTER)
 @station_app.command("check", cls=about("--station"))
 def station_check(station: StationOption, as_json: JsonOption = False) -> None:
     """Check a station file; says what is wrong with it, or nothing is."""
+    from wetwell.services.reports.text_table import folded
     from wetwell.services.stations import find_station
 
     found = find_station(station)
@@ -43,7 +44,7 @@ def station_check(station: StationOption, as_json: JsonOption = False) -> None:
         print_result({"file": station, "station": found.name, "title": found.title, "is_valid": True}, as_json=True)
     else:
         titled = "" if found.title is None else f", {found.title},"
-        typer.echo(f"{station}: station '{found.name}'{titled} is valid")
+        typer.echo(folded(f"{station}: station '{found.name}'{titled} is valid"))
 
 
 @station_app.command("show", cls=about("--station"))

@@ -76,6 +76,7 @@ def up(
     is_shown = speed is None and not steady
     plant, speed = live_plant(station, scenario, seed, speed)  # what is wrong is said here, not by a child
     from wetwell.services.reports.terminal import banner
+    from wetwell.services.reports.text_table import folded
     from wetwell.services.supervisor.runs import RunRecord, take_folder
     from wetwell.services.supervisor.screens import JsonScreen, TerminalScreen
     from wetwell.services.supervisor.serve import Screen, UpPlan, serve_all
@@ -91,13 +92,14 @@ def up(
         "historian": ["historian"],
         "dashboard": ["dashboard"],
         "detector": ["detector", "--station", station],
-        "alarms": ["alarms", "--station", station],
+        "alarms": ["alarms", "--station", station, "--held"],
         "watch": ["gap", "watch", "--station", station],
         "simulator": ["simulator", *live, *(["--stand-at-end"] if is_shown else [])],
     }
     with tempfile.TemporaryDirectory(prefix="wetwell-") as folder:
         settings = with_data(settings, data, Path(folder))
-        text = banner(settings, plant.station, plant.scenario.name, speed) + (f"\nData in {words}\n" if words else "")
+        text = banner(settings, plant.station, plant.scenario.name, speed)
+        text += folded(f"\nData in {words}") + "\n" if words else ""
         screen: Screen = JsonScreen(_say) if as_json else TerminalScreen(_say, text, plant.station.pump_labels)
         story_s = plant.scenario.duration_s
         plan = UpPlan(plant.station.name, commands, is_shown=is_shown, story_s=story_s, limit_s=limit_s)

@@ -267,14 +267,14 @@ def station_name(name_or_file: str) -> str:
     return station_and_names(name_or_file)[0]
 
 
-def station_and_names(name_or_file: str) -> tuple[str, tuple[str, ...]]:
-    """Name of a station, and what people call its pumps; a name alone does not tell that."""
+def station_and_names(name_or_file: str) -> tuple[str, str | None, tuple[str, ...]]:
+    """Name of a station, and what people call it and its pumps; a name alone does not tell that."""
     if not name_or_file.endswith(".toml"):
-        return name_or_file, ()
+        return name_or_file, None, ()
     from wetwell.protocols.station.station_file import load_station
 
     station = load_station(Path(name_or_file))
-    return station.name, station.pump_labels
+    return station.name, station.title, station.pump_labels
 
 
 def signals_named(text: str, flag: str) -> tuple["SensedQuantity", ...]:

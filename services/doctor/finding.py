@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from wetwell.services.reports.text_table import folded
+
 Level = Literal["ok", "warning", "error"]
 
 
@@ -38,7 +40,7 @@ def finding_lines(findings: Sequence[Finding]) -> str:
     lines = []
     for finding in findings:
         word = finding.level if finding.level == "ok" else finding.level.upper()
-        lines.append(f"{word:<7}  {finding.check:<9}  {finding.text}")
+        lines.append(folded(f"{word:<7}  {finding.check:<9}  {finding.text}", hang=20))
         if finding.advice:
-            lines.append(f"{'':<20}-> {finding.advice}")
+            lines.append(folded(f"{'':<20}-> {finding.advice}", hang=3))
     return "\n".join(lines)

@@ -5,7 +5,7 @@ from typing import Any
 
 from wetwell.protocols.messages.history import History
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.tables import named
+from wetwell.services.reports.tables import named, titled
 
 _SHOWN = {
     "verdicts": ("time", "pump", "state"),
@@ -19,10 +19,10 @@ _PUMPS = ("pump", "asset")
 """Columns that name a pump."""
 
 
-def history_table(history: History, labels: Sequence[str] = ()) -> dict[str, Any]:
+def history_table(history: History, labels: Sequence[str] = (), title: str | None = None) -> dict[str, Any]:
     """Rows of an answer; of samples without least and largest values, of figures those of the whole station.
 
-    Where `labels` say what people call the pumps, that stands beside their numbers.
+    Where `labels` and `title` say what people call the pumps and the station, that stands beside their keys.
     """
     if history.kind in _SHOWN:
         names = _SHOWN[history.kind]
@@ -39,7 +39,7 @@ def history_table(history: History, labels: Sequence[str] = ()) -> dict[str, Any
         {"time": to_iso(time_ns)} | {name: _short(history.columns[name][row]) for name in names}
         for row, time_ns in enumerate(history.time)
     ]
-    return {"station": history.station, history.kind: rows} | ({"more": True} if history.more else {})
+    return {"station": titled(history.station, title), history.kind: rows} | ({"more": True} if history.more else {})
 
 
 def _short(value: float | None) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from wetwell.services.reports.text_table import text_table
+from wetwell.services.reports.text_table import folded, text_table
 
 
 def experiment_lines(told: Mapping[str, Any]) -> str:
@@ -36,7 +36,7 @@ def experiment_lines(told: Mapping[str, Any]) -> str:
             f"prices ({source}): {prices['energy_per_kwh']:g} a kWh, {prices['crew_per_hour']:g} an hour of work"
         )
     lines += [f"not allowed: {one['act']}: {one['reason']}" for one in told["refused"]]
-    return "\n".join(lines)
+    return folded("\n".join(lines))
 
 
 def _named(effects: list[str]) -> str:

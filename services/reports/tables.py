@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.reports.text_table import SCREEN_WIDTH, shown, text_table
+from wetwell.services.reports.text_table import SCREEN_WIDTH, folded, shown, text_table
 
 if TYPE_CHECKING:
     from wetwell.protocols.recordings.kpi import Kpis
@@ -41,7 +41,7 @@ def as_lines(result: Mapping[str, object], indent: str = "") -> str:
             table = text_table(value, SCREEN_WIDTH - len(indent) - 2)
             lines += [f"{indent}{key}:", *(f"{indent}  {line}" for line in table)]
         else:
-            lines.append(f"{indent}{key}: {shown(value)}")
+            lines.append(folded(f"{indent}{key}: {shown(value)}"))
     return "\n".join(lines)
 
 
@@ -59,6 +59,17 @@ def named(key: object, labels: Sequence[str]) -> object:
         return key
     label = labels[int(number) - 1]
     return key if label == number else f"{key} ({label})"
+
+
+def titled(key: str, title: str | None) -> str:
+    """Key of a station, and beside it what people call it, where that is known.
+
+    Examples
+    --------
+    >>> titled("sued", "Pumpwerk Süd"), titled("sued", None)
+    ('sued (Pumpwerk Süd)', 'sued')
+    """
+    return key if title is None else f"{key} ({title})"
 
 
 def kpi_table(figures: "Kpis", labels: Sequence[str] = (), *, with_hours: bool) -> dict[str, object]:

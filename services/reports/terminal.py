@@ -7,6 +7,7 @@ from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.modbus.registers import register_table
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
+from wetwell.services.reports.text_table import SCREEN_WIDTH, folded
 from wetwell.services.runtime.settings import Settings
 
 WORDS: dict[State, str] = {
@@ -20,6 +21,10 @@ WORDS: dict[State, str] = {
 }
 
 
+FIGURES_INDENT = " " * len("2025-01-01T00:00:00Z  ")
+"""Before the figures of a verdict that stand in a line of their own: they begin below the pump."""
+
+
 def banner(settings: Settings, station: Station, scenario: str, speed: float) -> str:
     """Where to poll and what to subscribe to."""
     table = register_table(len(station.pump), len(station.control.start_levels_m))
@@ -28,8 +33,9 @@ def banner(settings: Settings, station: Station, scenario: str, speed: float) ->
     host, port = settings.dashboard.host, settings.dashboard.port
     page = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     order = "-B " if modbus.word_order == "ABCD" else ""
+    what = f"{len(station.pump)} pumps, scenario '{scenario}', {speed:g} times as fast as life"
     return f"""\
-wetwell: station {station.label}, {len(station.pump)} pumps, scenario '{scenario}', {speed:g} times as fast as life
+{folded(f"wetwell: station {station.label}, {what}")}
 
 Page         http://{page}
 
@@ -48,8 +54,8 @@ Zenoh        {settings.zenoh.endpoint}
 
 def begin_line(*, has_keys: bool) -> str:
     """What stands before the first verdict."""
-    keys = "space holds the plant, + and - change its speed, q ends; so does Ctrl-C" if has_keys else "Ctrl-C stops"
-    return f"All parts are ready, the plant begins. {keys}. Verdicts, in the station's time:\n"
+    keys = "Space holds it, + and - change its speed, q ends; so does Ctrl-C" if has_keys else "Ctrl-C stops"
+    return f"All parts are ready, the plant begins.\n{keys}. Verdicts, in the station's time:\n"
 
 
 def clock_line(clock: PlantClock) -> str:
@@ -95,29 +101,30 @@ def story_lines(changes: Sequence[Verdict], hours: float, names: Sequence[str]) 
     for verdict in changes:
         if verdict.state == "learning":
             continue
-        lines.append(f"  {verdict_line(verdict, names)}")
+        lines.append(verdict_line(verdict, names, "  "))
         said = [] if verdict.onset is None else [f"began about {to_iso(verdict.onset // NS_PER_S * NS_PER_S)}"]
         advice = verdict.evidence.get("advice")
         said += [str(advice)] if advice and verdict.state != "normal" else []
         if said:
-            lines.append(f"    {'; '.join(said)}")
+            lines.append(folded(f"    {'; '.join(said)}"))
     return "\n".join(lines)
 
 
-def verdict_line(verdict: Verdict, names: Sequence[str] = ()) -> str:
-    """One line for people, with the name of the pump where it is not just its number.
+def verdict_line(verdict: Verdict, names: Sequence[str] = (), indent: str = "") -> str:
+    """One line for people, with the name of the pump where that is not its number; its figures below if it is long.
 
     Examples
     --------
     >>> print(verdict_line(Verdict(
     ...     time=0, station="alpha", pump=2, state="pump_fault", probability={"pump_fault": 0.998, "normal": 0.002},
     ...     evidence={"shift_m": {"pump": -5.9, "system": 0.06}}, onset=0, window=(0, 0))))
-    1970-01-01T00:00:00Z  pump 2  PUMP FAULT             p = 0.998  pump curve -5.90 m, system curve +0.06 m
+    1970-01-01T00:00:00Z  pump 2  PUMP FAULT    p = 0.998  pump curve -5.90 m, system curve +0.06 m
     """
     number = str(verdict.pump)
     name = names[verdict.pump - 1] if verdict.pump <= len(names) else number
     pump = number if name == number else f"{number} ({name})"
-    words = [f"{to_iso(verdict.time)}  pump {pump}  {WORDS[verdict.state]:<21}"]
+    head = f"{indent}{to_iso(verdict.time)}  pump {pump}  {WORDS[verdict.state]:<12}"
+    words = []
     if verdict.state in verdict.probability and verdict.state != "learning":
         words.append(f"p = {verdict.probability[verdict.state]:.3f}")
     if "shift_m" in verdict.evidence:
@@ -125,4 +132,7 @@ def verdict_line(verdict: Verdict, names: Sequence[str] = ()) -> str:
         words.append(f"pump curve {shift_m['pump']:+.2f} m, system curve {shift_m['system']:+.2f} m")
     if "reason" in verdict.evidence:
         words.append(str(verdict.evidence["reason"]))
-    return "  ".join(words).rstrip()
+    line = "  ".join([head, *words]).rstrip()
+    if len(line) <= SCREEN_WIDTH:
+        return line
+    return f"{head.rstrip()}\n{folded(indent + FIGURES_INDENT + '  '.join(words), hang=0)}"

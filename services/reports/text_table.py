@@ -43,6 +43,29 @@ def text_table(rows: Sequence[Mapping[str, object]], width: int = SCREEN_WIDTH) 
     return lines
 
 
+def folded(text: str, hang: int = 2) -> str:
+    """A text whose lines fit the screen, as far as single words allow it; what follows of a line is indented further.
+
+    Parameters
+    ----------
+    text : str
+        Of one line or more.
+    hang : int
+        By so much more than the beginning of the line. [characters]
+
+    Examples
+    --------
+    >>> print(folded("  note: " + "word " * 20 + "end"))
+      note: word word word word word word word word word word word word word word word word word word
+        word word end
+    """
+    lines = []
+    for line in text.splitlines():
+        indent = " " * (len(line) - len(line.lstrip()) + hang)
+        lines += _wrapped(line, SCREEN_WIDTH, indent)
+    return "\n".join(lines)
+
+
 def shown(value: object) -> str:
     """A value for people: a list by its members, and a dash where there is nothing.
 
@@ -84,7 +107,11 @@ def _cells(cells: Sequence[str], width: int) -> list[list[str]]:
     """Lines of each cell of a column: to the right under its head, or to the left where some are wrapped."""
     if all(len(cell) <= width for cell in cells):
         return [[cell.rjust(width)] for cell in cells]
-    return [wrap(cell, width, break_long_words=False, break_on_hyphens=False) or [""] for cell in cells]
+    return [_wrapped(cell, width) for cell in cells]
+
+
+def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    return wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [""]
 
 
 def _lines(row: Sequence[Sequence[str]], widths: Sequence[int]) -> list[list[str]]:

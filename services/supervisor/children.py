@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import re
 import sys
 from collections.abc import AsyncIterator, Sequence
 
@@ -14,6 +15,8 @@ from wetwell.services.runtime.settings import Settings, environment_of
 log = logging.getLogger(__name__)
 
 STOP_TIMEOUT_S = 10.0
+ONE_SETTING = r"WETWELL_\w+?__"
+"""Variables of single settings: they would count for more than the sections, in which flags have their say."""
 
 
 class ChildError(WetwellError):
@@ -25,8 +28,8 @@ async def child(settings: Settings, name: str, arguments: Sequence[str]) -> Asyn
     """Start a child in a session of its own; at the end ask it to stop, and make it stop if it does not."""
     alone = settings.health.model_copy(update={"http": None})  # the page is the supervisor's
     given = environment_of(settings.model_copy(update={"health": alone}))
-    environment = os.environ | given | {PARENT_VARIABLE: "1"}
-    environment.pop("WETWELL_HEALTH__HTTP", None)
+    inherited = {name: value for name, value in os.environ.items() if not re.match(ONE_SETTING, name)}
+    environment = inherited | given | {PARENT_VARIABLE: "1"}
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",

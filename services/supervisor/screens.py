@@ -32,7 +32,7 @@ class TerminalScreen:
     def greet(self) -> None:
         """Say where to look."""
         self._end(self._banner)
-        self._go_on("Starting; the first time kernels are compiled, which takes half a minute:")
+        self._go_on("Starting; the first time kernels are compiled, which takes half a minute:\n")
 
     def show_ready(self, part: str, after_s: float) -> None:
         """Go on with the line of the parts that are ready."""

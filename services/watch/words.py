@@ -1,5 +1,7 @@
 """The watch of a station as others see it: a message, and lines for a terminal."""
 
+from collections.abc import Mapping
+
 from wetwell.protocols.messages.gap_watch import GapLook, GapName, GapWatch
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.tables import as_lines
@@ -32,11 +34,11 @@ def message_of(state: WatchState) -> GapWatch | None:
     )
 
 
-def watch_lines(watches: list[GapWatch]) -> str:
-    """A table of stations, and below it what their gaps are called."""
+def watch_lines(watches: list[GapWatch], labels: Mapping[str, str]) -> str:
+    """A table of stations, by key and what people call them (`labels`), and below it what their gaps are called."""
     stations = [
         {
-            "station": one.station,
+            "station": labels[one.station],
             "until": to_iso(one.time)[:16],
             "gap": round(max(one.gap.values(), default=1.0), 2),
             "matters": round(one.matters, 2),
@@ -47,7 +49,7 @@ def watch_lines(watches: list[GapWatch]) -> str:
         for one in watches
     ]
     names = [
-        {"station": one.station, "called": each.text} for one in watches for each in (*one.called, *one.past)
+        {"station": labels[one.station], "called": each.text} for one in watches for each in (*one.called, *one.past)
     ] or "none"
     return as_lines({"stations": stations or "none", "names": names})
 

@@ -14,12 +14,16 @@ from pathlib import Path
 import pytest
 from walks import LEFT_OUT_PAGES, WALKS, Walk
 
+from wetwell.services.reports.text_table import SCREEN_WIDTH
+
 ROOT = Path(__file__).parents[2]
 PORTS = ("7447", "8080", "5020", "5021", "9100")
 """Of the bus, the control-room page, two PLCs and the figures; a walk has its own."""
 PATIENCE_S = 240
 AGAIN_S = 2.0
 """Between two tries of a command; each starts a process."""
+FOR_PROGRAMS = ("--json", "wetwell schema", "wetwell modbus-map", "wetwell config show", "--show-completion")
+"""In commands that print what programs read."""
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?")
 """A number; not one that is part of a name."""
 
@@ -40,6 +44,13 @@ def commands(page: Path) -> list[str]:
 def lines_of(text: str) -> list[str]:
     """Lines of a text without their spacing, which tables fit to their longest row."""
     return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+
+
+def too_wide(line: str, printed: str) -> list[str]:
+    """What a command of ours prints for people and is wider than a screen, single words apart."""
+    if not line.startswith("wetwell ") or any(form in line for form in FOR_PROGRAMS):
+        return []
+    return [shown for shown in printed.splitlines() if len(shown) > SCREEN_WIDTH and len(shown.split()) > 1]
 
 
 def is_said(shown: str, printed: str, near: float) -> bool:
@@ -96,6 +107,20 @@ def test_a_line_of_a_page_is_what_is_printed_but_for_the_share_that_its_walk_all
     assert is_said("gap 1.02 after, pump_1_at_80", printed, near) == is_same
 
 
+@pytest.mark.parametrize(
+    ("line", "printed", "is_wide"),
+    [
+        ("wetwell doctor", "a " * 51, True),
+        ("wetwell doctor", "a " * 50, False),
+        ("wetwell doctor", "a" * 101, False),
+        ("wetwell doctor --json", "a " * 51, False),
+        ("cat field.csv", "a " * 51, False),
+    ],
+)
+def test_what_people_read_fits_a_screen(line: str, printed: str, is_wide: bool) -> None:
+    assert bool(too_wide(line, printed)) == is_wide
+
+
 @pytest.mark.check
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("walk", WALKS, ids=lambda walk: walk.pages[0].removeprefix("docs/"))
@@ -122,7 +147,9 @@ def test_commands_run(walk: Walk, tmp_path: Path) -> None:
             else:
                 code = next((code for beginning, code in walk.codes.items() if line.startswith(beginning)), 0)
                 patience_s = PATIENCE_S if line.startswith(walk.patient) else 0.0
-                printed += lines_of(run(run_line, tmp_path, environment, code, patience_s))
+                said_now = run(run_line, tmp_path, environment, code, patience_s)
+                assert too_wide(line, said_now) == []
+                printed += lines_of(said_now)
         for block in (block for page in walk.pages for block in blocks(ROOT / page, "python")):
             run(f"python - <<'PYTHON'\n{block}PYTHON\n", tmp_path, environment)
         for process, said in started:

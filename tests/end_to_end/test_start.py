@@ -15,6 +15,7 @@ import pytest
 
 from wetwell.protocols.timestamps import MAX_STAMP_NS
 from wetwell.services.historian.store.folder_store import FolderStore
+from wetwell.services.reports.text_table import SCREEN_WIDTH
 
 LEAST_SAMPLES = 6_000
 """Ten seconds at 600 times life."""
@@ -37,6 +38,12 @@ def kept(folder: Path) -> list[int]:
         return []
     with contextlib.closing(FolderStore(folder)) as store:
         return store.samples("alpha", 0, MAX_STAMP_NS).seq.tolist()
+
+
+def alarms(folder: Path) -> list[bytes]:
+    """What the historian has kept of alarms of the station."""
+    with contextlib.closing(FolderStore(folder)) as store:
+        return store.events("alarms", "alpha", 0, MAX_STAMP_NS, 10)
 
 
 def start_and_stop(folder: Path, environment: dict[str, str]) -> tuple[int, str]:
@@ -65,6 +72,8 @@ def start_and_stop(folder: Path, environment: dict[str, str]) -> tuple[int, str]
         before, begins, _ = shown.partition("\nAll parts are ready")
         assert begins, shown
         assert all(f" {part} " in before.splitlines()[-1] for part in PARTS), before
+        assert max(map(len, shown.splitlines())) <= SCREEN_WIDTH, shown
+        assert alarms(folder) == [], "a healthy start calls nobody"
         return process.returncode, said
     finally:
         process.kill()

@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
+from wetwell.services.reports.text_table import folded
 from wetwell.sim2real.diagnosis.report import GapReport
 
 PLACES = 4
@@ -67,4 +68,4 @@ def gap_lines(report: GapReport, out: Path) -> str:
     lines += [f"not tested: {one.effect}: {one.reason}" for one in report.not_tested]
     lines += [f"note: {note}" for note in report.notes]
     lines += [f"next: {report.next_experiment}", f"{out}: report.json, report.html, station.toml"]
-    return "\n".join(lines)
+    return folded("\n".join(lines))

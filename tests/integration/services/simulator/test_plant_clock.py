@@ -137,6 +137,24 @@ def test_alarms_miss_no_samples_of_a_plant_that_is_held(alpha, bus):
     assert is_missed(0.0, 1_100.0)
 
 
+def test_alarms_miss_nothing_of_a_plant_that_is_not_let_go_yet(alpha, bus):
+    now_s = 0.0
+    service = AlarmService(bus, AlarmSettings(), [alpha], lambda: Now(0, now_s), is_held=True)
+    status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+
+    def missed(at_s: float) -> set[str]:
+        nonlocal now_s
+        now_s = at_s
+        service.look()
+        return {rule for (_, rule), record in service.registry.records.items() if record.status.is_active}
+
+    assert missed(1.0) | missed(1_000.0) == set(), "kernels may take their time to compile"
+    service.handle_status(Status(**status, figures={"held": 0.0}).encode())
+    assert missed(1_030.0) == set()
+    assert missed(1_031.0) == {"detector_silent"}
+    assert missed(1_061.0) == {"detector_silent", "samples_stale"}
+
+
 def test_an_order_that_is_none_is_answered(alpha, bus):
     async def run() -> list[bytes]:
         async with plant(bus, alpha, PlantStart(is_held=True)):

@@ -22,3 +22,20 @@ def test_the_name_of_the_pump_stands_in_a_column_where_it_is_known() -> None:
     assert "Nord)" in shown
     assert "Süd 1" not in shown
     assert "Süd" not in alarm_lines([alarm, level])
+
+
+def test_the_title_of_the_station_stands_beside_its_key_and_nobody_reads_nanoseconds() -> None:
+    alarm = Alarm(
+        id="level_high",
+        time=0,
+        station="sued",
+        priority="high",
+        is_active=True,
+        state="unacknowledged",
+        text="high level",
+        raised=1_534_172_891,
+    )
+    shown = alarm_lines([alarm], title="Pumpwerk Süd")
+    assert "sued (Pumpwerk" in shown
+    assert "Süd)" in shown
+    assert "  1970-01-01T00:00:01Z  " in shown

@@ -18,6 +18,11 @@ def test_pumps_of_episodes_and_verdicts_have_their_names() -> None:
     assert history_table(verdicts, LABELS)["verdicts"][0]["pump"] == "2 (Pumpwerk Süd Nord)"
 
 
+def test_the_title_of_the_station_stands_beside_its_key() -> None:
+    samples = History(kind="samples", station="sued", time=[0], columns={"level_m": [1.0]})
+    assert history_table(samples, LABELS, "Pumpwerk Süd")["station"] == "sued (Pumpwerk Süd)"
+
+
 def test_without_the_station_file_only_the_keys_are_known() -> None:
     verdicts = History(kind="verdicts", station="sued", messages=[VERDICT])
     assert history_table(verdicts)["verdicts"] == [VERDICT]

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.services.reports.text_table import SCREEN_WIDTH, text_table
+from wetwell.services.reports.text_table import SCREEN_WIDTH, folded, text_table
 
 WORD = st.text(alphabet="abcdefgh", min_size=1, max_size=12)
 CELL = st.lists(WORD, max_size=12).map(" ".join)
@@ -32,3 +32,16 @@ def test_numbers_are_never_broken():
 
 def test_rows_of_unlike_keys_have_all_columns():
     assert text_table([{"a": 1}, {"a": 2, "b": 3}]) == ["a  b", "1", "2  3"]
+
+
+@given(indent=st.integers(0, 20), words=st.lists(WORD, min_size=1, max_size=60), hang=st.integers(0, 20))
+def test_a_long_line_goes_on_in_the_next_and_says_all(indent, words, hang):
+    lines = folded(" " * indent + " ".join(words), hang).splitlines()
+    assert max(map(len, lines)) <= SCREEN_WIDTH
+    assert [word for line in lines for word in line.split()] == words
+    assert [len(line) - len(line.lstrip()) for line in lines] == [indent] + [indent + hang] * (len(lines) - 1)
+
+
+def test_lines_that_fit_stay_as_they_are():
+    text = "ok       router     answers\n\n    begins  here"
+    assert folded(text) == text

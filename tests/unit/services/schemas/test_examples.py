@@ -6,6 +6,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from wetwell.protocols.messages.alarm import Alarm
+from wetwell.protocols.messages.order import Plan
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.modbus.device_map import DeviceFile
@@ -14,6 +15,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.schemas.described import tables_of
 from wetwell.services.schemas.examples import add_examples, examples_of
+from wetwell.services.schemas.messages import message_models, message_schema
 from wetwell.services.schemas.registry import SCHEMAS, schema_named
 from wetwell.sim2real.diagnosis.report import GapReport
 from wetwell.sim2real.recording.preparation import Preparation
@@ -69,15 +71,27 @@ def test_what_a_key_shows_is_allowed_there(name):
         assert Draft202012Validator(rule).is_valid(value), key
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
-def test_each_key_has_a_meaning_in_words_and_a_value_to_see(name):
-    schema = schema_named(name)
+def unseen(schema):
+    """Keys of a schema and its tables without a meaning in words, or without a value to see."""
     for table in (schema, *schema.get("$defs", {}).values()):
         for key, rule in {**table.get("properties", {}), **table.get("patternProperties", {})}.items():
-            assert len(rule.get("description", "").split()) > 1, f"{table['title']}.{key}"
-            assert rule.get("examples") or "default" in rule or list(tables_of(schema, rule)), (
-                f"{table['title']}.{key}"
-            )
+            is_shown = rule.get("examples") or rule.get("default") is not None or "const" in rule
+            if len(rule.get("description", "").split()) < 2 or not (is_shown or list(tables_of(schema, rule))):
+                yield f"{table['title']}.{key}"
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_each_key_has_a_meaning_in_words_and_a_value_to_see(name):
+    assert list(unseen(schema_named(name))) == []
+
+
+@pytest.mark.parametrize("model", list(message_models()), ids=lambda model: model.__name__)
+def test_each_key_of_a_message_has_too_and_the_model_takes_its_example(model):
+    others = set(schema_named("station")["$defs"]) | {"Station"} if model is Plan else set()
+    assert [key for key in unseen(message_schema(model)) if key.partition(".")[0] not in others] == []
+    (example,) = examples_of(model.__name__.lower())
+    model.model_validate_json(json.dumps(example))
+    assert example.keys() <= message_schema(model)["properties"].keys()
 
 
 def test_the_first_example_counts_and_tables_are_looked_into():

@@ -44,6 +44,7 @@ def test_each_name_is_a_line():
         f"{FRICTION_LINE}; the detector tells it as a fault of main",
     ]
     assert message.past[0].text.endswith("over since 1970-01-01T02:00")
-    lines = watch_lines([message])
-    for part in ("alpha", "3.3", "friction bias", "no effect explains"):
+    lines = watch_lines([message], {"alpha": "alpha (Pumpwerk Süd)"})
+    assert lines.count("alpha (Pumpwerk Süd)") == 5, "in the table, and beside each name"
+    for part in ("3.3", "friction bias", "no effect explains"):
         assert part in lines
