@@ -38,7 +38,8 @@ def test_the_first_sentence_says_what_where_how_large_and_how_sure(rough_main):
     first = text[text.index("What it says") :]
     assert re.match(
         r"What it says In the rising main of station north there is friction bias \(factor 1\.\d+, 95 % interval "
-        r"1\.\d+ to 1\.\d+\), with a probability of .*?%: at full speed it has flow [\d.]+ m³/h \([\d.]+ %\) "
+        r"1\.\d+ to 1\.\d+; loss exponent [\d.]+, 95 % interval [\d.]+ to 2\), with a probability "
+        r"of .*?%: at full speed it has flow [\d.]+ m³/h \([\d.]+ %\) "
         r"lower and head [\d.]+ m \([\d.]+ %\) higher than its simulator says\. What to do: ",
         first,
     )
