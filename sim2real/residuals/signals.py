@@ -188,7 +188,7 @@ def _one_pump(
     if rated == 0.0:
         return None
     slope = np.gradient(expected)
-    size = _usual_size(np.where(counted, recorded, 0.0), regime, is_ramp)
+    size = _usual_size(np.where(counted, recorded, 0.0), expected, regime, is_ramp)
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
     late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
     material = np.sqrt(
@@ -217,12 +217,18 @@ def _one_pump(
     )
 
 
-def _usual_size(recorded: Floats, regime: Integers, is_ramp: Flags) -> Floats:
-    """(n,) size of a reading, in ramps the usual one at that second of all of them.
+def _usual_size(recorded: Floats, expected: Floats, regime: Integers, is_ramp: Flags) -> Floats:
+    """(n,) size of a reading without its noise, by which the size of the noise is known.
 
-    By the size of the noise is known. With its own size a reading would be as far from zero, in units of it, as any.
+    In ramps it is the usual one at that second of all of them; else what is expected, by the usual ratio of recorded
+    and expected in the regime. With its own size a reading that happens to be high would count less, so that what
+    shifts all readings would explain some of the noise.
     """
     size = np.abs(recorded)
+    for steady in (STEADY, MULTI_PUMP):
+        rows = (regime == steady) & (expected > 0.0) & (size > 0.0)
+        if rows.any():
+            size[rows] = np.median(size[rows] / expected[rows]) * expected[rows]
     keys, group = np.unique((since_changes(regime) * len(REGIMES) + regime)[is_ramp], return_inverse=True)
     size[is_ramp] = (np.bincount(group, size[is_ramp], keys.size) / np.bincount(group, minlength=keys.size))[group]
     return size

@@ -10,7 +10,7 @@ from wetwell.sim2real.recording.regimes import STEADY, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
-from wetwell.sim2real.residuals.bins import HEAD
+from wetwell.sim2real.residuals.bins import FLOW, HEAD
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.scenario import Scenario
@@ -73,6 +73,14 @@ def test_slopes_of_residuals_know_nothing_of_the_noise(fitter, alpha):
     moved_m = fitter.slopes(fit)[steady, 0] * bins.deviation[steady]
     assert moved_m == pytest.approx(moved_m.mean(), rel=1e-6)
     assert moved_m.mean() < -1.0
+
+
+def test_the_size_of_the_noise_knows_nothing_of_the_noise(fitter):
+    """Else what shifts all readings explains that those which happen to be high count less."""
+    bins = fitter.bins
+    steady = (bins.signal == FLOW) & (bins.regime == STEADY) & (bins.pump == 0)
+    usual = np.median(bins.deviation[steady])
+    assert np.mean(np.isclose(bins.deviation[steady], usual, rtol=1e-6)) > 0.5
 
 
 def test_nothing_can_be_reached_without_effects(fitter):
