@@ -118,7 +118,7 @@ def test_friction_that_grew_between_two_weeks_has_a_value_in_each(answers):
     weeks = [rough(station, factor, 5 + k, DEFAULT_START_NS + k * week_ns) for k, factor in enumerate((1.1, 1.3))]
     found = diagnose(weeks, station, only=ONLY)
     (effect,) = found.report().effects
-    assert (effect.name, effect.differs) == ("friction_bias", ("factor",))
+    assert (effect.name, "factor" in effect.differs) == ("friction_bias", True)
     assert effect.parameters["factor@1"].value == pytest.approx(1.1, rel=0.02)
     assert effect.parameters["factor"].value == pytest.approx(1.3, rel=0.02)
     assert found.station.effect[0].model_dump()["factor"] == pytest.approx(1.3, rel=0.02)
