@@ -117,7 +117,7 @@ PAST_DEFECTS = (
     PastDefect(
         "a start has room for few messages only",
         "9521a23",
-        "services/detector/intake.py",
+        "services/detector/follower.py",
         "CAPACITY = 200_000",
         "CAPACITY = 200",
     ),
@@ -125,7 +125,7 @@ PAST_DEFECTS = (
         "samples are judged before what was missed meanwhile",
         "66dd745",
         "services/detector/intake.py",
-        "self._behind = {judge: Waiting(room) for judge in judges if judge.is_restored}",
+        "self._behind = {judge: follower.waiting[judge.station] for judge in judges if judge.is_restored}",
         "self._behind = dict[StationDetector, Waiting]()",
     ),
     PastDefect(
