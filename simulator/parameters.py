@@ -102,15 +102,18 @@ class MainParameters:
 class SensorParameters:
     r"""How a channel measures and transmits.
 
-    The sensor: $y = g\, x_\tau + o$ with x damped by a first-order lag τ, of which `followed` is the share of a step
-    that it follows within a second, then noise $y (1 + \sigma n)$ (the level: $y + \sigma n$) with $n$ white or
-    AR(1), then 0 below a cutoff. The telemetry: a delay, rounding to a quantum, and a value that is held until it has
-    moved by a deadband.
+    The sensor: $y = g\, x_\tau + o$ with x damped by one or two first-order lags in a row, of which `followed` and
+    `followed_again` are the shares of a step that they follow within a second and `carried` what the first still
+    brings to the second of where it was before, then noise $y (1 + \sigma n)$ (the
+    level: $y + \sigma n$) with $n$ white or AR(1), then 0 below a cutoff. The telemetry: a delay, rounding to a
+    quantum, and a value that is held until it has moved by a deadband.
     """
 
     gain: float = 1.0
     offset: float = 0.0
     followed: float = 1.0
+    followed_again: float = 1.0
+    carried: float = 0.0
     noise: float = 0.0
     correlation: float
     cutoff: float = -math.inf
@@ -336,6 +339,32 @@ def _sensor_parameters(sensors: Sensors, pumps: int) -> tuple[SensorParameters, 
     noise[FIRST_PUMP + HEAD :: PUMP_CHANNELS] = sensors.head_noise
     noise[FIRST_PUMP + POWER :: PUMP_CHANNELS] = sensors.power_noise
     return tuple(SensorParameters(noise=share, correlation=sensors.correlation) for share in noise.tolist())
+
+
+def damped_by(sensor: SensorParameters, lag_s: float, second_share: float) -> SensorParameters:
+    r"""The sensor with a lag, of which a second filter in a row takes a share.
+
+    What comes in is held over a second, so that both filters are exact:
+
+    $$x_1 = u + (x_0 - u)\, e^{-1/\tau_1}, \qquad y_1 = u + (y_0 - u)\, e^{-1/\tau_2} + (x_0 - u)\, c, \qquad
+    c = \frac{1}{\tau_2} \int_0^1 e^{-t/\tau_1} e^{-(1 - t)/\tau_2}\, dt$$
+
+    Parameters
+    ----------
+    sensor : SensorParameters
+    lag_s : float
+        τ₁ + τ₂. [s]
+    second_share : float
+        τ₂ over both; at most .5. [1]
+    """
+    first_s, second_s = (1.0 - second_share) * lag_s, second_share * lag_s
+    followed, followed_again = followed_share(first_s), followed_share(second_s)
+    carried = 0.0
+    if second_s > 0.0:
+        faster = 1.0 / second_s - 1.0 / first_s
+        carried = (followed_again - followed) / faster if faster > 1e-6 else 1.0 - followed_again
+        carried /= second_s
+    return replace(sensor, followed=followed, followed_again=followed_again, carried=carried)
 
 
 def followed_share(lag_s: float) -> float:

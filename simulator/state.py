@@ -65,6 +65,7 @@ class ChannelState:
     """Sensor and telemetry of a channel; NaN where nothing has been read or sent yet."""
 
     damped: float = math.nan
+    damped_again: float = math.nan
     last_noise: float = 0.0
     last_reading: float = math.nan
     last_sent: float = math.nan

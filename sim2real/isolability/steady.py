@@ -61,7 +61,10 @@ def steady_values(
     """
     count = len(plant.pumps)
     quiet = tuple(
-        replace(sensor, noise=0.0, delay_s=0.0, quantum=0.0, deadband=0.0, followed=1.0) for sensor in plant.sensors
+        replace(
+            sensor, noise=0.0, delay_s=0.0, quantum=0.0, deadband=0.0, followed=1.0, followed_again=1.0, carried=0.0
+        )
+        for sensor in plant.sensors
     )
     plant = replace(plant, sensors=quiet)
     records = plant.records()

@@ -11,7 +11,7 @@ from wetwell.simulator.kernel import move_plant
 from wetwell.simulator.parameters import PlantRecords
 from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.channels import pump_channel
-from wetwell.simulator.telemetry.sensors import RESTING
+from wetwell.simulator.telemetry.sensors import RESTING, follow, follow_again
 from wetwell.simulator.wet_well import level_at_volume_m, volume_at_level_m3
 
 
@@ -44,8 +44,8 @@ def replay_seconds(
     ----------
     plant, state, forcing
         As in the simulator's kernel.
-    damped : (3, pumps) array
-        State of the damping of flow, head and power; to come as zeros.
+    damped : (2, 3, pumps) array
+        State of both filters of flow, head and power; to come as zeros.
     frequency_hz : (pumps, n) array
     measured_level_m : (n,) array
         NaN is "no value".
@@ -64,7 +64,7 @@ def replay_seconds(
     """
     now, sensor = state.station[0], plant.sensors[LEVEL]
     extra_m3h = 0.0
-    sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
+    filtered_m = sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
     delay_s = sensor.delay_s
     whole = int(delay_s)
     share = delay_s - whole
@@ -78,7 +78,12 @@ def replay_seconds(
         misread_m = state.correction[LEVEL_READING, 0]
         _read(plant, state, damped, second, truth, reading)
 
-        sensed_m += (true_m + misread_m - sensed_m) * sensor.followed
+        before_m = filtered_m
+        filtered_m = follow(before_m, true_m + misread_m, sensor.followed)
+        if sensor.carried > 0.0:
+            sensed_m = follow_again(sensed_m, before_m, true_m + misread_m, sensor)
+        else:
+            sensed_m = filtered_m
         level_m[second] = sensed_m
         expected_m = sensed_m
         if delay_s > 0.0 and second > whole:
@@ -95,13 +100,14 @@ def replay_seconds(
         if followed >= 1.0:
             begun_m = max(measured_level_m[second] - misread_m, plant.profile[0].level_m)
             now.volume_m3 = volume_at_level_m3(begun_m, plant.profile)
-            sensed_m = measured_level_m[second]
+            filtered_m = sensed_m = measured_level_m[second]
         else:
             area_m2 = (
                 volume_at_level_m3(true_m + 0.01, plant.profile) - volume_at_level_m3(true_m, plant.profile)
             ) / 0.01
             corrected_m3 = now.volume_m3 + followed * error_m * area_m2
             now.volume_m3 = max(corrected_m3, 0.0)
+            filtered_m += followed * error_m
             sensed_m += followed * error_m
             extra_m3h += coming * inflow_gain[second] * error_m * area_m2 * 3600.0
 
@@ -119,8 +125,10 @@ def _read(plant: PlantRecords, state: PlantState, damped: Floats, second: int, t
             value = true_value
             is_seen = is_active
             if sensor.followed < 1.0:
-                damped[k, i] += (value - damped[k, i]) * sensor.followed
-                value = damped[k, i]
+                before, came = damped[0, k, i], value
+                value = damped[0, k, i] = follow(before, came, sensor.followed)
+                if sensor.carried > 0.0:
+                    value = damped[1, k, i] = follow_again(damped[1, k, i], before, came, sensor)
                 is_seen = is_active or value > RESTING
             reading[k, i, second] = 0.0
             if is_seen:

@@ -184,7 +184,10 @@ class Replay:
         frequency_delay_s = _delay_s(plant, "frequency_hz")
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         records = replace(plant, control_delay_s=0.0).records()
-        read = tuple((sensor.gain, sensor.offset, sensor.followed, sensor.cutoff) for sensor in plant.sensors)
+        read = tuple(
+            (sensor.gain, sensor.offset, sensor.followed, sensor.followed_again, sensor.carried, sensor.cutoff)
+            for sensor in plant.sensors
+        )
         delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
         station, profile = np.asarray(records.station).tolist(), np.asarray(records.profile).tolist()
         corrections = (plant.corrections, plant.columns)
@@ -214,7 +217,7 @@ class Replay:
             replace(plant, control_delay_s=0.0).records(),
             first_state(plant, max(self._first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
-            np.zeros((len(PUMP_METERS), pumps)),
+            np.zeros((2, len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
             observer.level_m,
             observer.level_gain,

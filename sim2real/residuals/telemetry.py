@@ -28,6 +28,8 @@ EDGE = 1.5
 """Ratio of the sizes that one move in five and one in ten (or ten and twenty) do not reach; 2 for noise."""
 FEW = 0.005
 """Share of moves that may be smaller than the deadband: values that were lost, or sent twice."""
+STORED_MOVES = 2.5
+"""Steps of storage up to which moves tell of that alone, and of nothing that holds the value."""
 OFTEN_S = 60
 """A value that is held for less was not sent because its time was up."""
 SEEN_SHARES = (0.97, 1.03)
@@ -138,18 +140,14 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
         is_ramp = np.isin(regimes.of_pumps, (START_RAMP, STOP_RAMP)) & (quantity in traces.signals)
         if noise[quantity] <= 0.0:
             continue
-        moves = np.concatenate([np.diff(part) for part in parts])
-        moves = np.abs(moves[np.isfinite(moves)])
-        jumps = moves[moves > 0.0]
-        if jumps.size < FEWEST:
+        moves = _moves(parts, is_ramp)
+        if moves.all.size < FEWEST:
             continue
         quantum = _lattice(np.concatenate(parts))
-        if quantity == "level_m" and quantum >= MIN_QUANTUM_M and jumps.size >= MIN_MOVES:
+        if quantity == "level_m" and quantum >= MIN_QUANTUM_M and moves.all.size >= MIN_MOVES:
             found.append(Pattern(quantity=quantity, quantum=quantum))
-            continue
-        held_share = 1.0 - jumps.size / moves.size
-        if held_share > HELD_SHARE and float(np.quantile(jumps, SMALL)) > 2.5 * quantum:
-            pattern = _held(quantity, parts, is_ramp, jumps, held_share)
+        elif moves.held_share > HELD_SHARE:
+            pattern = _held(quantity, moves, STORED_MOVES * quantum)
             found += [pattern] if pattern is not None else []
     return found
 
@@ -161,38 +159,55 @@ def _patterns_of_rows(traces: Traces) -> list[Pattern]:
     return [Pattern(quantity="level_m", quantum=quantum)] if is_rounded else []
 
 
-def _held(
-    quantity: AnalogueQuantity, parts: list[Floats], is_ramp: Flags, jumps: Floats, held_share: float
-) -> Pattern | None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Moves:
+    """Sizes of the moves of a channel, and the share of its values that are held.
+
+    `soon` are those that follow another soon, so were not sent as their time was up, `is_soon_calm` which of these
+    are in no ramp, and `calm` all that are in none.
+    """
+
+    all: Floats
+    soon: Floats
+    is_soon_calm: Flags
+    calm: Floats
+    held_share: float
+
+
+def _moves(parts: list[Floats], is_ramp: Flags) -> _Moves:
+    sizes = [np.abs(np.diff(part)) for part in parts]
+    at_s = [np.flatnonzero(size > 0.0) for size in sizes]
+    soon_s = [at[1:][np.diff(at) < OFTEN_S] for at in at_s]
+    is_calm = [~(ramp[:-1] | ramp[1:]) for ramp in is_ramp]
+    moved = np.concatenate([size[at] for size, at in zip(sizes, at_s, strict=True)])
+    return _Moves(
+        all=moved,
+        soon=np.concatenate([size[at] for size, at in zip(sizes, soon_s, strict=True)]),
+        is_soon_calm=np.concatenate([calm[at] for calm, at in zip(is_calm, soon_s, strict=False)]),
+        calm=np.concatenate([size[at][calm[at]] for size, at, calm in zip(sizes, at_s, is_calm, strict=False)]),
+        held_share=1.0 - moved.size / max(sum(int(np.isfinite(size).sum()) for size in sizes), 1),
+    )
+
+
+def _held(quantity: AnalogueQuantity, moves: _Moves, least: float) -> Pattern | None:
     """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon.
 
     Where such are few, and nearly all values are held, it lies over the largest move outside ramps, which its time
     being up has brought about.
     """
-    soon, is_calm = _soon(parts, is_ramp)
-    calm = np.concatenate([np.abs(np.diff(part))[~ramp[1:]] for part, ramp in zip(parts, is_ramp, strict=False)])
-    calm = calm[calm > 0.0]
-    if held_share > NEARLY_ALL and soon.size < MIN_MOVES and calm.size >= FEWEST:
-        return Pattern(quantity=quantity, deadband=float(calm.max()), within=BY_TIME)
-    if jumps.size < MIN_MOVES or not (_has_edge(jumps) or _has_edge(soon)):
+    soon = moves.soon
+    if moves.held_share > NEARLY_ALL and soon.size < MIN_MOVES and moves.calm.size >= FEWEST:
+        largest = float(moves.calm.max())
+        return Pattern(quantity=quantity, deadband=largest, within=BY_TIME) if largest > least else None
+    unforced = soon if soon.size >= FEWEST else moves.all
+    if moves.all.size < MIN_MOVES or float(np.quantile(unforced, SMALL)) <= least:
+        return None
+    if not (_has_edge(moves.all) or _has_edge(soon)):
         return None
     if soon.size < MIN_MOVES:
-        return Pattern(quantity=quantity, deadband=float(np.quantile(jumps, SMALL)), within=IN_RAMPS)
-    within = SEEN_SHARES if is_calm.sum() >= MIN_MOVES else IN_RAMPS
+        return Pattern(quantity=quantity, deadband=float(np.quantile(moves.all, SMALL)), within=IN_RAMPS)
+    within = SEEN_SHARES if moves.is_soon_calm.sum() >= MIN_MOVES else IN_RAMPS
     return Pattern(quantity=quantity, deadband=float(np.quantile(soon, FEW)), within=within)
-
-
-def _soon(parts: list[Floats], is_ramp: Flags) -> tuple[Floats, Flags]:
-    """Sizes of the moves that follow another soon, so were not sent as their time was up; which are in no ramp."""
-    sizes: list[Floats] = []
-    calm: list[Flags] = []
-    for part, ramp in zip(parts, is_ramp, strict=False):
-        moves = np.diff(part)
-        at_s = np.flatnonzero(np.isfinite(moves) & (moves != 0.0))
-        at_s = at_s[1:][np.diff(at_s) < OFTEN_S]
-        sizes.append(np.abs(moves[at_s]))
-        calm.append(~ramp[at_s])
-    return np.concatenate(sizes), np.concatenate(calm)
 
 
 def _has_edge(jumps: Floats) -> bool:

@@ -32,13 +32,11 @@ def sense(
     out. A stuck sensor repeats its last reading; its noise is drawn all the same, so that nothing else changes.
     """
     if sensor.followed < 1.0:
-        damped = state.damped
-        if math.isnan(damped):
-            damped = true_value
-        damped += (true_value - damped) * sensor.followed
-        state.damped = damped
-        true_value = damped
-        is_active = is_active or damped > RESTING
+        before, value = state.damped, true_value
+        true_value = state.damped = follow(before, value, sensor.followed)
+        if sensor.carried > 0.0:
+            true_value = state.damped_again = follow_again(state.damped_again, before, value, sensor)
+        is_active = is_active or true_value > RESTING
     reading = 0.0
     if is_active:
         noise = rng.standard_normal()
@@ -56,6 +54,22 @@ def sense(
         return state.last_reading
     state.last_reading = reading
     return reading
+
+
+@inlined
+def follow(damped: float, value: float, share: float) -> float:
+    """Output of a first-order lag a second later; it begins at its first input."""
+    if math.isnan(damped):
+        damped = value
+    return damped + (value - damped) * share
+
+
+@inlined
+def follow_again(damped: float, before: float, value: float, sensor: SensorParameters) -> float:
+    """Output of a second lag in a row a second later, of which the first had `before`, and gets a value."""
+    if math.isnan(damped) or math.isnan(before):
+        return value
+    return value + (damped - value) * (1.0 - sensor.followed_again) + (before - value) * sensor.carried
 
 
 @inlined

@@ -1,21 +1,22 @@
 """Damped flow meters."""
 
-from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.parameters import PlantParameters, followed_share
+from wetwell.simulator.parameters import PlantParameters, damped_by
 
 
 class FlowMeterLag(Effect):
-    r"""Every pump's flow meter follows with a first-order lag.
+    r"""Every pump's flow meter follows with a lag of one filter, or of two.
 
-    $$\tau \frac{dy}{dt} = Q - y$$
+    $$(1 - s)\, \tau\, \frac{dx}{dt} = Q - x, \qquad s\, \tau\, \frac{dy}{dt} = x - y$$
 
     Parameters
     ----------
     lag_s : float
-        τ, time in which the reading makes up 63 % of a change; 0 is no effect. [s]
+        τ, the time by which the reading comes late while the true value moves evenly; 0 is no effect. [s]
+    second_share : float
+        s, share of it that a second filter in a row takes: of transmitter and input card; 0 is one filter. [1]
 
     References
     ----------
@@ -27,9 +28,8 @@ class FlowMeterLag(Effect):
 
     name: Literal["flow_meter_lag"] = "flow_meter_lag"
     lag_s: Annotated[float, limits(0.0, 120.0, "s")]
+    second_share: Annotated[float, limits(0.0, 0.5, "1")] = 0.0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Damp the flows."""
-        return parameters.with_sensors(
-            lambda sensor: replace(sensor, followed=followed_share(self.lag_s)), "flow_m3h"
-        )
+        return parameters.with_sensors(lambda sensor: damped_by(sensor, self.lag_s, self.second_share), "flow_m3h")

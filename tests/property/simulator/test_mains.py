@@ -37,7 +37,7 @@ def run(station, frequency_hz):
         plant.records(),
         first_state(plant, LEVEL_M),
         healthy_forcing(np.zeros(seconds), pumps, len(station.mains)),
-        np.zeros((3, pumps)),
+        np.zeros((2, 3, pumps)),
         np.ascontiguousarray(frequency_hz),
         np.full(seconds, np.nan),
         np.zeros(seconds),

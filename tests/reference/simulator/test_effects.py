@@ -362,6 +362,34 @@ def test_flow_meter_lag(quiet_alpha):
     assert rows["pump1_flow_m3h"][stop + 5] > 10
 
 
+@pytest.mark.parametrize("second_share", [0.02, 0.2, 0.5])
+def test_lags_of_two_filters_in_a_row(quiet_alpha, second_share):
+    """Against the two ODEs under the true flow and level."""
+    lag_s = 8.0
+    times_s = (1.0 - second_share) * lag_s, second_share * lag_s
+    effects = [
+        {"name": name, "lag_s": lag_s, "second_share": second_share}
+        for name in ("flow_meter_lag", "level_sensor_lag")
+    ]
+    rows = run(quiet_alpha, *effects, seconds=450)
+    for true, read, tolerance in (
+        ("truth_pump1_flow_m3h", "pump1_flow_m3h", 1e-5),
+        ("truth_level_m", "level_m", 1e-3),
+    ):
+        filtered, expected = [rows[read][0]] * 2, []
+        for value in rows[true]:
+            both = solve_ivp(
+                lambda _t, x, value=value: ((value - x[0]) / times_s[0], (x[0] - x[1]) / times_s[1]),
+                (0, 1),
+                filtered,
+                rtol=1e-9,
+                atol=1e-9,
+            )
+            filtered = both.y[:, -1]
+            expected.append(filtered[1])
+        np.testing.assert_allclose(rows[read], expected, atol=tolerance)
+
+
 def test_flow_low_cutoff(quiet_alpha):
     rows, plain = run(quiet_alpha, {"name": "flow_low_cutoff", "cutoff_m3h": 80.0}), run(quiet_alpha)
     flow_m3h = plain["pump1_flow_m3h"]

@@ -53,6 +53,15 @@ def test_a_deadband_that_only_time_and_ramps_pass_is_at_least_what_time_moved(re
     assert len(found) == 1 or report_s > 240
 
 
+def test_a_deadband_is_seen_though_what_time_sends_is_stored_in_steps_that_large(recorded):
+    station, recording = recorded
+    coarse = {name: np.round(held(recording.columns[name], 3.0, 120) / 0.2) * 0.2 for name in NAMES}
+    (found,) = patterns(station, recording, **coarse)
+    assert found.quantity == "power_kw"
+    assert found.missed(3.0) == 0.0
+    assert found.missed(0.0) > 0.0
+
+
 def test_a_deadband_that_noise_passes_is_known_to_a_few_percent(recorded):
     station, recording = recorded
     (found,) = patterns(station, recording, **{name: held(recording.columns[name], 0.25, 10**6) for name in NAMES})
