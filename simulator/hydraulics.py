@@ -211,6 +211,8 @@ def common_flows(
     low_m3h = 0.0
     high_m3h = _flows_at_head(pumps, curves, speed_ratio, lowest_head_m, own_h2_m5, own_loss_m_m3h, flow_m3h)[0]
     total_m3h = high_m3h / (1.0 + running)
+    if inertia_m_m3h > 0.0 and before_m3h < high_m3h:
+        total_m3h = before_m3h  # it can hardly have moved
     for _ in range(MAX_ITERATIONS):
         head_m = lowest_head_m + (rise_m_m3h + shared_h2_m5 * total_m3h) * total_m3h
         pumped_m3h, steepness = _flows_at_head(

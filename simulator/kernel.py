@@ -200,8 +200,12 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
             mean_m3h[i] = flow_m3h[i]
         return
     inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * INERTIA_STEPS / STAGE
+    is_moving = False
     for i in pumps:
         mean_m3h[i] = 0.0
+        is_moving = is_moving or state.speed_ratio[i] > 0.0 or flow_m3h[i] > 0.0
+    if not is_moving:
+        return
     for _ in range(INERTIA_STEPS):
         for i in pumps:
             before_m3h[i] = flow_m3h[i]
