@@ -37,8 +37,9 @@ def replay_seconds(
 
     $$A \frac{dL}{dt} = Q_{in} + b - \sum_i Q_i + A\,g\,e, \qquad \frac{db}{dt} = A\,g_b\,e, \qquad e = y - \hat y$$
 
-    with y the recorded level and ŷ what the level sensor would read, lag and delay included, at that second or as the
-    mean of `span_s` seconds.
+    with y the recorded level and ŷ what the level sensor would read, lag included, at that second or as the mean of
+    `span_s` seconds. A late level comes here earlier by the whole seconds of its delay; ŷ has the rest of it, by what
+    the plant moves and not by what was corrected: that has the noise of the sensor.
 
     Parameters
     ----------
@@ -58,16 +59,15 @@ def replay_seconds(
     truth : Truth
         Room for one second.
     level_m : (n,) array
-        Out: what the level sensor would read in each second, before it is known what it read.
+        Out: what the level sensor would read in each second, the rest of its delay included, before it is known what
+        it read.
     reading : (3, pumps, n) array
         Out: flow, head and power as the sensors would read them without noise and delay.
     """
     now, sensor = state.station[0], plant.sensors[LEVEL]
     extra_m3h = 0.0
     filtered_m = sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
-    delay_s = sensor.delay_s
-    whole = int(delay_s)
-    share = delay_s - whole
+    share = sensor.delay_s - int(sensor.delay_s)
     for second in range(forcing.inflow_m3h.size):
         for i in range(state.pumps.size):
             state.pumps[i].frequency_hz = frequency_hz[i, second]
@@ -78,28 +78,24 @@ def replay_seconds(
         misread_m = state.correction[LEVEL_READING, 0]
         _read(plant, state, damped, second, truth, reading)
 
-        before_m = filtered_m
+        before_m, begun_m = filtered_m, sensed_m
         filtered_m = follow(before_m, true_m + misread_m, sensor.followed)
         if sensor.carried > 0.0:
             sensed_m = follow_again(sensed_m, before_m, true_m + misread_m, sensor)
         else:
             sensed_m = filtered_m
-        level_m[second] = sensed_m
-        expected_m = sensed_m
-        if delay_s > 0.0 and second > whole:
-            expected_m = (1.0 - share) * level_m[second - whole] + share * level_m[second - whole - 1]
+        expected_m = level_m[second] = sensed_m - share * (sensed_m - begun_m)
         if math.isnan(measured_level_m[second]):
             continue
         if span_s > 1:
-            late = max(second - whole, 0)
             expected_m = 0.0
             for before in range(span_s):
-                expected_m += level_m[max(late - before, 0)] / span_s
+                expected_m += level_m[max(second - before, 0)] / span_s
         error_m = measured_level_m[second] - expected_m
         followed = level_gain[second]
         if followed >= 1.0:
-            begun_m = max(measured_level_m[second] - misread_m, plant.profile[0].level_m)
-            now.volume_m3 = volume_at_level_m3(begun_m, plant.profile)
+            anew_m = max(measured_level_m[second] - misread_m, plant.profile[0].level_m)
+            now.volume_m3 = volume_at_level_m3(anew_m, plant.profile)
             filtered_m = sensed_m = measured_level_m[second]
         else:
             area_m2 = (

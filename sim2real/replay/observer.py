@@ -1,6 +1,6 @@
 """How far each recorded level moves the replay, and how far a right replay may be off before it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,21 @@ class Observer:
     level_gain: Floats
     inflow_gain: Floats
     deviation_m: Floats | None
+
+    def of_late_level(self, late_s: int) -> "Observer":
+        """The same where a level is recorded so much after it was: its values are taken when they were.
+
+        An observer that waited for them would swing: its corrections would come late.
+        """
+        if late_s == 0:
+            return self
+        none = np.zeros(late_s)
+        return replace(
+            self,
+            level_m=np.r_[self.level_m[late_s:], none + np.nan],
+            level_gain=np.r_[self.level_gain[late_s:], none],
+            inflow_gain=np.r_[self.inflow_gain[late_s:], none],
+        )
 
 
 def constant_observer(level_m: Floats) -> Observer:

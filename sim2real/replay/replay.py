@@ -88,9 +88,6 @@ class Replay:
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
         self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
-        known = np.flatnonzero(np.isfinite(traces.level_m))
-        first = traces.level_m[known[:FIRST]]  # a single value may be wrong
-        self._first_level_m = float(np.median(first)) if known.size else station.middle_level_m
         self.observer = self._observer()
 
     def run(self, effects: Sequence[Acting] = ()) -> Prediction:
@@ -175,7 +172,7 @@ class Replay:
             for k, name in enumerate(PUMP_METERS)
             if name in self.traces.signals
         }
-        told_m = later(level_m, plant.sensors[LEVEL].delay_s)
+        told_m = later(level_m, int(plant.sensors[LEVEL].delay_s))
         return Prediction(level_m=trailing_means(told_m, span_s), signals=signals, plant=plant)
 
     def _run(self, acting: Sequence[Effect], plant: PlantParameters) -> _Run:
@@ -211,11 +208,16 @@ class Replay:
         """(n,) level and (3, pumps, n) flow, head and power as the sensors read them, by the kernel."""
         traces, pumps = self.traces, self.traces.pumps
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
+        is_held = observer.level_m is not traces.level_m
+        observer = observer.of_late_level(int(plant.sensors[LEVEL].delay_s))
+        known = np.flatnonzero(np.isfinite(observer.level_m))
+        first = observer.level_m[known[:FIRST]]  # a single value may be wrong
+        first_level_m = float(np.median(first)) if known.size else self.station.middle_level_m
         level_m = np.empty(traces.seconds)
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
         replay_seconds(
             replace(plant, control_delay_s=0.0).records(),
-            first_state(plant, max(self._first_level_m, plant.profile["level_m"][0])),
+            first_state(plant, max(first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
             np.zeros((2, len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
@@ -223,7 +225,7 @@ class Replay:
             observer.level_gain,
             observer.inflow_gain,
             traces.by_hand.is_inlet_shut,
-            1 if observer.level_m is not traces.level_m and traces.span_s > 1 else traces.span_s,
+            1 if is_held and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
             level_m,
             reading,
