@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 Verdict = Literal["effect", "none", "unknown"]
 
@@ -15,8 +15,9 @@ NONE_PRIOR = 0.5
 """Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
-MISSED = 0.15
-"""Probability that the truth is not among what was weighed: too small to be seen, or of another form. [1]"""
+MISJUDGED = 0.28
+"""Probability that the likelihood takes unknown for known, or the other way round: what acts is too small to be seen
+beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""
 
@@ -58,13 +59,14 @@ def posterior_of(
 ) -> tuple[SetProbability, ...]:
     r"""Probabilities of the answers, best first; they sum to 1.
 
-    $$P(S) = (1 - \epsilon) \frac{(1 - u)\,\pi_S\,L_S}{Z}, \qquad
-    P(\text{unknown}) = \epsilon + (1 - \epsilon) \frac{u \sum_S \pi_S\,L_S F_S}{Z}, \qquad
+    $$U = \frac{u \sum_S \pi_S\,L_S F_S}{Z}, \qquad
+    P(\text{unknown}) = (1 - \epsilon)\, U + \epsilon\, (1 - U), \qquad
+    P(S) = (1 - P(\text{unknown})) \frac{\pi_S\,L_S}{\sum_{S'} \pi_{S'}\,L_{S'}}, \qquad
     \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
 
     with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q,
-    n effects in the library, the sum Z of the numerators, and `MISSED` ε. The probability of an answer is the sum
-    over all sets S that tell it.
+    n effects in the library, the sum Z of this numerator and of $(1 - u) \sum_S \pi_S\,L_S$, and `MISJUDGED` ε. The
+    probability of an answer is the sum over all sets S that tell it.
 
     Parameters
     ----------
@@ -80,22 +82,22 @@ def posterior_of(
     >>> far = Weight(effects=("ragging",), acting=("ragging",), log=-90.0, log_flexible=0.0)
     >>> best = posterior_of([Weight(effects=(), acting=(), log=0.0, log_flexible=-9.0), far], 25)[0]
     >>> best.verdict, round(best.probability, 2)
-    ('none', 0.85)
+    ('none', 0.72)
     """
     priors = np.array([_log_prior(weight.acting, library, log_share) for weight in weights])
     sets = priors + np.array([weight.log for weight in weights])
     unknown = priors + np.array([weight.log + weight.log_flexible for weight in weights])
-    logs = np.r_[np.log(1.0 - UNKNOWN_PRIOR) + sets, np.log(UNKNOWN_PRIOR) + logsumexp(unknown)]
-    shares = (1.0 - MISSED) * np.exp(logs - logsumexp(logs))
-    shares[-1] += MISSED
+    odds = np.log(UNKNOWN_PRIOR / (1.0 - UNKNOWN_PRIOR)) + logsumexp(unknown) - logsumexp(sets)
+    is_unknown = MISJUDGED + (1.0 - 2.0 * MISJUDGED) * float(expit(odds))
+    shares = (1.0 - is_unknown) * np.exp(sets - logsumexp(sets))
     answers: dict[tuple[str, ...], float] = {}
-    for weight, share in zip(weights, shares[:-1], strict=True):
+    for weight, share in zip(weights, shares, strict=True):
         answers[weight.effects] = answers.get(weight.effects, 0.0) + float(share)
     found = [
         SetProbability(effects=effects, verdict="effect" if effects else "none", probability=probability)
         for effects, probability in answers.items()
     ]
-    found.append(SetProbability(effects=(), verdict="unknown", probability=float(shares[-1])))
+    found.append(SetProbability(effects=(), verdict="unknown", probability=is_unknown))
     return tuple(sorted(found, key=lambda one: -one.probability))
 
 
@@ -107,10 +109,14 @@ def _log_prior(effects: tuple[str, ...], library: int, log_share: Callable[[tupl
 
 
 def verdict_of(posterior: Sequence[SetProbability]) -> Verdict:
-    """The most probable verdict of what was weighed, all sets of effects together; `MISSED` decides none."""
-    totals: dict[Verdict, float] = {"none": 0.0, "unknown": -MISSED, "effect": 0.0}
+    """The most probable verdict by the likelihood, all sets of effects together; `MISJUDGED` decides none."""
+    totals: dict[Verdict, float] = {"none": 0.0, "unknown": 0.0, "effect": 0.0}
     for one in posterior:
         totals[one.verdict] += one.probability
+    known = totals["none"] + totals["effect"]
+    totals["unknown"] = (totals["unknown"] - MISJUDGED) / (1.0 - 2.0 * MISJUDGED)
+    for verdict in ("none", "effect"):
+        totals[verdict] *= (1.0 - totals["unknown"]) / known
     return max(totals, key=lambda verdict: totals[verdict])
 
 
