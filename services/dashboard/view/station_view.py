@@ -61,7 +61,6 @@ class StationView:
         self.seen_s = 0.0
         self.now_s = 0.0
         self.is_stale = True
-        self.is_held = False
         self.lost = 0
         self._rows: deque[str] = deque(maxlen=rows)
         self._late = 0
@@ -176,8 +175,6 @@ class StationView:
 
     def handle_status(self, status: Status) -> None:
         """Take the health figures of a service; those of a simulator say whether its plant is held."""
-        if status.service == "simulator":
-            self.is_held = status.figures.get("held", 0.0) > 0.0
         self._statuses[status.service] = status.encode().decode()
         if status.service == SIMULATOR:
             self._is_held = status.figures.get("held", 0.0) > 0.0
@@ -201,10 +198,9 @@ class StationView:
 
     def settle(self, now_s: float, stale_s: float) -> bool:
         """Notice that samples have stopped or come again; whether either has happened."""
-        if self.is_held:
+        if self._is_held and SIMULATOR in self._alive:
             self.seen_s = now_s  # nothing is missed of a plant that stands
-        is_held = self._is_held and SIMULATOR in self._alive  # the time of the plant stands, and its samples with it
-        is_stale = self.sample is None or (now_s - self.seen_s > stale_s and not is_held)
+        is_stale = self.sample is None or now_s - self.seen_s > stale_s
         if is_stale == self.is_stale:
             return False
         self.is_stale = is_stale

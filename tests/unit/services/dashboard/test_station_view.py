@@ -82,10 +82,21 @@ def test_names_that_somebody_makes_up_have_a_bound(view, monkeypatch):
 
 def test_a_plant_that_is_held_has_not_lost_its_samples(view):
     status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=True))
     view.handle_sample(sample(1).encode())
     view.handle_status(Status(**status, figures={"held": 1.0}).encode())
     assert frame_of(view, 100.0)["stale"] is False
     view.handle_status(Status(**status, figures={"held": 0.0}).encode())
+    assert frame_of(view, 120.0)["stale"] is True
+
+
+def test_a_plant_that_was_held_and_has_died_has_lost_its_samples(view):
+    status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=True))
+    view.handle_sample(sample(1).encode())
+    view.handle_status(Status(**status, figures={"held": 1.0}).encode())
+    assert frame_of(view, 100.0)["stale"] is False
+    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=False))
     assert frame_of(view, 120.0)["stale"] is True
 
 
