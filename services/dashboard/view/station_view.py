@@ -10,9 +10,9 @@ from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.dashboard.view.cause import worst_cause
+from wetwell.services.dashboard.view.cause import states_of, worst_cause
 from wetwell.services.dashboard.view.sample_row import NS_PER_MS, live_figures, number, sample_row, thinned
 
 ROWS_A_FRAME = 8
@@ -264,11 +264,12 @@ class StationView:
     def summary(self) -> dict[str, Any]:
         """What the overview shows of the station beside its live figures."""
         pumps = len(self.sample.pumps) if self.sample is not None else max(self._last_verdicts, default=0)
+        states = self._states
         active = [alarm for alarm in self._alarms.values() if alarm.state != "normal"]
         return {
             "name": self.name,
             "state": self.worst_state,
-            "pumps": [self._states.get(pump, "unknown") for pump in range(1, pumps + 1)],
+            "pumps": [states.get(pump, "unknown") for pump in range(1, pumps + 1)],
             "cause": worst_cause(self._last_verdicts.values()),
             "stale": self.is_stale,
             "quality": None if self.sample is None else self.sample.quality,
@@ -281,8 +282,8 @@ class StationView:
         }
 
     @property
-    def _states(self) -> dict[int, str]:
-        return {pump: verdict.state for pump, verdict in self._last_verdicts.items()}
+    def _states(self) -> Mapping[int, State]:
+        return states_of(self._last_verdicts.values())
 
     @property
     def last_verdicts(self) -> Mapping[int, Verdict]:
