@@ -39,7 +39,9 @@ FAULTS = {
     ),
     900: ("pump:1", "watch", 5.0, Severity(quantity="speed_loss_percent", value=0.7, interval=(0.5, 0.9), limit=3.0)),
 }
-BAD, UNHEARD, CALLS, WATCHED = 123, 124, 200, 300
+BAD, UNHEARD, CALLS, WATCHED, FLUSHED = 123, 124, 200, 300, 700
+FAULTS[FLUSHED] = FAULTS[7]
+"""Of this one pump 1 stands since its main was flushed, which pump 2 tells."""
 FIRST = ["s-0042", "s-0007", "s-0123", "s-0124", "s-0500", "s-0200", "s-0900", "s-0000"]
 """Act, the dearer first; nobody sees it; plan; an alarm waits; watch; all is well."""
 IN_ORDER = """nodes => nodes.sort((a, b) => a.ariaRowIndex - b.ariaRowIndex)
@@ -122,6 +124,9 @@ def fed(tmp_path_factory):
         until(all_are_known)
         for number in range(STATIONS):
             bus.publisher(verdict_key(f"s-{number:04}", 1)).put(verdict(number).encode())
+        told = {"time": SPRING_NS + NS_PER_S, "pump": 2, "state": "normal", "faults": ()}
+        flushed = verdict(FLUSHED).model_copy(update=told)
+        bus.publisher(verdict_key(flushed.station, 2)).put(flushed.encode())
         alarm = Alarm(
             id="level_high", time=SPRING_NS, station=f"s-{CALLS:04}", priority="high", state="unacknowledged",
             is_active=True, text="x", raised=SPRING_NS,
@@ -181,6 +186,15 @@ def test_what_a_source_calls_bad_and_what_was_never_seen_is_not_in_ink(fed, open
     expect(unheard.locator(".gauge .value")).to_have_attribute("data-quality", "never")
     expect(unheard).to_contain_text("no data")
     expect(unheard).not_to_contain_text("normal")
+
+
+def test_a_main_that_was_flushed_is_told_by_the_newest_verdict_whatever_pump_ran_before(fed, open_page) -> None:
+    page = open_page(f"{fed.url}/station/s-{FLUSHED:04}?pump=1")
+    expect(page.locator(".sentence")).to_have_text("Pump 1 and its main are as they were learnt.")
+    expect(page.locator("#station-state")).to_have_text("normal")
+    expect(page.locator(".pump .condition")).to_have_text(["normal", "normal"])
+    expect(page.locator(".well .main.fault")).to_have_count(0)
+    expect(page.locator(".cause")).to_have_count(0)
 
 
 def test_one_cursor_goes_through_all_trends(fed, open_page) -> None:

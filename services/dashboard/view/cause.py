@@ -1,13 +1,14 @@
 """What is at fault, how far it has gone and what waiting costs: one line of the overview for each station."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from wetwell.detector.verdict.stage import STAGES
-from wetwell.protocols.messages.verdict import AssetFault, Severity, Verdict
+from wetwell.protocols.messages.verdict import AssetFault, Severity, State, Verdict
 
 FAULTS = ("sensor_fault", "system_fault", "pump_fault", "pump_and_system_fault")
 """States that name a fault, the gravest last."""
+_WITHOUT_MAIN: dict[State, State] = {"system_fault": "normal", "pump_and_system_fault": "pump_fault"}
 _STATE_OF = {"pump": "pump_fault", "main": "system_fault", "sensor": "sensor_fault"}
 
 Cause = dict[str, Any]
@@ -27,7 +28,46 @@ def worst_cause(verdicts: Iterable[Verdict]) -> Cause | None:
     >>> cause["asset"], cause["stage"], cause["waiting_cost"]
     ('pump:2', None, 30.0)
     """
-    return max((cause for verdict in verdicts for cause in causes_of(verdict)), key=_weight, default=None)
+    verdicts = sorted(verdicts, key=lambda verdict: verdict.time)
+    newest = {cause["asset"]: cause for causes in standing_causes(verdicts).values() for cause in causes}
+    return max(newest.values(), key=_weight, default=None)
+
+
+def standing_causes(verdicts: Iterable[Verdict]) -> dict[int, list[Cause]]:
+    """What is at fault by the last verdict on each pump, but for what the newest one on that asset does not tell.
+
+    Examples
+    --------
+    >>> rest = {"station": "alpha", "probability": {}, "evidence": {}, "window": (0, 0)}
+    >>> clogged = Verdict(time=1, pump=1, state="system_fault", **rest)
+    >>> flushed = Verdict(time=2, pump=2, state="normal", **rest)
+    >>> [cause["asset"] for cause in standing_causes([clogged])[1]], standing_causes([clogged, flushed])
+    (['main'], {1: [], 2: []})
+    """
+    told = sorted((one for one in verdicts if one.standing() is not None), key=lambda verdict: verdict.time)
+    causes = {verdict.pump: causes_of(verdict) for verdict in told}
+
+    def stands(asset: str) -> bool:
+        newest = [verdict.pump for verdict in told if verdict.speaks_of(asset)][-1:]
+        return not newest or any(cause["asset"] == asset for cause in causes[newest[0]])
+
+    return {pump: [cause for cause in own if stands(cause["asset"])] for pump, own in causes.items()}
+
+
+def states_of(verdicts: Iterable[Verdict]) -> Mapping[int, State]:
+    """State of each pump, without a fault of its main that stands no more."""
+    verdicts = list(verdicts)
+    standing = standing_causes(verdicts)
+
+    def has(verdict: Verdict, causes: Iterable[Cause]) -> bool:
+        return any(cause["asset"] == verdict.main for cause in causes)
+
+    return {
+        verdict.pump: _WITHOUT_MAIN.get(verdict.state, verdict.state)
+        if has(verdict, causes_of(verdict)) and not has(verdict, standing.get(verdict.pump, ()))
+        else verdict.state
+        for verdict in verdicts
+    }
 
 
 def causes_of(verdict: Verdict) -> list[Cause]:

@@ -7,7 +7,7 @@ from prometheus_client.registry import Collector
 
 from wetwell.detector.verdict.stage import STAGES
 from wetwell.protocols.quantities import PUMP_ANALOGUES
-from wetwell.services.dashboard.view.cause import Cause, causes_of
+from wetwell.services.dashboard.view.cause import Cause, standing_causes, states_of
 from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.dashboard.view.station_view import RANKS, StationView
 
@@ -74,12 +74,14 @@ def _judged(stations: list[StationView]) -> Iterable[Metric]:
     limit = GaugeMetricFamily("wetwell_severity_limit", "Action limit of the quantity.", labels=_OF_ASSET)
     trend = GaugeMetricFamily("wetwell_severity_trend_per_day", "Growth of the severity in a day.", labels=_OF_ASSET)
     for station in stations:
-        for pump, verdict in list(station.last_verdicts.items()):  # the loop adds to it meanwhile
+        verdicts = list(station.last_verdicts.values())  # the loop adds to it meanwhile
+        standing, now = standing_causes(verdicts), states_of(verdicts)
+        for pump in now:
             name = (station.name, str(pump))
             for state in RANKS:
                 if state != "no_data":
-                    states.add_metric((*name, state), float(state == verdict.state))
-            causes = causes_of(verdict)
+                    states.add_metric((*name, state), float(state == now[pump]))
+            causes = standing.get(pump, [])
             stage.add_metric(name, max(map(_stage_number, causes), default=0.0))
             for cause in causes:
                 _add_severity(name, cause, severity, limit, trend)

@@ -10,9 +10,9 @@ from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.dashboard.view.cause import worst_cause
+from wetwell.services.dashboard.view.cause import states_of, worst_cause
 from wetwell.services.dashboard.view.sample_row import NS_PER_MS, live_figures, number, sample_row, thinned
 
 ROWS_A_FRAME = 8
@@ -61,7 +61,6 @@ class StationView:
         self.seen_s = 0.0
         self.now_s = 0.0
         self.is_stale = True
-        self.is_held = False
         self.lost = 0
         self._rows: deque[str] = deque(maxlen=rows)
         self._late = 0
@@ -176,8 +175,6 @@ class StationView:
 
     def handle_status(self, status: Status) -> None:
         """Take the health figures of a service; those of a simulator say whether its plant is held."""
-        if status.service == "simulator":
-            self.is_held = status.figures.get("held", 0.0) > 0.0
         self._statuses[status.service] = status.encode().decode()
         if status.service == SIMULATOR:
             self._is_held = status.figures.get("held", 0.0) > 0.0
@@ -201,10 +198,9 @@ class StationView:
 
     def settle(self, now_s: float, stale_s: float) -> bool:
         """Notice that samples have stopped or come again; whether either has happened."""
-        if self.is_held:
+        if self._is_held and SIMULATOR in self._alive:
             self.seen_s = now_s  # nothing is missed of a plant that stands
-        is_held = self._is_held and SIMULATOR in self._alive  # the time of the plant stands, and its samples with it
-        is_stale = self.sample is None or (now_s - self.seen_s > stale_s and not is_held)
+        is_stale = self.sample is None or now_s - self.seen_s > stale_s
         if is_stale == self.is_stale:
             return False
         self.is_stale = is_stale
@@ -268,11 +264,12 @@ class StationView:
     def summary(self) -> dict[str, Any]:
         """What the overview shows of the station beside its live figures."""
         pumps = len(self.sample.pumps) if self.sample is not None else max(self._last_verdicts, default=0)
+        states = self._states
         active = [alarm for alarm in self._alarms.values() if alarm.state != "normal"]
         return {
             "name": self.name,
             "state": self.worst_state,
-            "pumps": [self._states.get(pump, "unknown") for pump in range(1, pumps + 1)],
+            "pumps": [states.get(pump, "unknown") for pump in range(1, pumps + 1)],
             "cause": worst_cause(self._last_verdicts.values()),
             "stale": self.is_stale,
             "quality": None if self.sample is None else self.sample.quality,
@@ -285,8 +282,8 @@ class StationView:
         }
 
     @property
-    def _states(self) -> dict[int, str]:
-        return {pump: verdict.state for pump, verdict in self._last_verdicts.items()}
+    def _states(self) -> Mapping[int, State]:
+        return states_of(self._last_verdicts.values())
 
     @property
     def last_verdicts(self) -> Mapping[int, Verdict]:

@@ -29,6 +29,12 @@ CREATE TABLE IF NOT EXISTS wetwell.minute (
     station int NOT NULL, time_ns bigint NOT NULL, count float8[] NOT NULL, mean float8[] NOT NULL,
     low float8[] NOT NULL, high float8[] NOT NULL, PRIMARY KEY (station, time_ns)
 );
+DO $$ BEGIN
+    IF to_regclass('wetwell.ten') IS NULL THEN
+        CREATE TABLE wetwell.ten (LIKE wetwell.minute INCLUDING ALL);
+        UPDATE wetwell.station SET summed_until_ns = DEFAULT; -- days of an earlier version get their ten minutes, too
+    END IF;
+END $$;
 CREATE TABLE IF NOT EXISTS wetwell.event (
     id bigserial PRIMARY KEY, kind text NOT NULL, station int NOT NULL, time_ns bigint NOT NULL,
     digest bytea NOT NULL, payload text NOT NULL, UNIQUE (kind, station, time_ns, digest)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, LiteralString
 
 import numpy as np
 import psycopg
@@ -23,7 +23,7 @@ from wetwell.services.historian.store.interface import (
 )
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.store.postgres_connection import PostgresConnection
-from wetwell.services.historian.summary import MINUTE_NS, Summary, fuller, joined
+from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
 from wetwell.services.runtime.postgres import Fence
 
 
@@ -172,23 +172,30 @@ class PostgresStore:
         return samples <= points and not minutes
 
     def summary(self, station: str, start_ns: int, end_ns: int, span_ns: int) -> Summary:
-        """Summary over equal spans from `start_ns` on, of samples and of minutes that they have become."""
-        days_ns = self.days_ns(station, start_ns, end_ns)
-        parts = []
+        """Summary over equal spans from `start_ns` on, of ten minutes, samples, and minutes that they have become."""
+        parts, tens_ns, first_ns = [], np.empty(0, dtype=np.int64), start_ns
+        if start_ns % TEN_NS == end_ns % TEN_NS == span_ns % TEN_NS == 0:
+            summed_ns = self._summed_until_ns(station)
+            tens = self._kept("ten", station, start_ns, min(end_ns, summed_ns))
+            parts.append(tens.over(start_ns, span_ns))
+            tens_ns, first_ns = np.unique(tens.time_ns // DAY_NS * DAY_NS), max(start_ns, summed_ns)
+        days_ns = self.days_ns(station, first_ns, end_ns)
         for day_ns in days_ns:
             day = Summary.of(self.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS)))
-            minutes = self._minutes(station, day_ns, day_ns + DAY_NS)
+            minutes = self._kept("minute", station, day_ns, day_ns + DAY_NS)
             if len(minutes):  # late samples, or a day that has become minutes just now
                 day = fuller(minutes, day.over(day_ns, MINUTE_NS)).between(start_ns, end_ns)
             parts.append(day.over(start_ns, span_ns))
-        minutes = self._minutes(station, start_ns, end_ns)
-        parts.append(minutes.select(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, days_ns)).over(start_ns, span_ns))
+        minutes = self._kept("minute", station, start_ns, end_ns)
+        known_ns = [*days_ns, *tens_ns]
+        parts.append(minutes.select(~np.isin(minutes.time_ns // DAY_NS * DAY_NS, known_ns)).over(start_ns, span_ns))
         return joined(parts).over(start_ns, span_ns)
 
-    def _minutes(self, station: str, start_ns: int, end_ns: int) -> Summary:
+    def _kept(self, table: LiteralString, station: str, start_ns: int, end_ns: int) -> Summary:
+        """Rows of `minute` or of `ten`."""
         rows = self._connection.read(
-            "SELECT time_ns, array_send(count), array_send(mean), array_send(low), array_send(high) "
-            "FROM wetwell.minute WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
+            "SELECT time_ns, array_send(count), array_send(mean), array_send(low), array_send(high) "  # noqa: S608
+            f"FROM wetwell.{table} WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
             "AND time_ns >= %s AND time_ns < %s ORDER BY time_ns",
             (station, start_ns, end_ns),
         )
@@ -227,28 +234,35 @@ class PostgresStore:
 
     def _sum_up(self, station: str, newest_ns: int) -> str | None:
         """Work out the hours of the oldest complete day that has none yet, or has had late samples since."""
-        ((summed_ns,),) = self._connection.read(
-            "SELECT summed_until_ns FROM wetwell.station WHERE name = %s", (station,)
-        )
+        summed_ns = self._summed_until_ns(station)
         end_ns = newest_ns - self._keep_live_days * DAY_NS
         day_ns = next(iter(self.days_ns(station, summed_ns, end_ns)), None) if summed_ns < end_ns else None
         if day_ns is None:
             return None
-        has_minutes = len(self._minutes(station, day_ns, day_ns + DAY_NS)) > 0
+        minutes = self._kept("minute", station, day_ns, day_ns + DAY_NS)
         around = self.samples(station, day_ns - HOUR_NS, day_ns + DAY_NS + HOUR_NS)
         hours = Hours.of_samples(around, day_ns, day_ns + DAY_NS)
+        day = Summary.of(around.between(day_ns, day_ns + DAY_NS))
+        if len(minutes):  # these are a few late samples
+            day = fuller(minutes, day.over(day_ns, MINUTE_NS))
         with self._connection.transaction() as database:
-            for hour_ns, data in [] if has_minutes else hours.rows():  # else these are a few late samples
+            for hour_ns, data in [] if len(minutes) else hours.rows():
                 database.execute(
                     "INSERT INTO wetwell.hour SELECT id, %b, %b::float8[] FROM wetwell.station WHERE name = %b "
                     "ON CONFLICT (station, hour_ns) DO UPDATE SET values = excluded.values",
                     (hour_ns, Hours.of_rows([(hour_ns, data)]).values[0].tolist(), station),
                 )
+            _replace(database, "ten", station, day_ns, day.over(day_ns, TEN_NS))
             database.execute(
                 "UPDATE wetwell.station SET summed_until_ns = %s WHERE name = %s AND summed_until_ns = %s",
                 (day_ns + DAY_NS, station, summed_ns),
             )
         return f"station '{station}': {len(hours)} hours summed up"
+
+    def _summed_until_ns(self, station: str) -> int:
+        """Until when each day has its hours and ten minutes; a late sample takes it back to its day."""
+        rows = self._connection.read("SELECT summed_until_ns FROM wetwell.station WHERE name = %s", (station,))
+        return rows[0][0] if rows else -(2**63)
 
     def _downsample(self, station: str, newest_ns: int) -> str | None:
         """Turn the samples of the oldest day into minutes, if it is old enough."""
@@ -260,18 +274,10 @@ class PostgresStore:
         day_ns = days_ns[0]
         samples = self.samples(station, day_ns, day_ns + DAY_NS)
         minutes = Summary.of(samples).over(day_ns, MINUTE_NS)
-        minutes = fuller(self._minutes(station, day_ns, day_ns + DAY_NS), minutes)
+        minutes = fuller(self._kept("minute", station, day_ns, day_ns + DAY_NS), minutes)
         keys = list(zip(samples.time_ns.tolist(), samples.seq.tolist(), strict=True))
         with self._connection.transaction() as database:
-            ((number,),) = database.execute("SELECT id FROM wetwell.station WHERE name = %s", (station,)).fetchall()
-            database.execute(
-                "DELETE FROM wetwell.minute WHERE station = %s AND time_ns >= %s AND time_ns < %s",
-                (number, day_ns, day_ns + DAY_NS),
-            )
-            database.cursor().executemany(
-                "INSERT INTO wetwell.minute VALUES (%s, %s, %s, %s, %s, %s)",
-                [(number, *row) for row in minutes.lists()],
-            )
+            number = _replace(database, "minute", station, day_ns, minutes)
             database.execute(
                 "DELETE FROM wetwell.sample WHERE station = %s AND (time_ns, seq) IN "
                 "(SELECT * FROM unnest(%s::bigint[], %s::bigint[]))",
@@ -285,7 +291,7 @@ class PostgresStore:
             return None
         deleted = 0
         with self._connection.transaction() as database:
-            for table in ("sample", "minute", "event"):
+            for table in ("sample", "minute", "ten", "event"):
                 deleted += database.execute(
                     psycopg.sql.SQL(
                         "DELETE FROM {} WHERE station = (SELECT id FROM wetwell.station WHERE name = %s) "
@@ -297,6 +303,22 @@ class PostgresStore:
                     (station, newest_ns - self._keep_days * DAY_NS),
                 ).rowcount
         return f"station '{station}': {deleted} old rows deleted" if deleted else None
+
+
+def _replace(
+    database: psycopg.Connection[Any], table: LiteralString, station: str, day_ns: int, rows: Summary
+) -> int:
+    """Put the rows of a day into `minute` or `ten` in place of those that are there; the number of the station."""
+    ((number,),) = database.execute("SELECT id FROM wetwell.station WHERE name = %s", (station,)).fetchall()
+    database.execute(
+        f"DELETE FROM wetwell.{table} WHERE station = %s AND time_ns >= %s AND time_ns < %s",  # noqa: S608 - ours
+        (number, day_ns, day_ns + DAY_NS),
+    )
+    database.cursor().executemany(
+        f"INSERT INTO wetwell.{table} VALUES (%s, %s, %s, %s, %s, %s)",  # noqa: S608 - ours
+        [(number, *row) for row in rows.lists()],
+    )
+    return int(number)
 
 
 def _copy(database: psycopg.Connection[Any], batch: Batch, ids: dict[str, int]) -> int:

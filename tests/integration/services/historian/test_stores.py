@@ -216,6 +216,25 @@ def test_late_samples_do_not_hide_the_minutes_of_their_day(name: str, make_store
         maintain(historian)
 
 
+def test_ten_minutes_answer_for_long_spans_also_of_an_earlier_version(make_store, postgres) -> None:
+    store = make_store("postgres")
+    historian = filled(store, days=6)
+    maintain(historian)
+    mean = ask(historian, kind="samples", points=40)
+    with psycopg.connect(postgres.url, autocommit=True) as database:
+        (kept,) = database.execute("SELECT count(*) FROM wetwell.ten").fetchone() or ()
+        assert kept == 4 * 72, "days before the live one and its last; samples come each 20 minutes"
+        store.close()
+        database.execute("DROP TABLE wetwell.ten")
+        later = PostgresStore(postgres.url)
+        again = Historian(later)
+        assert close(ask(again, kind="samples", points=40), mean), "from the samples"
+        maintain(again)
+        database.execute("DELETE FROM wetwell.sample WHERE time_ns < %s", (DAY + 4 * DAY_NS,))
+        assert close(ask(again, kind="samples", points=40), mean)
+    later.close()
+
+
 def test_an_address_that_is_none_and_a_second_historian_are_refused(
     make_store: Callable[..., Store], postgres
 ) -> None:

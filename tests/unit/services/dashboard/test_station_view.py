@@ -82,10 +82,42 @@ def test_names_that_somebody_makes_up_have_a_bound(view, monkeypatch):
 
 def test_a_plant_that_is_held_has_not_lost_its_samples(view):
     status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=True))
     view.handle_sample(sample(1).encode())
     view.handle_status(Status(**status, figures={"held": 1.0}).encode())
     assert frame_of(view, 100.0)["stale"] is False
     view.handle_status(Status(**status, figures={"held": 0.0}).encode())
+    assert frame_of(view, 120.0)["stale"] is True
+
+
+def test_a_fault_of_the_main_ends_with_the_newest_verdict_on_it(view):
+    """Not with the last one on a pump that does not run any more."""
+    station = view.station_state
+
+    def overview():
+        return json.loads(view.site_state())["stations"]["0"]
+
+    view.handle_sample(sample(1).encode())
+    view.handle_verdict(verdict(1, "system_fault", pump=1).encode())
+    view.handle_verdict(verdict(2, "system_fault", pump=2).encode())
+    frame_of(view, 1.0)
+    assert (overview()["pumps"], overview()["cause"]["since_ms"]) == (["system_fault"] * 2, 2000)
+    view.handle_verdict(verdict(3, "unknown", pump=2).encode())
+    frame_of(view, 2.0)
+    assert (overview()["pumps"], overview()["cause"]["asset"]) == (["system_fault", "unknown"], "main")
+    view.handle_verdict(verdict(4, "normal", pump=2).encode())
+    frame_of(view, 3.0)
+    assert (overview()["state"], overview()["pumps"], overview()["cause"]) == ("normal", ["normal"] * 2, None)
+    assert json.loads(station("alpha"))["state"] == "normal"
+
+
+def test_a_plant_that_was_held_and_has_died_has_lost_its_samples(view):
+    status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=True))
+    view.handle_sample(sample(1).encode())
+    view.handle_status(Status(**status, figures={"held": 1.0}).encode())
+    assert frame_of(view, 100.0)["stale"] is False
+    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=False))
     assert frame_of(view, 120.0)["stale"] is True
 
 

@@ -36,9 +36,20 @@ export function faultsOf(verdict) {
   if (verdict?.faults?.length) return verdict.faults.map((fault) => ({ ...fault, state: STATE_OF[fault.asset.split(":")[0]] ?? "unknown" }));
   if (!verdict || !isFault(verdict.state)) return [];
   const fault = { state: verdict.state, stage: verdict.stage ?? null, since: verdict.onset ?? verdict.time, severity: verdict.severity ?? null, trend: verdict.trend ?? null };
-  const main = verdict.evidence?.main ? `main:${verdict.evidence.main}` : "main";
+  const main = mainAsset(verdict);
   if (verdict.state === "pump_and_system_fault") return [{ ...fault, asset: `pump:${verdict.pump}`, state: "pump_fault" }, { ...fault, asset: main, state: "system_fault" }];
   return [{ ...fault, asset: verdict.asset ?? { system_fault: main, sensor_fault: `sensor:pump${verdict.pump}` }[verdict.state] ?? `pump:${verdict.pump}` }];
+}
+
+const mainAsset = (verdict) => (verdict.evidence?.main ? `main:${verdict.evidence.main}` : "main");
+
+/** Whether a verdict says whether a fault of an asset stands: of its pump, its main, its meters and those of the wet well. */
+export function speaksOf(verdict, asset) {
+  if (!verdict || (!verdict.faults && verdict.state === "unknown")) return false;
+  if (asset.startsWith("pump:")) return asset === `pump:${verdict.pump}`;
+  if (asset.startsWith("main")) return asset === mainAsset(verdict);
+  const pump = asset.match(/^sensor:pump(\d+)/)?.[1];
+  return pump === undefined || Number(pump) === verdict.pump;
 }
 
 export const isOfMain = (fault) => fault.asset.startsWith("main");

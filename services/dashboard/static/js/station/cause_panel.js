@@ -4,7 +4,7 @@ import { absence } from "../base/absent.js";
 import { html, panel, say } from "../base/dom.js";
 import { day, figure, millis, moment } from "../base/format.js";
 import { grade } from "../base/quality.js";
-import { STAGES, assetWords, faultsOf, icon, kindOf, stageOf, state } from "../base/states.js";
+import { STAGES, assetWords, icon, kindOf, stageOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 import { moneyOf } from "./money.js";
 import { residualCharts } from "./residual_charts.js";
@@ -70,19 +70,19 @@ export function causePanel(view) {
 
   function look(fault, pump) {
     asset = fault.asset;
-    choose(faultsOf(station.verdict(chosen())).some((each) => each.asset === asset) ? chosen() : pump);
+    choose(station.faults(chosen()).some((each) => each.asset === asset) ? chosen() : pump);
   }
 
   /** The fault that is told of: the one that was chosen, else the worst of the pump. */
   function shownFault(verdict) {
-    const faults = faultsOf(verdict);
+    const faults = verdict ? station.faults(verdict.pump) : [];
     return faults.find((each) => each.asset === asset) ?? faults[0];
   }
 
   function sentence(verdict, fault) {
     if (!fault) {
       const reason = verdict.evidence?.reason ? ` (${verdict.evidence.reason})` : "";
-      return { normal: t("Pump {name} and its main are as they were learnt.", { name: station.called(verdict.pump) }), learning: t("The healthy station is being learnt.") }[verdict.state] ?? `${t("Not enough is known to judge")}${reason}.`;
+      return { normal: t("Pump {name} and its main are as they were learnt.", { name: station.called(verdict.pump) }), learning: t("The healthy station is being learnt.") }[station.pumpState(verdict.pump)] ?? `${t("Not enough is known to judge")}${reason}.`;
     }
     const words_ = assetWords(fault.asset, (number) => station.called(number));
     const parts = [t("{asset} is at fault since {time}", { asset: words_.charAt(0).toUpperCase() + words_.slice(1), time: moment(millis(fault.since)) })];

@@ -1,7 +1,8 @@
 // What the page knows of one station: takes frames, keeps the last samples, verdicts and alarms.
 
+import { millis } from "../base/format.js";
 import { Currency } from "../base/quality.js";
-import { faultsOf, isOfMain, kindOf, stageOf, state } from "../base/states.js";
+import { faultsOf, isOfMain, kindOf, speaksOf, stageOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 
 const MOST_ROWS = 1500;
@@ -169,18 +170,35 @@ export class StationState {
     return this.then ? this.then.get(number)?.at(-1) : this.verdicts.get(number)?.at(-1);
   }
 
+  /** State of a pump, without a fault of its main that stands no more. */
   pumpState(number) {
-    return this.verdict(number)?.state ?? "unknown";
+    const told = this.verdict(number)?.state ?? "unknown";
+    const isOver = faultsOf(this.verdict(number)).some(isOfMain) && !this.faults(number).some(isOfMain);
+    return (isOver && { system_fault: "normal", pump_and_system_fault: "pump_fault" }[told]) || told;
+  }
+
+  /** Faults that the verdict on a pump tells, but for those of which the newest verdict on that asset, of whatever pump, says nothing. */
+  faults(number) {
+    return faultsOf(this.verdict(number)).filter(({ asset }) => {
+      const newest = this.judged.findLast((verdict) => speaksOf(verdict, asset));
+      return !newest || faultsOf(newest).some((fault) => fault.asset === asset);
+    });
+  }
+
+  /** What is said of each pump, the newest last. */
+  get judged() {
+    return this.numbers.map((number) => this.verdict(number)).filter(Boolean).sort((a, b) => millis(a.time) - millis(b.time));
   }
 
   /** How a pump is drawn: a fault of its main is no fault of the pump. */
   pumpLook(number) {
     const verdict = this.verdict(number);
-    const faults = faultsOf(verdict);
+    const faults = this.faults(number);
     const own = faults.find((fault) => !isOfMain(fault));
     if (own) return { kind: kindOf(own), word: state(own.state).word, isFault: true, state: own.state };
     if (faults.length) return { kind: "calm", word: t("see main"), isFault: false, state: "normal" };
-    return { kind: verdict ? kindOf(verdict) : "doubt", word: state(this.pumpState(number)).word, isFault: false, state: this.pumpState(number) };
+    const now = this.pumpState(number);
+    return { kind: verdict ? (now === verdict.state ? kindOf(verdict) : state(now).kind) : "doubt", word: state(now).word, isFault: false, state: now };
   }
 
   /** The fault of a main (by its place), the worst that its pumps tell; undefined if none does. */
@@ -188,16 +206,11 @@ export class StationState {
     return this.causes.find(({ fault, pump }) => isOfMain(fault) && this.mainOf(pump) === place)?.fault;
   }
 
-  /** What is at fault, each asset once however many pumps feel it, the gravest first: {fault, pump, verdict}. */
+  /** What is at fault, each asset once as the newest verdict tells it, the gravest first: {fault, pump, verdict}. */
   get causes() {
     const found = new Map();
-    for (const pump of this.numbers) {
-      const verdict = this.verdict(pump);
-      for (const fault of faultsOf(verdict)) {
-        const before = found.get(fault.asset);
-        if (!before || rank(fault) > rank(before.fault)) found.set(fault.asset, { fault, pump, verdict });
-      }
-    }
+    for (const verdict of this.judged)
+      for (const fault of this.faults(verdict.pump)) found.set(fault.asset, { fault, pump: verdict.pump, verdict });
     return [...found.values()].sort((a, b) => rank(b.fault) - rank(a.fault));
   }
 
