@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from wetwell.detector.inference.observation import PUMP, SYSTEM, Observation
-from wetwell.detector.inference.posterior import Carried, Scales
+from wetwell.detector.inference.posterior import FLOW_TRUST, Carried, Scales
 from wetwell.detector.inference.prior import (
     CHANGE_PER_RUN,
     PUMP_PRIOR,
@@ -27,8 +27,9 @@ def carry(
 ) -> tuple[Floats, Carried | None]:
     """(6,) prior of the hypotheses, and the faults that were there before.
 
-    What is no larger than a run scatters by is no size to hold the next run against: that part of the probability is
-    of a fault as new as any other. Without a head sensor no size is known, and nothing is carried.
+    What is no larger than a run scatters by, or than a flow meter that wanders makes of health, is no size to hold
+    the next run against: that part of the probability is of a fault as new as any other. Without a head sensor no
+    size is known, and nothing is carried.
 
     Parameters
     ----------
@@ -56,7 +57,8 @@ def carry(
     mean_m = np.array([-lost_m, rise * friction_m - change_m])
     variance_m2 = np.array([lost_m2, variance * friction_m**2 + change_m**2])
     is_known = np.array([asset.track.time_ns is not None for asset in (pump.asset, system.asset)])
-    is_fault = is_known * _beyond(mean_m, variance_m2, np.sqrt(own_m2))
+    meter_m = 2.0 * FLOW_TRUST * observation.flow_meter[: SYSTEM + 1]  # to one side when learnt, to the other now
+    is_fault = is_known * _beyond(mean_m, variance_m2, np.hypot(np.sqrt(own_m2), meter_m))
     begun = CHANGE_PER_RUN * np.array([PUMP_PRIOR, SYSTEM_PRIOR])
     chance = np.array([pump.pump, system.system])
     share = np.maximum(chance - begun, 0.0) / chance * is_fault

@@ -100,6 +100,22 @@ def test_flow_meters_that_wander_over_the_day_take_a_day_to_learn_and_then_give_
     assert min(ends_s.values()) > LEARNING_S
 
 
+@pytest.mark.check
+@pytest.mark.parametrize("seed", [92011, 92015, 92016])
+def test_meters_that_wander_beside_slow_noise_give_no_alarm_before_the_day_is_learnt(alpha, seed):
+    """What they make of health was carried along as a fault that stays."""
+    sensors = alpha.sensors.model_copy(update={"correlation": 0.95})
+    recording = Simulation(alpha.model_copy(update={"sensors": sensors}), Scenario(name="slow"), seed).advance(
+        2 * DAY_S
+    )
+    for pump in (1, 2, 3):
+        seconds = np.arange(len(recording))
+        recording.columns[f"pump{pump}_flow_m3h"][:] *= 1.0 + 0.01 * np.sin(2.0 * np.pi * seconds / DAY_S)
+    _, told = judged(alpha, recording)
+    assert false_ones(told, np.inf) == []
+    assert share_of_normal(told, DAY_S, np.inf) > 0.95
+
+
 def test_a_station_that_never_had_a_level_is_judged_without(alpha):
     fault = Blockage(pump=3, speed_loss=0.15, shape="step", start_s=8 * HOUR_S, end_s=9 * HOUR_S)
     recording = Simulation(alpha, Scenario(name="bare", fault=(fault,)), 7).advance(10 * HOUR_S)

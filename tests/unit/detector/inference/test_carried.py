@@ -87,6 +87,18 @@ def test_at_another_flow_a_main_is_expected_between_friction_and_lift(friction_m
         assert weighed(seen((0.0, shift_m)), pump, system, friction_m)[SYSTEM_FAULT] > 0.99
 
 
+@pytest.mark.parametrize("error", [-0.015, 0.015])
+def test_what_a_flow_meter_that_wanders_makes_of_health_is_no_size_to_carry(error):
+    run = seen((0.0, 0.0))
+    pump_m, system_m = error * run.flow_meter[:2]
+    pump, system = believed(pump_m=-pump_m, rise=system_m / FRICTION_M)
+    _, carried = carry(pump, system, run, SCALES, FLOOR, FRICTION_M, 20 * RUN_NS)
+    assert carried.share.max() < 0.05
+    pump, system = believed(pump_m=-3.0 * pump_m, rise=3.0 * system_m / FRICTION_M)
+    _, carried = carry(pump, system, run, SCALES, FLOOR, FRICTION_M, 20 * RUN_NS)
+    assert carried.share.min() > 0.9
+
+
 def test_without_a_head_sensor_nothing_is_carried():
     pump, system = believed(pump_m=6.4)
     prior, carried = carry(pump, system, seen((0.0, np.nan), system_in_pump=-1.0), SCALES, FLOOR, FRICTION_M, RUN_NS)
