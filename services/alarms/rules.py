@@ -159,19 +159,30 @@ def fault_text(fault: AssetFault) -> str:
     >>> trend = Trend(per_day=2.88, interval=(2.3, 3.4), reaches_limit=from_iso("2026-11-24T08:00:00Z"))
     >>> fault_text(AssetFault(asset="main", stage="plan", since=0, severity=severity, trend=trend))
     'main: plan, friction 8.9 % (8.5 to 9.3), limit 15 %, 2.9 % a day, limit about 2026-11-24'
+    >>> blocked = Severity(quantity="wear_head_percent", value=132.0, interval=(128.0, 136.0), limit=5.0)
+    >>> no_growth = Trend(per_day=540.0, interval=(-20.0, 1100.0))
+    >>> fault_text(AssetFault(asset="pump:2", stage="act", since=0, severity=blocked, trend=no_growth))
+    'pump 2: act, loss of head 130 % (130 to 140), limit 5 %'
     """
     kind, _, name = fault.asset.partition(":")
     words = [f"{name if kind == 'sensor' else f'{kind} {name}'.strip()}: {fault.stage}"]
     if fault.severity is not None:
         label, unit = QUANTITIES.get(fault.severity.quantity, (fault.severity.quantity, ""))
         low, high = fault.severity.interval
-        words.append(f"{label} {fault.severity.value:.2g} {unit} ({low:.2g} to {high:.2g})")
+        words.append(f"{label} {_short(fault.severity.value)} {unit} ({_short(low)} to {_short(high)})")
         words.append(f"limit {fault.severity.limit:g} {unit}")
         if fault.trend is not None:
-            words.append(f"{fault.trend.per_day:.2g} {unit} a day")
+            least, most = fault.trend.interval
+            if least > 0.0 or most < 0.0:  # else no growth is seen
+                words.append(f"{_short(fault.trend.per_day)} {unit} a day")
             if fault.trend.reaches_limit is not None:
                 words.append(f"limit about {to_iso(fault.trend.reaches_limit)[:10]}")
     return ", ".join(words)
+
+
+def _short(value: float) -> str:
+    """Two digits, as people write them: 540 and not 5.4e+02."""
+    return f"{float(f'{value:.2g}'):.15g}"
 
 
 QUANTITIES: Mapping[str, tuple[str, str]] = {

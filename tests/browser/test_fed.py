@@ -17,6 +17,7 @@ from wetwell.protocols.messages.gap_watch import GapLook, GapName, GapWatch
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.verdict import AssetFault, Severity, Trend, Verdict
 from wetwell.protocols.timestamps import NS_PER_DAY, NS_PER_S, from_iso
+from wetwell.services.alarms.rules import RULES, fault_text
 
 pytestmark = pytest.mark.check
 
@@ -81,6 +82,22 @@ def verdict(number):
     )  # fmt: skip
 
 
+def alarms():
+    """Alarms as the service tells them: with figures in its text, without, and of a fault."""
+    fault = verdict(7).faults[0]
+    told = [
+        ("level_high", {"text": "level high: 2.31 m, limit 2.00 m"}),
+        ("detector_silent", {"text": RULES["detector_silent"].text, "advice": RULES["detector_silent"].advice}),
+        ("samples_stale", {"text": "no samples for 90 s"}),
+        ("main.system_fault", {"text": fault_text(fault), "asset": "main", "stage": "act", "trend": fault.trend,
+                               "severity": fault.severity}),
+    ]  # fmt: skip
+    return [
+        Alarm(id=name, time=SPRING_NS, station=f"s-{CALLS:04}", priority="high", state="unacknowledged",
+              is_active=True, raised=SPRING_NS, **words) for name, words in told
+    ]  # fmt: skip
+
+
 def watched_gap():
     factor = {"factor": {"value": 1.1, "ci": [1.09, 1.11], "unit": "1"}}
     effect = {"name": "friction_bias", "component": "rising_main", "equivalent": [], "parameters": factor}
@@ -127,11 +144,8 @@ def fed(tmp_path_factory):
         told = {"time": SPRING_NS + NS_PER_S, "pump": 2, "state": "normal", "faults": ()}
         flushed = verdict(FLUSHED).model_copy(update=told)
         bus.publisher(verdict_key(flushed.station, 2)).put(flushed.encode())
-        alarm = Alarm(
-            id="level_high", time=SPRING_NS, station=f"s-{CALLS:04}", priority="high", state="unacknowledged",
-            is_active=True, text="x", raised=SPRING_NS,
-        )  # fmt: skip
-        bus.publisher(alarm_key(alarm.station, alarm.id)).put(alarm.encode())
+        for alarm in alarms():
+            bus.publisher(alarm_key(alarm.station, alarm.id)).put(alarm.encode())
         bus.publisher(gap_key(f"s-{WATCHED:04}")).put(watched_gap().encode())
         place.tell = lambda number, time_ns: samples[number].put(sample(number, time_ns).encode())
         yield place
@@ -148,6 +162,8 @@ def test_a_thousand_stations_stand_in_the_order_of_need_and_only_those_in_sight_
     for told in ("rising main", "act", "2026-03-24", "16.2 / 15.0 %", "↗ 0.80 %/day", "900"):
         expect(line).to_contain_text(told)
     assert axe(page) == []
+    expect(line.get_by_role("img")).to_have_attribute("aria-label", "pump 1 runs, see main; pump 2 stands, unknown")
+    assert line.locator(".pumps [class*=urgent]").count() == 0, "the main is at fault, and not the pumps"
     table.locator(".window").evaluate("node => node.scrollTo(0, node.scrollHeight)")
     expect(page.get_by_role("link", name="s-0999")).to_be_visible()
     page.get_by_label("Find a station").fill("s-05")
@@ -245,6 +261,15 @@ def test_no_english_is_left_on_a_german_page(fed, open_page, path) -> None:
     own = shown.replace(SERVICES_SAY, "")
     english = {found.group(0).lower() for found in re.finditer(ENGLISH, own, re.IGNORECASE)}
     assert english == set(), f"{sorted(english)} in {shown}"
+
+
+def test_an_alarm_is_told_in_the_language_of_the_reader_with_what_is_known_of_its_fault(fed, open_page) -> None:
+    page = open_page(f"{fed.url}/alarms?lang=de")
+    expect(page.locator("tr.alarm .text .strong")).to_have_count(4)
+    *plain, of_fault = sorted(page.locator("tr.alarm .text .strong").all_inner_texts(), key=len)
+    assert plain == ["Detektor läuft nicht", "keine Messwerte seit 90 s", "Pegel hoch: 2,31 m, Grenze 2,00 m"]
+    size = "mehr Reibung 16,2 % (+15,4 bis +17,0), Grenze 15,0 %, wächst um 0,80 % am Tag"
+    assert of_fault == f"Leitungsfehler – Druckleitung: handeln, {size}, die Grenze wird am 2026-04-07 erreicht"
 
 
 def test_local_time_goes_on_over_the_change_to_summer_time(fed, open_page) -> None:

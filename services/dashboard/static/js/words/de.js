@@ -2,6 +2,7 @@
 
 export default {
   " by {name}": " von {name}",
+  " for {span}": " seit {span}",
   " until {time}": " bis {time}",
   ", limit {value} {unit}": ", Grenze {value} {unit}",
   "/day": "/Tag",
@@ -13,6 +14,7 @@ export default {
   "7 days": "7 Tage",
   "8 hours": "8 Stunden",
   "90 days": "90 Tage",
+  ": {level} m, limit {limit} m": ": {level} m, Grenze {limit} m",
   "; limits {low} and {high}": "; Grenzen {low} und {high}",
   "; says {what}": "; sagt {what}",
   "Advice": "Rat",
@@ -236,6 +238,7 @@ export default {
   "in service": "in Betrieb",
   "inflow": "Zulauf",
   "inflow {value} m³/h": "Zulauf {value} m³/h",
+  "error": "Fehler",
   "it grows by {value} a day": "wächst um {value} am Tag",
   "it shrinks by {value} a day": "schrumpft um {value} am Tag",
   "is learnt anew": "wird neu gelernt",
@@ -328,6 +331,7 @@ export default {
   "steady samples": "ruhige Messwerte",
   "start all pumps, send a crew or a tanker": "alle Pumpen starten, Einsatz oder Saugwagen schicken",
   "the pumps do not keep up: look at running pumps and inflow": "die Pumpen kommen nicht nach: laufende Pumpen und Zulauf ansehen",
+  "the station has left its simulator": "die Station ist von ihrem Simulator abgewichen",
   "the station is not seen: check PLC, gateway and network": "die Station wird nicht gesehen: SPS, Gateway und Netz prüfen",
   "the PLC answers but its program does not run": "die SPS antwortet, aber ihr Programm läuft nicht",
   "check the PLC's power, network and address": "Strom, Netz und Adresse der SPS prüfen",
