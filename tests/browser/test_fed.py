@@ -291,3 +291,15 @@ def test_local_time_goes_on_over_the_change_to_summer_time(fed, open_page) -> No
     expect(page).to_have_url(
         re.compile(re.escape("from=2026-10-24T23%3A00%3A00.000Z&to=2026-10-25T03%3A00%3A00.000Z"))
     )
+
+
+@pytest.mark.parametrize("width", [1280, 1600, 1920])
+@pytest.mark.parametrize("lang", ["en", "de"])
+def test_nothing_of_a_fault_is_cut_off_in_the_overview(fed, open_page, width, lang) -> None:
+    page = open_page(f"{fed.url}/?lang={lang}", viewport={"width": width, "height": 900})
+    expect(page.get_by_role("row").filter(has_text="s-0007")).to_be_visible()
+    cut = page.locator(".stations .sheet .cell").evaluate_all(
+        "nodes => nodes.filter(node => node.checkVisibility() && node.scrollWidth > node.clientWidth)"
+        ".map(node => node.textContent)"
+    )
+    assert cut == [], cut
