@@ -22,6 +22,9 @@ const FIGURES = [
   [/ for (\d+) s$/, (seconds) => t(" for {span}", { span: lasting(Number(seconds)) })],
 ];
 
+/** In place of an alarm: what the station was put into, such as "under maintenance", and what that suppresses. */
+export const STATION = "station";
+
 const STATES = {
   normal: t("normal"), unacknowledged: t("unacknowledged"), acknowledged: t("acknowledged"), returned: t("returned"), shelved: t("shelved"),
   out_of_service: t("out of service"), latched_unacknowledged: t("latched, unacknowledged"), latched_acknowledged: t("latched, acknowledged"), suppressed: t("suppressed by design"),
@@ -35,7 +38,7 @@ const ACTS = {
 const PRIORITY_WORDS = { urgent: t("urgent"), high: t("high"), medium: t("medium"), low: t("low"), advisory: t("advisory") };
 
 export const ruleOf = (alarm) => alarm.id.split(".").at(-1);
-export const ruleWord = (alarm) => RULES[ruleOf(alarm)] ?? ruleOf(alarm).replaceAll("_", " ");
+export const ruleWord = (alarm) => (alarm.id === STATION ? t("mode of the station") : null) ?? RULES[ruleOf(alarm)] ?? ruleOf(alarm).replaceAll("_", " ");
 export const stateWord = (name) => STATES[name] ?? t(name.replaceAll("_", " "));
 export const actWord = (name) => ACTS[name] ?? t(name.replaceAll("_", " "));
 export const priorityWord = (name) => PRIORITY_WORDS[name] ?? name;
@@ -48,6 +51,7 @@ export const isPutAside = (alarm) => alarm.state === "shelved" || alarm.state ==
 /** What is the matter, in the reader's language; what the service tells in words of its own comes behind the kind of alarm. */
 export function textOf(alarm) {
   const word = ruleWord(alarm);
+  if (alarm.id === STATION) return t(alarm.text);
   if (alarm.asset && alarm.severity) return [`${word} – ${assetWords(alarm.asset)}${alarm.stage ? `: ${STAGES[alarm.stage].word}` : ""}`, ...sizeWords(alarm)].join(", ");
   for (const [form, words] of FIGURES) {
     const figures = alarm.text.match(form);

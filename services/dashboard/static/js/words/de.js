@@ -277,6 +277,7 @@ export default {
   "no connection": "keine Verbindung",
   "no connection to the bus": "keine Verbindung zum Bus",
   "no connection: nothing was done": "keine Verbindung: Nichts wurde getan",
+  "mode of the station": "Zustand der Station",
   "no data": "keine Daten",
   "no growth is seen": "kein Wachstum zu sehen",
   "no pumps": "keine Pumpen",
