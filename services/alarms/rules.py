@@ -9,6 +9,7 @@ from urllib.parse import unquote
 from wetwell.protocols.messages.alarm import Mode, Priority, RuleName
 from wetwell.protocols.messages.verdict import AssetFault, Stage, Verdict
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.reports.severity_words import QUANTITIES, severity_words, short
 
 
 @dataclass(frozen=True)
@@ -167,32 +168,15 @@ def fault_text(fault: AssetFault) -> str:
     kind, _, name = fault.asset.partition(":")
     words = [f"{name if kind == 'sensor' else f'{kind} {name}'.strip()}: {fault.stage}"]
     if fault.severity is not None:
-        label, unit = QUANTITIES.get(fault.severity.quantity, (fault.severity.quantity, ""))
-        low, high = fault.severity.interval
-        words.append(f"{label} {_short(fault.severity.value)} {unit} ({_short(low)} to {_short(high)})")
-        words.append(f"limit {fault.severity.limit:g} {unit}")
+        words.append(severity_words(fault.severity, digits=2))
+        _, unit = QUANTITIES.get(fault.severity.quantity, ("", ""))
         if fault.trend is not None:
             least, most = fault.trend.interval
             if least > 0.0 or most < 0.0:  # else no growth is seen
-                words.append(f"{_short(fault.trend.per_day)} {unit} a day")
+                words.append(f"{short(fault.trend.per_day)} {unit} a day")
             if fault.trend.reaches_limit is not None:
                 words.append(f"limit about {to_iso(fault.trend.reaches_limit)[:10]}")
     return ", ".join(words)
-
-
-def _short(value: float) -> str:
-    """Two digits, as people write them: 540 and not 5.4e+02."""
-    return f"{float(f'{value:.2g}'):.15g}"
-
-
-QUANTITIES: Mapping[str, tuple[str, str]] = {
-    "speed_loss_percent": ("speed loss", "%"),
-    "wear_head_percent": ("loss of head", "%"),
-    "friction_rise_percent": ("friction", "%"),
-    "static_head_rise_m": ("static head", "m"),
-    "meter_error_percent": ("error", "%"),
-}
-"""Words and units of severities."""
 
 
 def verdict_advice(verdict: Verdict, rule: Rule) -> str:
