@@ -10,7 +10,8 @@ import pytest
 from browser_site import Site, free_port, until, wetwell
 from playwright.sync_api import expect
 
-from wetwell.protocols.bus.keys import alarm_key, gap_key, sample_key, verdict_key
+from wetwell.detector.verdict.station_model import StationModel
+from wetwell.protocols.bus.keys import alarm_key, gap_key, model_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import connect_client
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.gap_watch import GapLook, GapName, GapWatch
@@ -18,6 +19,7 @@ from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.verdict import AssetFault, Severity, Trend, Verdict
 from wetwell.protocols.timestamps import NS_PER_DAY, NS_PER_S, from_iso
 from wetwell.services.alarms.rules import RULES, fault_text
+from wetwell.services.stations import find_station
 
 pytestmark = pytest.mark.check
 
@@ -40,10 +42,12 @@ FAULTS = {
     ),
     900: ("pump:1", "watch", 5.0, Severity(quantity="speed_loss_percent", value=0.7, interval=(0.5, 0.9), limit=3.0)),
 }
-BAD, UNHEARD, CALLS, WATCHED, FLUSHED = 123, 124, 200, 300, 700
+BAD, UNHEARD, CALLS, WATCHED, FLUSHED, TWO_MAINS = 123, 124, 200, 300, 700, 800
+TWIN = find_station("twin")
+MAINS = [main.name for main in TWIN.mains]
 FAULTS[FLUSHED] = FAULTS[7]
 """Of this one pump 1 stands since its main was flushed, which pump 2 tells."""
-FIRST = ["s-0042", "s-0007", "s-0123", "s-0124", "s-0500", "s-0200", "s-0900", "s-0000"]
+FIRST = ["s-0042", "s-0007", "s-0800", "s-0123", "s-0124", "s-0500", "s-0200", "s-0900", "s-0000"]
 """Act, the dearer first; nobody sees it; plan; an alarm waits; watch; all is well."""
 IN_ORDER = """nodes => nodes.sort((a, b) => a.ariaRowIndex - b.ariaRowIndex)
   .map(node => node.querySelector("a").textContent)"""
@@ -144,6 +148,11 @@ def fed(tmp_path_factory):
         told = {"time": SPRING_NS + NS_PER_S, "pump": 2, "state": "normal", "faults": ()}
         flushed = verdict(FLUSHED).model_copy(update=told)
         bus.publisher(verdict_key(flushed.station, 2)).put(flushed.encode())
+        model = StationModel(TWIN).message((None,) * 4, {}, 0).model_copy(update={"station": f"s-{TWO_MAINS:04}"})
+        bus.publisher(model_key(model.station)).put(model.encode())
+        fault = verdict(7).faults[0].model_copy(update={"asset": f"main:{MAINS[0]}"})
+        told = {"evidence": {"main": MAINS[0]}, "state": "system_fault", "faults": (fault,)}
+        bus.publisher(verdict_key(model.station, 1)).put(verdict(TWO_MAINS).model_copy(update=told).encode())
         for alarm in alarms():
             bus.publisher(alarm_key(alarm.station, alarm.id)).put(alarm.encode())
         bus.publisher(gap_key(f"s-{WATCHED:04}")).put(watched_gap().encode())
@@ -211,6 +220,13 @@ def test_a_main_that_was_flushed_is_told_by_the_newest_verdict_whatever_pump_ran
     expect(page.locator(".pump .condition")).to_have_text(["normal", "normal"])
     expect(page.locator(".well .main.fault")).to_have_count(0)
     expect(page.locator(".cause")).to_have_count(0)
+
+
+def test_of_two_mains_the_one_that_is_at_fault_says_so(fed, open_page) -> None:
+    page = open_page(f"{fed.url}/station/s-{TWO_MAINS:04}")
+    expect(page.locator(".well .main.fault title")).to_have_text([f"{MAINS[0]}, system fault: act"])
+    told = page.locator(".well text").filter(has_text="system fault")
+    expect(told).to_have_text(re.compile(rf"^{MAINS[0]} .* m³/h, system fault: act; {MAINS[1]} .{{1,6}} m³/h$"))
 
 
 def test_one_cursor_goes_through_all_trends(fed, open_page) -> None:

@@ -115,7 +115,7 @@ function stationLine() {
   const cells = Object.fromEntries(["flow", "power", "gap", "alarms", "time", "cause", "stage", "since", "severity", "trend", "cost"].map((each) => [each, html("span")]));
   const cell = (kind, ...children) => html("div", { role: "cell", class: `cell ${kind}` }, ...children);
   const element = html("div", { class: "line", role: "row" },
-    cell("", chip), cell("name", name, mode), cell("cause", cells.cause), cell("cause", cells.stage), cell("cause", cells.since), cell("cause middle", cells.severity), cell("cause middle", cells.trend), cell("cause number", cells.cost),
+    cell("", chip), cell("name", name, mode), cell("cause asset", cells.cause), cell("cause", cells.stage), cell("cause", cells.since), cell("cause middle", cells.severity), cell("cause middle", cells.trend), cell("cause number", cells.cost),
     cell("middle", pumps.element), cell("gauge middle", html("span", { class: "track", "aria-hidden": "true" }, fill), level),
     cell("number wide", cells.flow), cell("number wide", cells.power), cell("number wide", cells.gap), cell("number middle", cells.alarms), cell("wide", cells.time));
   let shown = "";
