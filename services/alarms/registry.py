@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from wetwell.protocols.messages.alarm import Alarm, AlarmAct, AlarmAnswer, Mode, RuleName
+from wetwell.protocols.messages.alarm import STATION, Alarm, AlarmAct, AlarmAnswer, Mode, RuleName
 from wetwell.protocols.messages.verdict import AssetFault
 from wetwell.services.alarms.rates import AlarmRates
 from wetwell.services.alarms.record import AlarmRecord
@@ -28,6 +28,9 @@ SHELF = "end of shelf"
 """Who takes an alarm from the shelf when its time is over."""
 
 
+_MODE_WORDS: Mapping[Mode | None, str] = {"maintenance": "under maintenance", "stopped": "stopped"}
+
+
 class RegistryState(BaseModel):
     """What is kept of a registry over a restart; on disk a record is called an entry."""
 
@@ -38,6 +41,7 @@ class RegistryState(BaseModel):
     calls_ns: list[int] = Field(default_factory=list)
     is_flood: bool = False
     modes: dict[str, Mode] = Field(default_factory=dict)
+    told_modes: dict[str, Alarm] = Field(default_factory=dict)
 
 
 class AlarmRegistry:
@@ -48,6 +52,7 @@ class AlarmRegistry:
         self.changed: list[Alarm] = []
         self.records: dict[tuple[str, str], AlarmRecord] = {}
         self.modes: dict[str, Mode] = {}
+        self._told_modes: dict[str, Alarm] = {}
         self.rates = AlarmRates()
         self._names: dict[str, set[str]] = {}
         self._answers: OrderedDict[str, AlarmAnswer] = OrderedDict()
@@ -133,11 +138,28 @@ class AlarmRegistry:
         return [self.records[station, name] for name in sorted(self._names.get(station, ()))]
 
     def set_mode(self, station: str, mode: Mode | None, by: str, reason: str, time_ns: int, now_ns: int) -> None:
-        """Put a station under maintenance, stop it, or neither: what that suppresses calls nobody until it ends."""
+        """Put a station under maintenance, stop it, or neither: what that suppresses calls nobody until it ends.
+
+        That it is so is told like an alarm, named "station": else nobody would see why there are none.
+        """
         if mode is None:
             self.modes.pop(station, None)
         else:
             self.modes[station] = mode
+        alarm = Alarm(
+            id=STATION,
+            time=time_ns,
+            station=station,
+            priority="advisory",
+            state="normal" if mode is None else "suppressed",
+            is_active=mode is not None,
+            text=_MODE_WORDS.get(mode, "back in operation"),
+            raised=None if mode is None else time_ns,
+            by=by,
+            reason=reason,
+        )
+        self._told_modes[station] = alarm
+        self.changed.append(alarm)
         for record in self.of_station(station):
             is_covered = mode is not None and record.rule in BY_DESIGN[mode]
             if is_covered and record.status.state not in SUPPRESSED:
@@ -220,8 +242,9 @@ class AlarmRegistry:
         self._tell(record, now_ns, is_call=status.state == "unacknowledged")
 
     def alarms(self) -> list[Alarm]:
-        """All alarms that there ever were."""
-        return [record.message(self.rules[record.rule]) for record in self.records.values()]
+        """All alarms that there ever were, and the modes of stations."""
+        records = [record.message(self.rules[record.rule]) for record in self.records.values()]
+        return [*records, *self._told_modes.values()]
 
     def stale(self, time_ns: Mapping[str, int]) -> list[AlarmRecord]:
         """Alarms that stand for more than a day of their station's time."""
@@ -249,6 +272,7 @@ class AlarmRegistry:
             calls_ns=self.rates.calls_ns,
             is_flood=self.rates.is_flood,
             modes=self.modes,
+            told_modes=self._told_modes,
         )
 
     def restore(self, state: RegistryState) -> None:
@@ -256,7 +280,7 @@ class AlarmRegistry:
         self.records, self._names = {}, {}
         for record in state.records:
             self._add(record)
-        self.modes = dict(state.modes)
+        self.modes, self._told_modes = dict(state.modes), dict(state.told_modes)
         self._pending = {name for name, record in self.records.items() if record.delay.held_s is not None}
         self._answers = OrderedDict((answer.id, answer) for answer in state.answers)
         self.rates = AlarmRates(state.calls_ns, is_flood=state.is_flood)

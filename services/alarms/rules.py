@@ -9,6 +9,7 @@ from urllib.parse import unquote
 from wetwell.protocols.messages.alarm import Mode, Priority, RuleName
 from wetwell.protocols.messages.verdict import AssetFault, Stage, Verdict
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.reports.severity_words import QUANTITIES, severity_words, short
 
 
 @dataclass(frozen=True)
@@ -159,29 +160,23 @@ def fault_text(fault: AssetFault) -> str:
     >>> trend = Trend(per_day=2.88, interval=(2.3, 3.4), reaches_limit=from_iso("2026-11-24T08:00:00Z"))
     >>> fault_text(AssetFault(asset="main", stage="plan", since=0, severity=severity, trend=trend))
     'main: plan, friction 8.9 % (8.5 to 9.3), limit 15 %, 2.9 % a day, limit about 2026-11-24'
+    >>> blocked = Severity(quantity="wear_head_percent", value=132.0, interval=(128.0, 136.0), limit=5.0)
+    >>> no_growth = Trend(per_day=540.0, interval=(-20.0, 1100.0))
+    >>> fault_text(AssetFault(asset="pump:2", stage="act", since=0, severity=blocked, trend=no_growth))
+    'pump 2: act, loss of head 130 % (130 to 140), limit 5 %'
     """
     kind, _, name = fault.asset.partition(":")
     words = [f"{name if kind == 'sensor' else f'{kind} {name}'.strip()}: {fault.stage}"]
     if fault.severity is not None:
-        label, unit = QUANTITIES.get(fault.severity.quantity, (fault.severity.quantity, ""))
-        low, high = fault.severity.interval
-        words.append(f"{label} {fault.severity.value:.2g} {unit} ({low:.2g} to {high:.2g})")
-        words.append(f"limit {fault.severity.limit:g} {unit}")
+        words.append(severity_words(fault.severity, digits=2))
+        _, unit = QUANTITIES.get(fault.severity.quantity, ("", ""))
         if fault.trend is not None:
-            words.append(f"{fault.trend.per_day:.2g} {unit} a day")
+            least, most = fault.trend.interval
+            if least > 0.0 or most < 0.0:  # else no growth is seen
+                words.append(f"{short(fault.trend.per_day)} {unit} a day")
             if fault.trend.reaches_limit is not None:
                 words.append(f"limit about {to_iso(fault.trend.reaches_limit)[:10]}")
     return ", ".join(words)
-
-
-QUANTITIES: Mapping[str, tuple[str, str]] = {
-    "speed_loss_percent": ("speed loss", "%"),
-    "wear_head_percent": ("loss of head", "%"),
-    "friction_rise_percent": ("friction", "%"),
-    "static_head_rise_m": ("static head", "m"),
-    "meter_error_percent": ("error", "%"),
-}
-"""Words and units of severities."""
 
 
 def verdict_advice(verdict: Verdict, rule: Rule) -> str:

@@ -201,7 +201,9 @@ class StationWatch:
             registry.observe(self.name, "plc_stopped", age_s >= heartbeat_after_s, time_ns, now.wall_ns, text=text)
 
     def handle_presence(self, service: str, *, is_alive: bool, now: Now) -> None:
-        """Note that a service has come or gone."""
+        """Note that a service has come or gone; a plant that has died is not held."""
+        if service == "simulator" and not is_alive:
+            self.is_held = False
         if service in self.services:
             gone_s = self.gone_s.get(service)
             self.gone_s[service] = None if is_alive else now.steady_s if gone_s is None else gone_s

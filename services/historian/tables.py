@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from typing import Any
 
-from wetwell.protocols.messages.history import History
+from wetwell.protocols.messages.history import Episode, History
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.reports.episode_table import episode_rows
 from wetwell.services.reports.tables import named, titled
 
 _SHOWN = {
     "verdicts": ("time", "pump", "state"),
     "changes": ("time", "pump", "state", "asset", "stage"),
     "alarms": ("time", "id", "priority", "state", "by", "text"),
-    "episodes": ("asset", "state", "stage", "from", "to", "advice", "cost"),
     "maintenance": ("time", "asset", "act", "found", "by", "result"),
     "stations": ("station", "first", "last"),
 }
@@ -24,6 +24,8 @@ def history_table(history: History, labels: Sequence[str] = (), title: str | Non
 
     Where `labels` and `title` say what people call the pumps and the station, that stands beside their keys.
     """
+    if history.kind == "episodes":
+        return {"episodes": episode_rows([Episode.model_validate(message) for message in history.messages], labels)}
     if history.kind in _SHOWN:
         names = _SHOWN[history.kind]
         return {

@@ -9,6 +9,7 @@ from wetwell.protocols.timestamps import to_iso
 from wetwell.services.reports.charts import Section, page, paragraph, table
 from wetwell.services.reports.charts.axes import Scale, time_ticks
 from wetwell.services.reports.charts.svg import GRID, LEFT, RIGHT, WIDTH, colour, legend, svg, text_at
+from wetwell.services.reports.severity_words import severity_words
 from wetwell.services.reports.tables import named
 
 STAGES: tuple[Stage, ...] = ("watch", "plan", "act")
@@ -28,7 +29,7 @@ def episode_rows(episodes: Sequence[Episode], labels: Sequence[str] = ()) -> lis
     ...     severity=severity, advice="flush the main", cost=1306.8)])
     ... # doctest: +NORMALIZE_WHITESPACE
     [{'asset': 'main', 'state': 'system_fault', 'stage': 'act', 'from': '1970-01-01T00:00:00Z', 'to': 'stands',
-      'severity': 'friction_rise_percent 16.2 (15.5 to 16.9), limit 15', 'cost': 1306.8, 'advice': 'flush the main'}]
+      'severity': 'friction 16.2 % (15.5 to 16.9), limit 15 %', 'cost': 1306.8, 'advice': 'flush the main'}]
     """
     return [
         {
@@ -88,7 +89,4 @@ def episode_chart(episodes: Sequence[Episode], first_ns: int, last_ns: int) -> s
 
 
 def _severity(severity: Severity | None) -> str:
-    if severity is None:
-        return ""
-    low, high = severity.interval
-    return f"{severity.quantity} {severity.value:.3g} ({low:.3g} to {high:.3g}), limit {severity.limit:g}"
+    return "" if severity is None else severity_words(severity)

@@ -89,3 +89,28 @@ def test_the_overview_tells_cause_and_cost_and_on_a_phone_it_is_a_card(site, ope
     card = phone.get_by_role("row").filter(has_text="alpha")
     expect(card.get_by_text("pump 2", exact=True)).to_be_in_viewport(ratio=1.0)
     assert phone.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_a_station_under_maintenance_says_so_on_every_page_until_it_is_back(site, open_page, axe) -> None:
+    page = open_page(f"{site.url}/station/alpha")
+    modes = page.get_by_role("group", name="Mode of the station")
+    modes.get_by_role("button", name="under maintenance").click()
+    page.get_by_label("Your name").fill("Ada")
+    page.get_by_label("Reason").fill("pumps are pulled")
+    page.get_by_role("dialog").get_by_role("button", name="under maintenance").click()
+    try:
+        mode = page.locator("#station-mode")
+        expect(mode).to_have_text(re.compile("under maintenance by Ada, since 2025-.*: pumps are pulled"))
+        expect(modes.get_by_role("button", name="under maintenance")).to_have_attribute("aria-pressed", "true")
+        assert axe(page) == []
+        overview = open_page(site.url)
+        expect(overview.get_by_role("row").filter(has_text="alpha")).to_contain_text("under maintenance")
+        assert axe(overview) == []
+        overview.goto(f"{site.url}/alarms?show=aside")
+        expect(overview.get_by_role("row").filter(has_text="under maintenance")).to_contain_text("pumps are pulled")
+        expect(overview.get_by_role("row").filter(has_text="pump fault")).to_contain_text("suppressed by design")
+    finally:
+        modes.get_by_role("button", name="back in operation").click()
+        page.get_by_role("dialog").get_by_role("button", name="back in operation").click()
+    expect(mode).to_have_text("")
+    expect(modes.get_by_role("button", name="back in operation")).to_have_attribute("aria-pressed", "true")

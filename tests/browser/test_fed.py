@@ -10,13 +10,16 @@ import pytest
 from browser_site import Site, free_port, until, wetwell
 from playwright.sync_api import expect
 
-from wetwell.protocols.bus.keys import alarm_key, gap_key, sample_key, verdict_key
+from wetwell.detector.verdict.station_model import StationModel
+from wetwell.protocols.bus.keys import alarm_key, gap_key, model_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import connect_client
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.gap_watch import GapLook, GapName, GapWatch
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.verdict import AssetFault, Severity, Trend, Verdict
 from wetwell.protocols.timestamps import NS_PER_DAY, NS_PER_S, from_iso
+from wetwell.services.alarms.rules import RULES, fault_text
+from wetwell.services.stations import find_station
 
 pytestmark = pytest.mark.check
 
@@ -39,10 +42,12 @@ FAULTS = {
     ),
     900: ("pump:1", "watch", 5.0, Severity(quantity="speed_loss_percent", value=0.7, interval=(0.5, 0.9), limit=3.0)),
 }
-BAD, UNHEARD, CALLS, WATCHED, FLUSHED = 123, 124, 200, 300, 700
+BAD, UNHEARD, CALLS, WATCHED, FLUSHED, TWO_MAINS = 123, 124, 200, 300, 700, 800
+TWIN = find_station("twin")
+MAINS = [main.name for main in TWIN.mains]
 FAULTS[FLUSHED] = FAULTS[7]
 """Of this one pump 1 stands since its main was flushed, which pump 2 tells."""
-FIRST = ["s-0042", "s-0007", "s-0123", "s-0124", "s-0500", "s-0200", "s-0900", "s-0000"]
+FIRST = ["s-0042", "s-0007", "s-0800", "s-0123", "s-0124", "s-0500", "s-0200", "s-0900", "s-0000"]
 """Act, the dearer first; nobody sees it; plan; an alarm waits; watch; all is well."""
 IN_ORDER = """nodes => nodes.sort((a, b) => a.ariaRowIndex - b.ariaRowIndex)
   .map(node => node.querySelector("a").textContent)"""
@@ -79,6 +84,22 @@ def verdict(number):
         time=SPRING_NS, station=f"s-{number:04}", pump=1, state=state, probability={state: 1.0}, evidence=expected,
         window=(SPRING_NS, SPRING_NS), faults=(fault,) if fault else (),
     )  # fmt: skip
+
+
+def alarms():
+    """Alarms as the service tells them: with figures in its text, without, and of a fault."""
+    fault = verdict(7).faults[0]
+    told = [
+        ("level_high", {"text": "level high: 2.31 m, limit 2.00 m"}),
+        ("detector_silent", {"text": RULES["detector_silent"].text, "advice": RULES["detector_silent"].advice}),
+        ("samples_stale", {"text": "no samples for 90 s"}),
+        ("main.system_fault", {"text": fault_text(fault), "asset": "main", "stage": "act", "trend": fault.trend,
+                               "severity": fault.severity}),
+    ]  # fmt: skip
+    return [
+        Alarm(id=name, time=SPRING_NS, station=f"s-{CALLS:04}", priority="high", state="unacknowledged",
+              is_active=True, raised=SPRING_NS, **words) for name, words in told
+    ]  # fmt: skip
 
 
 def watched_gap():
@@ -127,11 +148,13 @@ def fed(tmp_path_factory):
         told = {"time": SPRING_NS + NS_PER_S, "pump": 2, "state": "normal", "faults": ()}
         flushed = verdict(FLUSHED).model_copy(update=told)
         bus.publisher(verdict_key(flushed.station, 2)).put(flushed.encode())
-        alarm = Alarm(
-            id="level_high", time=SPRING_NS, station=f"s-{CALLS:04}", priority="high", state="unacknowledged",
-            is_active=True, text="x", raised=SPRING_NS,
-        )  # fmt: skip
-        bus.publisher(alarm_key(alarm.station, alarm.id)).put(alarm.encode())
+        model = StationModel(TWIN).message((None,) * 4, {}, 0).model_copy(update={"station": f"s-{TWO_MAINS:04}"})
+        bus.publisher(model_key(model.station)).put(model.encode())
+        fault = verdict(7).faults[0].model_copy(update={"asset": f"main:{MAINS[0]}"})
+        told = {"evidence": {"main": MAINS[0]}, "state": "system_fault", "faults": (fault,)}
+        bus.publisher(verdict_key(model.station, 1)).put(verdict(TWO_MAINS).model_copy(update=told).encode())
+        for alarm in alarms():
+            bus.publisher(alarm_key(alarm.station, alarm.id)).put(alarm.encode())
         bus.publisher(gap_key(f"s-{WATCHED:04}")).put(watched_gap().encode())
         place.tell = lambda number, time_ns: samples[number].put(sample(number, time_ns).encode())
         yield place
@@ -148,6 +171,8 @@ def test_a_thousand_stations_stand_in_the_order_of_need_and_only_those_in_sight_
     for told in ("rising main", "act", "2026-03-24", "16.2 / 15.0 %", "↗ 0.80 %/day", "900"):
         expect(line).to_contain_text(told)
     assert axe(page) == []
+    expect(line.get_by_role("img")).to_have_attribute("aria-label", "pump 1 runs, see main; pump 2 stands, unknown")
+    assert line.locator(".pumps [class*=urgent]").count() == 0, "the main is at fault, and not the pumps"
     table.locator(".window").evaluate("node => node.scrollTo(0, node.scrollHeight)")
     expect(page.get_by_role("link", name="s-0999")).to_be_visible()
     page.get_by_label("Find a station").fill("s-05")
@@ -195,6 +220,13 @@ def test_a_main_that_was_flushed_is_told_by_the_newest_verdict_whatever_pump_ran
     expect(page.locator(".pump .condition")).to_have_text(["normal", "normal"])
     expect(page.locator(".well .main.fault")).to_have_count(0)
     expect(page.locator(".cause")).to_have_count(0)
+
+
+def test_of_two_mains_the_one_that_is_at_fault_says_so(fed, open_page) -> None:
+    page = open_page(f"{fed.url}/station/s-{TWO_MAINS:04}")
+    expect(page.locator(".well .main.fault title")).to_have_text([f"{MAINS[0]}, system fault: act"])
+    told = page.locator(".well text").filter(has_text="system fault")
+    expect(told).to_have_text(re.compile(rf"^{MAINS[0]} .* m³/h, system fault: act; {MAINS[1]} .{{1,6}} m³/h$"))
 
 
 def test_one_cursor_goes_through_all_trends(fed, open_page) -> None:
@@ -247,6 +279,15 @@ def test_no_english_is_left_on_a_german_page(fed, open_page, path) -> None:
     assert english == set(), f"{sorted(english)} in {shown}"
 
 
+def test_an_alarm_is_told_in_the_language_of_the_reader_with_what_is_known_of_its_fault(fed, open_page) -> None:
+    page = open_page(f"{fed.url}/alarms?lang=de")
+    expect(page.locator("tr.alarm .text .strong")).to_have_count(4)
+    *plain, of_fault = sorted(page.locator("tr.alarm .text .strong").all_inner_texts(), key=len)
+    assert plain == ["Detektor läuft nicht", "keine Messwerte seit 90 s", "Pegel hoch: 2,31 m, Grenze 2,00 m"]
+    size = "mehr Reibung 16,2 % (+15,4 bis +17,0), Grenze 15,0 %, wächst um 0,80 % am Tag"
+    assert of_fault == f"Leitungsfehler – Druckleitung: handeln, {size}, die Grenze wird am 2026-04-07 erreicht"
+
+
 def test_local_time_goes_on_over_the_change_to_summer_time(fed, open_page) -> None:
     berlin = {"timezone_id": "Europe/Berlin", "locale": "de-DE"}
     page = open_page(f"{fed.url}/station/s-0600", may_lose_its_server=True, **berlin)  # it has no historian
@@ -266,3 +307,15 @@ def test_local_time_goes_on_over_the_change_to_summer_time(fed, open_page) -> No
     expect(page).to_have_url(
         re.compile(re.escape("from=2026-10-24T23%3A00%3A00.000Z&to=2026-10-25T03%3A00%3A00.000Z"))
     )
+
+
+@pytest.mark.parametrize("width", [1280, 1600, 1920])
+@pytest.mark.parametrize("lang", ["en", "de"])
+def test_nothing_of_a_fault_is_cut_off_in_the_overview(fed, open_page, width, lang) -> None:
+    page = open_page(f"{fed.url}/?lang={lang}", viewport={"width": width, "height": 900})
+    expect(page.get_by_role("row").filter(has_text="s-0007")).to_be_visible()
+    cut = page.locator(".stations .sheet .cell").evaluate_all(
+        "nodes => nodes.filter(node => node.checkVisibility() && node.scrollWidth > node.clientWidth)"
+        ".map(node => node.textContent)"
+    )
+    assert cut == [], cut

@@ -1,9 +1,15 @@
 """Spans of time with a verdict or an alarm, from what was kept of their changes."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, get_args
+
+from wetwell.protocols.messages.alarm import Priority
 
 Band = dict[str, Any]
+
+PRIORITIES = get_args(Priority)
+"""The most urgent last."""
+_WORDS = ("id", "pump", "text", "asset", "stage", "severity", "trend")
 
 
 def verdict_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
@@ -36,7 +42,8 @@ def verdict_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
 def alarm_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
     """One band for each time that the condition of an alarm was there; an open one has `to` None.
 
-    A change tells since when its alarm is raised, so that one that was raised before the first change is whole.
+    A change tells since when its alarm is raised, so that one that was raised before the first change is whole. A
+    band has the words of the last change, and the most urgent priority that its alarm has had.
 
     Examples
     --------
@@ -44,6 +51,10 @@ def alarm_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
     >>> gone = raised | {"is_active": False, "time": "t9", "returned": "t3"}
     >>> [(band["from"], band["to"]) for band in alarm_bands([raised | {"is_active": True, "time": "t1"}, gone])]
     [('t1', 't3')]
+    >>> first = raised | {"is_active": True, "time": "t1"}
+    >>> worse = first | {"time": "t2", "priority": "urgent", "text": "y"}
+    >>> [(band["priority"], band["text"]) for band in alarm_bands([first, worse])]
+    [('urgent', 'y')]
     """
     bands: list[Band] = []
     standing: dict[str, Band] = {}
@@ -53,9 +64,11 @@ def alarm_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
         if raised is not None and (band is None or band["from"] != raised):
             if band is not None and band["to"] is None:
                 band["to"] = raised
-            words = {key: change.get(key) for key in ("id", "pump", "priority", "text")}
-            band = standing[name] = words | {"from": raised, "to": None}
+            band = standing[name] = {"priority": change["priority"], "from": raised, "to": None}
             bands.append(band)
+        if band is not None and change.get("raised") == band["from"]:
+            band["priority"] = max(band["priority"], change["priority"], key=PRIORITIES.index)
+            band.update({key: change.get(key) for key in _WORDS})
         if band is not None and not change.get("is_active"):
             band["to"] = band["to"] or change.get("returned") or change["time"]
     return bands

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from wetwell.protocols.messages.alarm import Alarm, AlarmState
+from wetwell.protocols.messages.alarm import STATION, Alarm, AlarmState
 from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.model import Model
 from wetwell.protocols.messages.sample import Sample
@@ -277,6 +277,7 @@ class StationView:
             "levels": self._levels[-1:],
             "floor": self._floor_m,
             "alarms": len(active),
+            "mode": next((alarm.text for alarm in active if alarm.id == STATION), ""),
             "gap": None if self._gap is None else {"matters": self._gap.matters, "doubled": self._gap.is_doubled},
             "unacknowledged": sum(alarm.state in WAITING for alarm in active),
         }

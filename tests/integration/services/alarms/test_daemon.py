@@ -152,6 +152,17 @@ def test_silence_is_told_and_an_end_of_it(alpha):
     assert site.look(1) == [("detector_silent", "returned")]
 
 
+def test_a_plant_that_is_held_is_not_missed_until_it_has_died():
+    site = Site()
+    site.sample()
+    held = {"time": 0, "station": "alpha", "service": "simulator", "state": "running", "figures": {"held": 1.0}}
+    site.service.handle_presence(Presence(alive_key("alpha", "simulator"), is_alive=True))
+    site.service.handle_status(Status.model_validate(held).encode())
+    assert site.look(100) == []
+    site.service.handle_presence(Presence(alive_key("alpha", "simulator"), is_alive=False))
+    assert ("samples_stale", "unacknowledged") in site.look(61)
+
+
 def test_a_stopped_plc_is_told_from_the_figures_of_the_gateway():
     site = Site()
     site.sample()

@@ -114,8 +114,8 @@ def test_a_station_under_maintenance_calls_nobody_by_what_the_crew_does(tmp_path
     site = Station(folder=tmp_path)
     site.stands(10, fault("act"))
     assert site.act("maintenance", alarm="station", reason="pumps are pulled").is_done
-    assert site.news() == [("main.system_fault", "suppressed")]
-    assert site.told[0].reason == "pumps are pulled"
+    assert site.news() == [("station", "suppressed"), ("main.system_fault", "suppressed")]
+    assert [told.reason for told in site.told] == ["pumps are pulled"] * 2
     assert site.stands(20, fault("act"), fault("act", asset="pump:2")) == [("pump2.pump_fault", "suppressed")]
     assert site.calls() == 1
     site.service.save()
@@ -125,16 +125,31 @@ def test_a_station_under_maintenance_calls_nobody_by_what_the_crew_does(tmp_path
     assert site.act("maintenance", alarm="station").reason == "maintenance: the station is maintenance"
     site.wall_s = 2.0
     assert site.act("resume", alarm="station").is_done
-    assert sorted(site.news()) == [("main.system_fault", "unacknowledged"), ("pump2.pump_fault", "unacknowledged")]
+    faults = [("main.system_fault", "unacknowledged"), ("pump2.pump_fault", "unacknowledged")]
+    assert sorted(site.news()) == [*faults, ("station", "normal")]
     audit = (tmp_path / "alarm-audit.jsonl").read_text()
     assert audit.count('"alarm": "station"') == 3
+
+
+def test_that_a_station_is_under_maintenance_is_told_even_where_nothing_else_is_and_after_a_restart(tmp_path):
+    site = Station(folder=tmp_path)
+    site.sample()
+    site.news()
+    site.act("maintenance", alarm="station", reason="pumps are pulled")
+    assert site.news() == [("station", "suppressed")]
+    site.start()
+    (told,) = site.service.registry.alarms()
+    assert (told.text, told.reason, told.state) == ("under maintenance", "pumps are pulled", "suppressed")
+    site.wall_s = 1.0
+    assert site.act("resume", alarm="station").is_done
+    assert site.news() == [("station", "normal")]
 
 
 def test_a_stopped_station_may_be_silent_but_not_flood():
     site = Station(stale_after_s=30.0)
     site.sample()
     site.act("stop", alarm="station")
-    assert site.look(60.0) == [("samples_stale", "suppressed")]
+    assert site.look(60.0) == [("station", "suppressed"), ("samples_stale", "suppressed")]
     assert site.calls() == 0
     registry, at_ns = site.service.registry, START_NS + 100 * NS_PER_S
     for second in range(12):

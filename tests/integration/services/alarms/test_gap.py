@@ -59,6 +59,7 @@ def test_a_crew_at_the_station_is_no_gap():
     site = Watched()
     site.sample()
     assert site.act("maintenance", alarm="station", reason="new pump").is_done
+    site.news()
     assert site.gap(2, is_doubled=True) == [("model_gap", "suppressed")]
 
 

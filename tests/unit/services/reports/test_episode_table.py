@@ -42,5 +42,5 @@ def test_a_row_says_what_stands_and_names_no_cost_that_is_not_known():
     assert (row["to"], row["cost"], row["severity"]) == (
         "stands",
         "",
-        "friction_rise_percent 16 (15 to 17), limit 15",
+        "friction 16 % (15 to 17), limit 15 %",
     )

@@ -3,7 +3,7 @@
 import { html } from "../base/dom.js";
 import { who } from "../base/who.js";
 import { t } from "../base/words.js";
-import { actWord, textOf } from "./alarm_words.js";
+import { STATION, actWord, textOf } from "./alarm_words.js";
 
 const NAME = "operator";
 const MINUTES = [["15", t("15 minutes")], ["60", t("1 hour")], ["240", t("4 hours")], ["480", t("8 hours")], ["1440", t("1 day")]];
@@ -14,7 +14,7 @@ export function askAct(alarms, act, tell) {
   const minutes = act === "shelve" ? html("select", { name: "minutes" }, ...MINUTES.map(([value, word]) => html("option", { value }, word))) : null;
   const reason = html("input", { name: "reason", maxlength: 500 });
   const dialog = html("dialog", { "aria-labelledby": "act-title" });
-  const what = alarms.length === 1 ? (alarms[0].id === "station" ? alarms[0].text : textOf(alarms[0])) : t("{count} alarms", { count: alarms.length });
+  const what = alarms.length === 1 ? (alarms[0].id === STATION ? alarms[0].text : textOf(alarms[0])) : t("{count} alarms", { count: alarms.length });
   const form = html("form", { method: "dialog" },
     html("h2", { id: "act-title" }, `${actWord(act)}: ${what}`),
     html("label", {}, t("Your name"), by),

@@ -39,12 +39,14 @@ export function severityShort({ cause }) {
   return `${figure(cause.severity.value, digits)}${limit} ${unit}`;
 }
 
-/** An arrow and the growth in a day. */
+/** An arrow and the growth in a day; what its interval does not tell from none is none. */
 export function trendWords({ cause }) {
   const grows = cause?.trend?.per_day;
   if (!Number.isFinite(grows)) return "";
   const unit = QUANTITIES[cause.severity?.quantity]?.unit ?? "";
-  return `${grows > 0.005 ? "↗" : grows < -0.005 ? "↘" : "→"} ${figure(grows, 2)} ${unit}${t("/day")}`;
+  const [least, most] = cause.trend.interval;
+  if (least <= 0 && most >= 0) return "→";
+  return `${grows > 0 ? "↗" : "↘"} ${figure(grows, 2)} ${unit}${t("/day")}`;
 }
 
 export const costWords = ({ cause }) => (cause?.waiting_cost == null ? "" : figure(cause.waiting_cost, 0));

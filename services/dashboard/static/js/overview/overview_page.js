@@ -65,7 +65,7 @@ export function overviewPage(main, showLink) {
   );
 
   function exportShown() {
-    const names = ["name", "state", "at_fault", "stage", "since", "quantity", "value", "limit", "trend_per_day", "cost_of_waiting", "alarms"];
+    const names = ["name", "state", "at_fault", "stage", "since", "quantity", "value", "limit", "trend_per_day", "cost_of_waiting", "mode", "level", "flow", "power", "alarms"];
     download("stations.csv", csvOf(names, shown.map((station) => ({ ...station, ...station.cause?.severity, state: station.state, at_fault: causeWords(station), stage: stageWord(station),
       since: station.cause && new Date(station.cause.since_ms).toISOString(), trend_per_day: station.cause?.trend?.per_day, cost_of_waiting: station.cause?.waiting_cost }))));
   }

@@ -1,8 +1,10 @@
-// The pumps of a station in a line: filled while they run, in the colour of their state, with a word for each.
+// The pumps of a station in a line: filled while they run, in the colour of their state, with a word for each. A fault of their main is none of theirs.
 
 import { html, mark, svg } from "../base/dom.js";
 import { state } from "../base/states.js";
 import { t } from "../base/words.js";
+
+const own = (name) => (name === "system_fault" ? { kind: "calm", word: t("see main") } : state(name === "pump_and_system_fault" ? "pump_fault" : name));
 
 export function pumpIcons() {
   const element = html("span", { class: "pumps", role: "img" });
@@ -16,10 +18,10 @@ export function pumpIcons() {
     while (element.children.length > states.length) element.lastChild.remove();
     states.forEach((name, place) => {
       const pump = element.children[place];
-      mark(pump, "class", isGood ? `is-${state(name).kind}` : "is-calm not-good");
+      mark(pump, "class", isGood ? `is-${own(name).kind}` : "is-calm not-good");
       mark(pump.firstChild, "fill", running.includes(place + 1) ? "currentColor" : "none");
     });
-    const words = states.map((name, place) => t("pump {name} {does}, {state}", { name: `${place + 1}${names[place] ? ` (${names[place]})` : ""}`, does: running.includes(place + 1) ? t("runs") : t("stands"), state: state(name).word }));
+    const words = states.map((name, place) => t("pump {name} {does}, {state}", { name: `${place + 1}${names[place] ? ` (${names[place]})` : ""}`, does: running.includes(place + 1) ? t("runs") : t("stands"), state: own(name).word }));
     mark(element, "aria-label", words.join("; ") || t("no pumps"));
   }
   return { element, show };

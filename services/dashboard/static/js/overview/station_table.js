@@ -108,13 +108,14 @@ function stationLine() {
   const word = html("span");
   const chip = html("span", { class: "state" }, word);
   const name = html("a", { href: "/" });
+  const mode = html("span", { class: "note" });
   const pumps = pumpIcons();
   const fill = html("span", { class: "fill" });
   const level = html("span", { class: "value" });
   const cells = Object.fromEntries(["flow", "power", "gap", "alarms", "time", "cause", "stage", "since", "severity", "trend", "cost"].map((each) => [each, html("span")]));
   const cell = (kind, ...children) => html("div", { role: "cell", class: `cell ${kind}` }, ...children);
   const element = html("div", { class: "line", role: "row" },
-    cell("", chip), cell("", name), cell("cause", cells.cause), cell("cause", cells.stage), cell("cause", cells.since), cell("cause middle", cells.severity), cell("cause middle", cells.trend), cell("cause number", cells.cost),
+    cell("", chip), cell("name", name, mode), cell("cause asset", cells.cause), cell("cause", cells.stage), cell("cause", cells.since), cell("cause middle", cells.severity), cell("cause middle", cells.trend), cell("cause number", cells.cost),
     cell("middle", pumps.element), cell("gauge middle", html("span", { class: "track", "aria-hidden": "true" }, fill), level),
     cell("number wide", cells.flow), cell("number wide", cells.power), cell("number wide", cells.gap), cell("number middle", cells.alarms), cell("wide", cells.time));
   let shown = "";
@@ -134,6 +135,7 @@ function stationLine() {
       name.textContent = station.name;
       name.href = `/station/${encodeURIComponent(station.name)}`;
     }
+    say(mode, station.mode ? ` ${t(station.mode)}` : "");
     const [grade_, reason] = qualityOf(station, isLinked);
     pumps.show(station.pumps, station.running, station.names, grade_ === "good");
     const { floor } = station;

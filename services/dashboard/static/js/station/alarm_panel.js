@@ -1,10 +1,11 @@
 // Alarms of one station: those that stand, and of a range of the past those that stood in it.
 
 import { alarmList } from "../alarms/alarm_list.js";
+import { priorityWord, textOf } from "../alarms/alarm_words.js";
 import { absence } from "../base/absent.js";
 import { html, panel } from "../base/dom.js";
 import { csvOf, download } from "../base/export.js";
-import { lasting, moment, words } from "../base/format.js";
+import { lasting, moment } from "../base/format.js";
 import { t } from "../base/words.js";
 
 export function alarmPanel({ station, range, past }) {
@@ -29,7 +30,7 @@ export function alarmPanel({ station, range, past }) {
     table.hidden = range.isLive || !bands.length;
     if (table.hidden) return;
     rows.replaceChildren(...bands.slice(0, 100).map((band) => html("tr", {},
-      html("td", {}, html("button", { type: "button", class: "plain", onclick: () => range.pick(Math.min(to, Math.max(from, band.from))) }, band.text)), html("td", {}, words(band.priority)),
+      html("td", {}, html("button", { type: "button", class: "plain", onclick: () => range.pick(Math.min(to, Math.max(from, band.from))) }, textOf(band))), html("td", {}, priorityWord(band.priority)),
       html("td", {}, moment(band.from)), html("td", {}, band.to ? lasting((band.to - band.from) / 1000) : t("still there")))));
   }
 

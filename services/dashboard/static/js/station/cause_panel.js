@@ -2,21 +2,14 @@
 
 import { absence } from "../base/absent.js";
 import { html, panel, say } from "../base/dom.js";
-import { day, figure, millis, moment } from "../base/format.js";
+import { millis, moment } from "../base/format.js";
 import { grade } from "../base/quality.js";
 import { STAGES, assetWords, icon, kindOf, stageOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 import { moneyOf } from "./money.js";
 import { residualCharts } from "./residual_charts.js";
-import { QUANTITIES, severityPicture, severityWords } from "./severity.js";
+import { severityPicture, sizeWords } from "./severity.js";
 import { statisticsOf } from "./statistics.js";
-
-/** Growth by the day; what its interval does not tell from none is none. */
-function growthWords({ per_day: perDay, interval }, quantity) {
-  const value = `${figure(Math.abs(perDay), 2)} ${QUANTITIES[quantity]?.unit ?? ""}`.trim();
-  if (interval[0] > 0) return t("it grows by {value} a day", { value });
-  return interval[1] < 0 ? t("it shrinks by {value} a day", { value }) : t("no growth is seen");
-}
 
 export function causePanel(view) {
   const { station, range, past, chosen, choose } = view;
@@ -85,11 +78,7 @@ export function causePanel(view) {
       return { normal: t("Pump {name} and its main are as they were learnt.", { name: station.called(verdict.pump) }), learning: t("The healthy station is being learnt.") }[station.pumpState(verdict.pump)] ?? `${t("Not enough is known to judge")}${reason}.`;
     }
     const words_ = assetWords(fault.asset, (number) => station.called(number));
-    const parts = [t("{asset} is at fault since {time}", { asset: words_.charAt(0).toUpperCase() + words_.slice(1), time: moment(millis(fault.since)) })];
-    if (fault.severity) parts.push(severityWords(fault.severity));
-    const { trend } = fault;
-    if (trend) parts.push(growthWords(trend, fault.severity?.quantity));
-    if (trend?.reaches_limit) parts.push(t("the limit is reached on {day}{interval}", { day: day(millis(trend.reaches_limit)), interval: trend.interval_at?.every(Boolean) ? ` (${day(millis(trend.interval_at[0]))} – ${day(millis(trend.interval_at[1]))})` : "" }));
+    const parts = [t("{asset} is at fault since {time}", { asset: words_.charAt(0).toUpperCase() + words_.slice(1), time: moment(millis(fault.since)) }), ...sizeWords(fault)];
     const stage = STAGES[fault.stage];
     return `${parts.join(", ")}.${stage ? ` ${stage.word.charAt(0).toUpperCase()}${stage.word.slice(1)}: ${stage.says}.` : ""}`;
   }

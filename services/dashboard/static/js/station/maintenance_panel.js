@@ -102,6 +102,8 @@ export function maintenancePanel({ station }) {
     element,
     update(changed) {
       if (station.pumps) showAssets();
+      const mode = station.mode?.text ?? "";
+      for (const button of modes.children) button.setAttribute("aria-pressed", { maintenance: "under maintenance", stop: "stopped", resume: "" }[button.dataset.mode] === mode);
       if (station.begun && (changed.has("begin") || performance.now() - asked > (awaited ? SOON_MS : AGAIN_MS))) load();
     },
   };

@@ -36,7 +36,7 @@ export function pastStore(station, range, told) {
   /** An alarm that has stood since before the range has not changed in it: the page knows it from the alarms of now. */
   function withStanding(bands) {
     const standing = [...station.alarms.values()].filter((alarm) => alarm.is_active && alarm.raised && !bands.some((band) => band.id === alarm.id && band.to === null));
-    return [...standing.map(({ id, pump, priority, text, raised }) => ({ id, pump, priority, text, from: millis(raised), to: null })), ...bands];
+    return [...standing.map((alarm) => ({ ...alarm, from: millis(alarm.raised), to: null })), ...bands];
   }
 
   /** The moment that is looked at; of a range that moves on, its end as it was asked for. */

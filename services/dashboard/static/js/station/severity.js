@@ -1,7 +1,7 @@
 // How far a fault has gone: in words, and as a bar beside its limits.
 
 import { html, svg } from "../base/dom.js";
-import { figure, signed } from "../base/format.js";
+import { day, figure, millis, signed } from "../base/format.js";
 import { kindOf } from "../base/states.js";
 import { t } from "../base/words.js";
 
@@ -11,6 +11,7 @@ export const QUANTITIES = {
   speed_loss_percent: { word: t("loss of speed"), unit: "%", digits: 1, doubt: OF_PUMP },
   friction_rise_percent: { word: t("more friction"), unit: "%", digits: 1, doubt: OF_MAIN },
   static_head_rise_m: { word: t("more static head"), unit: "m", digits: 2 },
+  meter_error_percent: { word: t("error"), unit: "%", digits: 1 },
   wear_head_percent: { word: t("loss of head"), unit: "%", digits: 1, doubt: OF_PUMP },
 };
 const WIDTH = 420;
@@ -23,6 +24,21 @@ export function severityWords({ quantity, value, interval, limit }) {
   const range = interval ? ` (${signed(interval[0], digits)} ${t("to")} ${signed(interval[1], digits)})` : "";
   const bound = limit == null ? "" : t(", limit {value} {unit}", { value: figure(limit, digits), unit });
   return `${word} ${figure(value, digits)} ${unit}${range}${bound}`;
+}
+
+/** Growth by the day; what its interval does not tell from none is none. */
+function growthWords({ per_day: perDay, interval }, quantity) {
+  const value = `${figure(Math.abs(perDay), 2)} ${formOf(quantity).unit}`.trim();
+  if (interval[0] > 0) return t("it grows by {value} a day", { value });
+  return interval[1] < 0 ? t("it shrinks by {value} a day", { value }) : t("no growth is seen");
+}
+
+/** How far a fault, or what an alarm tells of one, has gone, how it grows, and when it reaches the limit: a part of a sentence each. */
+export function sizeWords({ severity, trend }) {
+  const parts = severity ? [severityWords(severity)] : [];
+  if (trend) parts.push(growthWords(trend, severity?.quantity));
+  if (trend?.reaches_limit) parts.push(t("the limit is reached on {day}{interval}", { day: day(millis(trend.reaches_limit)), interval: trend.interval_at?.every(Boolean) ? ` (${day(millis(trend.interval_at[0]))} – ${day(millis(trend.interval_at[1]))})` : "" }));
+  return parts;
 }
 
 /** A bar from nothing to beyond the limit, with the interval as a whisker; half of the limit is where a visit is planned. Below it stands what cannot be told apart. */

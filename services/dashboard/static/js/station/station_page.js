@@ -2,7 +2,7 @@
 
 import { query, remember } from "../base/address.js";
 import { announce, html, say } from "../base/dom.js";
-import { moment, zone } from "../base/format.js";
+import { millis, moment, zone } from "../base/format.js";
 import { pastOf } from "../base/past.js";
 import { grade } from "../base/quality.js";
 import { icon, isFault, state as look } from "../base/states.js";
@@ -40,9 +40,10 @@ export function stationPage(name, main, showLink) {
   const word = html("span");
   const chip = html("span", { class: "state", id: "station-state" }, word);
   const time = html("span", { class: "note", id: "station-time" });
+  const mode = html("span", { class: "strong", id: "station-mode", role: "status" });
   const choice = html("div", { class: "buttons", role: "group", "aria-label": t("Pump") });
   const clock = plantClock(station);
-  const head = html("div", { class: "tools station-head" }, html("h1", {}, name), chip, time, clock.element, choice, range.element);
+  const head = html("div", { class: "tools station-head" }, html("h1", {}, name), chip, mode, time, clock.element, choice, range.element);
   const unknown = html("div", { class: "absent", role: "alert", id: "unknown-station", hidden: true }, html("h1", {}, name),
     t("There is no station {name}: nothing was heard of it, and the historian does not know it.", { name }), " ", html("a", { href: "/" }, t("All stations")));
   const panels = PANELS.map((make) => make(view));
@@ -81,6 +82,7 @@ export function stationPage(name, main, showLink) {
     grade(chip, station.state === "no_data" ? "good" : kind, reason); // "no data" says it itself
     grade(time, kind, reason);
     say(time, station.time ? `${moment(station.time)} ${zone(station.time)}${reason ? `, ${reason}` : ""}` : t("no sample yet"));
+    say(mode, modeWords(station.mode));
     range.show();
     past.update();
     showChoice();
@@ -135,6 +137,13 @@ export function stationPage(name, main, showLink) {
       for (const each of panels) each.end?.();
     },
   };
+}
+
+/** Why no alarm comes of faults: who has put the station into what, since when. */
+function modeWords(told) {
+  if (!told) return "";
+  const reason = told.reason ? `: ${told.reason}` : "";
+  return `${t(told.text)}${t(" by {name}", { name: told.by })}, ${t("since {time}", { time: moment(millis(told.raised)) })}${reason}`;
 }
 
 function byPump(verdicts) {

@@ -1,5 +1,6 @@
 // What the page knows of one station: takes frames, keeps the last samples, verdicts and alarms.
 
+import { STATION } from "../alarms/alarm_words.js";
 import { millis } from "../base/format.js";
 import { Currency } from "../base/quality.js";
 import { faultsOf, isOfMain, kindOf, speaksOf, stageOf, state } from "../base/states.js";
@@ -212,6 +213,11 @@ export class StationState {
     for (const verdict of this.judged)
       for (const fault of this.faults(verdict.pump)) found.set(fault.asset, { fault, pump: verdict.pump, verdict });
     return [...found.values()].sort((a, b) => rank(b.fault) - rank(a.fault));
+  }
+
+  /** What somebody has put the station into, as an alarm tells it: under maintenance, stopped; undefined in operation. */
+  get mode() {
+    return [...this.alarms.values()].find((alarm) => alarm.id === STATION && alarm.state !== "normal");
   }
 
   get numbers() {

@@ -1,6 +1,7 @@
 // Stacked trends over the range of the page: bands of verdicts and alarms, then level, flow, head, frequency and power,
 // under one cursor. Drag to zoom, click to look at a moment.
 
+import { textOf } from "../alarms/alarm_words.js";
 import { chart, pen } from "../base/chart.js";
 import { html, panel, say } from "../base/dom.js";
 import { csvOf, download } from "../base/export.js";
@@ -150,7 +151,7 @@ export function trendPanel({ station, range, past, chosen, choose }) {
     const during = (band) => band.from <= ms && (band.to ?? Infinity) > ms;
     const band = bandsOf().verdicts.filter((each) => each.pump === number).findLast(during);
     if (band) parts.push(STATES[band.state]?.word ?? band.state, stageOf(band)?.word);
-    for (const alarm of bandsOf().alarms.filter(during)) parts.push(alarm.text);
+    for (const alarm of bandsOf().alarms.filter(during)) parts.push(textOf(alarm));
     say(readout, `${moment(times[place])}, ${t("pump {name}", { name: station.called(number) })}: ${parts.filter(Boolean).join(", ")}`);
   }
 

@@ -4,7 +4,7 @@ import { absence } from "../base/absent.js";
 import { html, mark, panel, say, svg } from "../base/dom.js";
 import { NONE, figure, moment } from "../base/format.js";
 import { grade, reading, worst } from "../base/quality.js";
-import { icon, kindOf, stageOf, state } from "../base/states.js";
+import { icon, isOfMain, kindOf, stageOf, state } from "../base/states.js";
 import { t } from "../base/words.js";
 
 const WIDTH = 560;
@@ -85,16 +85,18 @@ export function wellPanel({ station, past, chosen, choose }) {
     grade(inflowText, inflow.kind === "never" ? "good" : inflow.kind);
     mains.forEach((each, place) => showMain(each, place));
     const flows = station.mains.map((name, place) => ({ name: name ?? t("rising main"), ...mainFlow(place) }));
-    say(mainText, flows.map(({ name, flow }) => `${name} ${figure(flow, 0)} m³/h`).join(", ") + mainWords());
+    say(mainText, flows.map(({ name, flow }, place) => `${name} ${figure(flow, 0)} m³/h${mainWords(place)}`).join("; "));
     grade(mainText, worst(flows.map(({ kind }) => kind)));
-    mark(mainText, "class", station.mains.some((_, place) => station.mainFault(place)) ? `strong is-${kindOf(station.mains.map((_, place) => station.mainFault(place)).find(Boolean))}` : "");
+    const worstOfMain = station.causes.find(({ fault }) => isOfMain(fault))?.fault;
+    mark(mainText, "class", worstOfMain ? `strong is-${kindOf(worstOfMain)}` : "");
     grade(drawing, station.shownKind);
     away.show(station.then || station.has("source") || station.shownKind === "never");
     say(element.querySelector("h2"), station.then ? t("Wet well and pumps at {time}", { time: moment(past.moment) }) : t("Wet well and pumps"));
     for (const each of pumps) each.update(station, chosen());
     const told = pumps.map((_, place) => t("pump {name} {does}, {state}", { name: station.called(place + 1), does: station.isRunning(place + 1) ? t("runs") : t("stands"), state: station.pumpLook(place + 1).word }));
     const reason = station.shownReason;
-    say(words, `${reason ? `${reason}. ` : ""}${t("Level {value} m.", { value: figure(level.value, 2) })} ${told.join("; ")}.${mainWords()}`);
+    told.push(...flows.map(({ name }, place) => mainWords(place) && `${name}${mainWords(place)}`).filter(Boolean));
+    say(words, `${reason ? `${reason}. ` : ""}${t("Level {value} m.", { value: figure(level.value, 2) })} ${told.join("; ")}.`);
   }
 
   /** The pipe of a main in the colour of what is said of it; its pumps keep theirs. */
@@ -102,11 +104,11 @@ export function wellPanel({ station, past, chosen, choose }) {
     const fault = station.mainFault(place);
     mark(each, "class", `main is-${fault ? kindOf(fault) : "calm"}${fault ? " fault" : ""}`);
     mark(each, "data-state", fault?.state ?? "normal");
-    say(each.querySelector("title"), fault ? mainWords() : "");
+    say(each.querySelector("title"), `${station.mains[place] ?? t("rising main")}${mainWords(place)}`);
   }
 
-  function mainWords() {
-    const fault = station.mains.map((_, place) => station.mainFault(place)).find(Boolean);
+  function mainWords(place) {
+    const fault = station.mainFault(place);
     if (!fault) return "";
     const stage = stageOf(fault);
     return `, ${state(fault.state).word}${stage ? `: ${stage.word}` : ""}`;
