@@ -263,7 +263,9 @@ def test_the_watched_gap_is_a_sentence_two_pictures_and_names(fed, open_page, ax
     expect(line.get_by_role("row").filter(has_text=f"s-{WATCHED:04}")).to_contain_text("1.9, doubled")
 
 
-@pytest.mark.parametrize("path", ["/", f"/station/s-{WATCHED:04}", "/station/s-0042", "/alarms", "/station/nowhere"])
+@pytest.mark.parametrize(
+    "path", ["/", f"/station/s-{WATCHED:04}", "/station/s-0042", "/alarms", "/health", "/station/nowhere"]
+)
 def test_no_english_is_left_on_a_german_page(fed, open_page, path) -> None:
     page = open_page(fed.url + path, locale="de-DE", timezone_id="Europe/Berlin", may_lose_its_server=True)
     expect(page.get_by_role("heading", level=1).first).to_be_visible()

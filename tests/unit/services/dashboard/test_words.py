@@ -8,6 +8,7 @@ import pytest
 
 from wetwell.detector.verdict.maintenance import _ADVICE, _CURED
 from wetwell.services.alarms.rules import RULES
+from wetwell.services.runtime.health.metrics import METRICS
 from wetwell.simulator.effects import LIBRARY
 from wetwell.simulator.effects.effect import Component
 
@@ -16,6 +17,21 @@ LANGUAGES = ("de",)
 SERVICES_SAY = {*_ADVICE.values(), *_CURED, *(rule.advice for rule in RULES.values())}
 SERVICES_NAME = {name.replace("_", " ") for name in (*LIBRARY, *get_args(Component))}
 """Effects and places by which the watch calls a gap."""
+OF_OTHERS = (
+    *("taken", "committed", "waiting", "failed_commits", "commit_age_s", "lag_s", "live_bytes", "disk_free_bytes"),
+    *(
+        "clients",
+        "is_connected",
+        "connections",
+        "reconnects",
+        "good_polls",
+        "last_good_poll_age_s",
+        "heartbeat_age_s",
+    ),
+    *("missing", "stuck", "dead", "noisy"),
+)
+SERVICES_COUNT = {re.sub(r"_(s|bytes)$", "", name).replace("_", " ") for name in (*METRICS, *OF_OTHERS)}
+"""Health figures as the page shows them, and what a verdict finds of meters."""
 
 
 def modules(folder):
@@ -44,7 +60,7 @@ def test_the_page_has_texts():
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_catalogue_lacks_no_text_and_holds_no_other(language):
-    wanted = page_texts() | SERVICES_SAY | SERVICES_NAME
+    wanted = page_texts() | SERVICES_SAY | SERVICES_NAME | SERVICES_COUNT
     assert sorted(wanted - catalogue(language).keys()) == []
     assert sorted(catalogue(language).keys() - wanted) == []
 

@@ -9,7 +9,7 @@ import { figure, moment, zone } from "../base/format.js";
 import { grade } from "../base/quality.js";
 import { absence } from "../base/absent.js";
 import { STATES, faultsOf, isOfMain, kindOf, stageOf } from "../base/states.js";
-import { t } from "../base/words.js";
+import { language, t } from "../base/words.js";
 
 const OF_PUMPS = [
   { column: "flow_m3h", name: "flow", word: t("Flow"), unit: "m³/h", digits: 0 },
@@ -147,7 +147,7 @@ export function trendPanel({ station, range, past, chosen, choose }) {
     if (place < 0) place = times.length - 1;
     const number = chosen();
     const parts = [t("level {value} m", { value: figure(values.level_m?.[place], 2) })];
-    for (const { column, word, unit, digits } of OF_PUMPS) parts.push(`${word.toLowerCase()} ${figure(values[`pump${number}_${column}`]?.[place], digits)} ${unit}`);
+    for (const { column, word, unit, digits } of OF_PUMPS) parts.push(`${language === "en" ? word.toLowerCase() : word} ${figure(values[`pump${number}_${column}`]?.[place], digits)} ${unit}`);
     const during = (band) => band.from <= ms && (band.to ?? Infinity) > ms;
     const band = bandsOf().verdicts.filter((each) => each.pump === number).findLast(during);
     if (band) parts.push(STATES[band.state]?.word ?? band.state, stageOf(band)?.word);
