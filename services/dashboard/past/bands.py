@@ -7,9 +7,9 @@ from wetwell.protocols.messages.alarm import Priority
 
 Band = dict[str, Any]
 
-RISING_PRIORITIES = get_args(Priority)
+URGENCY = get_args(Priority)
 """The most urgent last."""
-_TOLD_LAST = ("id", "pump", "text", "asset", "stage", "severity", "trend")
+_OF_BAND = ("id", "pump", "text", "asset", "stage", "severity", "trend")
 
 
 def verdict_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
@@ -67,8 +67,8 @@ def alarm_bands(changes: Iterable[Mapping[str, Any]]) -> list[Band]:
             band = standing[name] = {"priority": change["priority"], "from": raised, "to": None}
             bands.append(band)
         if band is not None and change.get("raised") == band["from"]:
-            band["priority"] = max(band["priority"], change["priority"], key=RISING_PRIORITIES.index)
-            band.update({key: change.get(key) for key in _TOLD_LAST})
+            band["priority"] = max(band["priority"], change["priority"], key=URGENCY.index)
+            band.update({key: change.get(key) for key in _OF_BAND})
         if band is not None and not change.get("is_active"):
             band["to"] = band["to"] or change.get("returned") or change["time"]
     return bands
