@@ -31,13 +31,16 @@ def open_socket(host: str, port: int) -> socket.socket:
         If the address cannot be listened on.
     """
     try:
-        return socket.create_server(
+        listener = socket.create_server(
             (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET, backlog=512
         )
     except OSError as error:
         raise LinkError(
             f"dashboard {host}:{port}: cannot listen: {(error.strerror or str(error)).lower()}"
         ) from error
+    # asyncio does so for sockets that name their protocol; else a body waits 40 ms for the receipt of its head.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listener
 
 
 @contextlib.asynccontextmanager

@@ -1,5 +1,6 @@
 """Alarms and acts of people on the page: filters, several at once, the journal, what crews did."""
 
+import csv
 import re
 
 import pytest
@@ -114,3 +115,36 @@ def test_a_station_under_maintenance_says_so_on_every_page_until_it_is_back(site
         page.get_by_role("dialog").get_by_role("button", name="back in operation").click()
     expect(mode).to_have_text("")
     expect(modes.get_by_role("button", name="back in operation")).to_have_attribute("aria-pressed", "true")
+
+
+def test_the_dialog_of_an_act_can_be_used_by_everybody(site, open_page, axe) -> None:
+    page = open_page(f"{site.url}/alarms")
+    page.get_by_role("row").filter(has_text="level high").get_by_role("button", name="shelve").click()
+    expect(page.get_by_role("dialog", name=re.compile("^shelve: level high"))).to_be_visible()
+    assert axe(page) == []
+
+
+def test_alarms_of_the_list_can_be_taken_along(site, open_page, tmp_path) -> None:
+    page = open_page(f"{site.url}/alarms")
+    expect(page.get_by_role("row").filter(has_text="level high")).to_be_visible()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="download what is drawn").click()
+    download.value.save_as(tmp_path / "alarms.csv")
+    with (tmp_path / "alarms.csv").open() as file:
+        rows = {row["id"]: row for row in csv.DictReader(file)}
+    assert (rows["level_high"]["station"], rows["level_high"]["priority"]) == ("alpha", "high")
+
+
+def test_episodes_and_energy_of_a_range_can_be_taken_along(site, open_page, tmp_path) -> None:
+    page = open_page(f"{site.url}/station/alpha?span=24h")
+    expect(page.locator(".episodes tbody tr").filter(has_text="pump 2").first).to_be_visible(timeout=150_000)
+    expect(page.locator(".is-kpi table")).to_contain_text("Pump 2")
+    found = {}
+    for panel in (".is-episodes", ".is-kpi"):
+        with page.expect_download() as download:
+            page.locator(panel).get_by_role("button", name="download what is drawn").click()
+        download.value.save_as(tmp_path / f"{panel}.csv")
+        with (tmp_path / f"{panel}.csv").open() as file:
+            found[panel] = list(csv.DictReader(file))
+    assert "pump:2" in [row["asset"] for row in found[".is-episodes"]]
+    assert found[".is-kpi"]

@@ -198,6 +198,7 @@ def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_po
         ("/station/alpha", "light"),
         ("/station/alpha", "dark"),
         ("/station/alpha?span=24h", "light"),
+        ("/station/alpha?from=2025-01-01T04:00:00Z&to=2025-01-01T08:00:00Z&at=2025-01-01T07:30:00Z", "dark"),
         ("/alarms", "dark"),
         ("/alarms?show=journal", "light"),
         ("/reports", "light"),
