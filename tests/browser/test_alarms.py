@@ -135,6 +135,18 @@ def test_alarms_of_the_list_can_be_taken_along(site, open_page, tmp_path) -> Non
     assert (rows["level_high"]["station"], rows["level_high"]["priority"]) == ("alpha", "high")
 
 
+def test_what_stands_at_a_station_can_be_taken_along_while_it_is_live(site, open_page, tmp_path) -> None:
+    page = open_page(f"{site.url}/station/alpha")
+    panel = page.locator(".is-alarms")
+    expect(panel.get_by_role("row").filter(has_text="level high")).to_be_visible()
+    with page.expect_download() as download:
+        panel.get_by_role("button", name="download what is drawn").click()
+    download.value.save_as(tmp_path / "alarms.csv")
+    with (tmp_path / "alarms.csv").open() as file:
+        rows = {row["alarm"]: row for row in csv.DictReader(file)}
+    assert rows["level_high"]["state"] in {"unacknowledged", "acknowledged", "returned"}
+
+
 def test_episodes_and_energy_of_a_range_can_be_taken_along(site, open_page, tmp_path) -> None:
     page = open_page(f"{site.url}/station/alpha?span=24h")
     expect(page.locator(".episodes tbody tr").filter(has_text="pump 2").first).to_be_visible(timeout=150_000)

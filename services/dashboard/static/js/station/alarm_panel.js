@@ -19,9 +19,13 @@ export function alarmPanel({ station, range, past }) {
   element.classList.add("is-alarms");
   let bands = [];
 
+  const listed = () => [...station.alarms.values()].filter((alarm) => alarm.state !== "normal");
+
   function exportShown() {
     const iso = (ms) => (ms == null ? "" : new Date(ms).toISOString());
-    download(`${station.name}-alarms.csv`, csvOf(["alarm", "priority", "from", "to", "text"], bands.map(({ id, priority, from, to, text }) => ({ alarm: id, priority, from: iso(from), to: iso(to), text }))));
+    const standing = listed().map(({ id, raised, returned, ...alarm }) => ({ ...alarm, alarm: id, from: raised, to: returned }));
+    const past_ = table.hidden ? [] : bands.filter((band) => band.to != null).map(({ id, from, to, ...band }) => ({ ...band, state: "", alarm: id, from: iso(from), to: iso(to) }));
+    download(`${station.name}-alarms.csv`, csvOf(["alarm", "priority", "state", "from", "to", "text"], [...standing, ...past_]));
   }
 
   function showRange() {
@@ -39,7 +43,7 @@ export function alarmPanel({ station, range, past }) {
     update(changed) {
       const isThere = station.has("alarms");
       away.show(isThere);
-      if (["alarms", "services", "begin"].some((name) => changed.has(name))) list.show([...station.alarms.values()].filter((alarm) => alarm.state !== "normal"), { isWatched: isThere });
+      if (["alarms", "services", "begin"].some((name) => changed.has(name))) list.show(listed(), { isWatched: isThere });
       if (changed.has("bands") || changed.has("range")) showRange();
     },
   };
