@@ -28,13 +28,14 @@ def worst_cause(verdicts: Iterable[Verdict]) -> Cause | None:
     >>> cause["asset"], cause["stage"], cause["waiting_cost"]
     ('pump:2', None, 30.0)
     """
-    verdicts = sorted(verdicts, key=lambda verdict: verdict.time)
     newest = {cause["asset"]: cause for causes in standing_causes(verdicts).values() for cause in causes}
     return max(newest.values(), key=_weight, default=None)
 
 
 def standing_causes(verdicts: Iterable[Verdict]) -> dict[int, list[Cause]]:
     """What is at fault by the last verdict on each pump, but for what the newest one on that asset does not tell.
+
+    The pump that was judged last comes last.
 
     Examples
     --------

@@ -12,7 +12,7 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.dashboard.view.cause import states_of, worst_cause
+from wetwell.services.dashboard.view.cause import Cause, states_of, worst_cause
 from wetwell.services.dashboard.view.sample_row import NS_PER_MS, live_figures, number, sample_row, thinned
 
 ROWS_A_FRAME = 8
@@ -75,6 +75,8 @@ class StationView:
         self._names: list[str | None] = []
         self._verdicts: dict[int, deque[str]] = {}
         self._last_verdicts: dict[int, Verdict] = {}
+        self._states: Mapping[int, State] = {}
+        self._cause: Cause | None = None
         self._alarms: dict[str, Alarm] = {}
         self._statuses: dict[str, str] = {}
         self._alive: set[str] = set()
@@ -153,6 +155,8 @@ class StationView:
             return
         kept.append(text)
         self._last_verdicts[verdict.pump] = verdict
+        self._states = states_of(self._last_verdicts.values())
+        self._cause = worst_cause(self._last_verdicts.values())
         self._fresh.setdefault("verdicts", []).append(text)
 
     def handle_model(self, model: Model) -> None:
@@ -264,13 +268,12 @@ class StationView:
     def summary(self) -> dict[str, Any]:
         """What the overview shows of the station beside its live figures."""
         pumps = len(self.sample.pumps) if self.sample is not None else max(self._last_verdicts, default=0)
-        states = self._states
         active = [alarm for alarm in self._alarms.values() if alarm.state != "normal"]
         return {
             "name": self.name,
             "state": self.worst_state,
-            "pumps": [states.get(pump, "unknown") for pump in range(1, pumps + 1)],
-            "cause": worst_cause(self._last_verdicts.values()),
+            "pumps": [self._states.get(pump, "unknown") for pump in range(1, pumps + 1)],
+            "cause": self._cause,
             "stale": self.is_stale,
             "quality": None if self.sample is None else self.sample.quality,
             "names": self._names,
@@ -281,10 +284,6 @@ class StationView:
             "gap": None if self._gap is None else {"matters": self._gap.matters, "doubled": self._gap.is_doubled},
             "unacknowledged": sum(alarm.state in WAITING for alarm in active),
         }
-
-    @property
-    def _states(self) -> Mapping[int, State]:
-        return states_of(self._last_verdicts.values())
 
     @property
     def last_verdicts(self) -> Mapping[int, Verdict]:
@@ -301,8 +300,7 @@ class StationView:
         """State of its worst pump; `no_data` while no samples come, whatever was said before."""
         if self.is_stale:
             return "no_data"
-        states = list(self._states.values())
-        return max(states, key=lambda state: RANKS[state], default="unknown")
+        return max(self._states.values(), key=lambda state: RANKS[state], default="unknown")
 
     def live(self) -> str:
         """JSON array of place, time in ms, level, flow, power and running pumps."""
