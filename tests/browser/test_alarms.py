@@ -1,9 +1,9 @@
 """Alarms and acts of people on the page: filters, several at once, the journal, what crews did."""
 
-import csv
 import re
 
 import pytest
+from browser_site import rows_taken_along
 from playwright.sync_api import expect
 
 pytestmark = pytest.mark.check
@@ -127,11 +127,7 @@ def test_the_dialog_of_an_act_can_be_used_by_everybody(site, open_page, axe) -> 
 def test_alarms_of_the_list_can_be_taken_along(site, open_page, tmp_path) -> None:
     page = open_page(f"{site.url}/alarms")
     expect(page.get_by_role("row").filter(has_text="level high")).to_be_visible()
-    with page.expect_download() as download:
-        page.get_by_role("button", name="download what is drawn").click()
-    download.value.save_as(tmp_path / "alarms.csv")
-    with (tmp_path / "alarms.csv").open() as file:
-        rows = {row["id"]: row for row in csv.DictReader(file)}
+    rows = {row["id"]: row for row in rows_taken_along(page, page, tmp_path)}
     assert (rows["level_high"]["station"], rows["level_high"]["priority"]) == ("alpha", "high")
 
 
@@ -139,11 +135,7 @@ def test_what_stands_at_a_station_can_be_taken_along_while_it_is_live(site, open
     page = open_page(f"{site.url}/station/alpha")
     panel = page.locator(".is-alarms")
     expect(panel.get_by_role("row").filter(has_text="level high")).to_be_visible()
-    with page.expect_download() as download:
-        panel.get_by_role("button", name="download what is drawn").click()
-    download.value.save_as(tmp_path / "alarms.csv")
-    with (tmp_path / "alarms.csv").open() as file:
-        rows = {row["alarm"]: row for row in csv.DictReader(file)}
+    rows = {row["alarm"]: row for row in rows_taken_along(page, panel, tmp_path)}
     assert rows["level_high"]["state"] in {"unacknowledged", "acknowledged", "returned"}
 
 
@@ -151,12 +143,6 @@ def test_episodes_and_energy_of_a_range_can_be_taken_along(site, open_page, tmp_
     page = open_page(f"{site.url}/station/alpha?span=24h")
     expect(page.locator(".episodes tbody tr").filter(has_text="pump 2").first).to_be_visible(timeout=150_000)
     expect(page.locator(".is-kpi table")).to_contain_text("Pump 2")
-    found = {}
-    for panel in (".is-episodes", ".is-kpi"):
-        with page.expect_download() as download:
-            page.locator(panel).get_by_role("button", name="download what is drawn").click()
-        download.value.save_as(tmp_path / f"{panel}.csv")
-        with (tmp_path / f"{panel}.csv").open() as file:
-            found[panel] = list(csv.DictReader(file))
-    assert "pump:2" in [row["asset"] for row in found[".is-episodes"]]
-    assert found[".is-kpi"]
+    episodes = rows_taken_along(page, page.locator(".is-episodes"), tmp_path)
+    assert "pump:2" in [row["asset"] for row in episodes]
+    assert rows_taken_along(page, page.locator(".is-kpi"), tmp_path)

@@ -1,13 +1,12 @@
 """Pages of stations that a test feeds over a bus: a thousand of them, bad values, a watched gap, summer time."""
 
 import asyncio
-import csv
 import re
 from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
-from browser_site import Site, free_port, until, wetwell
+from browser_site import Site, free_port, rows_taken_along, until, wetwell
 from playwright.sync_api import expect
 
 from wetwell.detector.verdict.station_model import StationModel
@@ -178,11 +177,7 @@ def test_a_thousand_stations_stand_in_the_order_of_need_and_only_those_in_sight_
     page.get_by_label("Find a station").fill("s-05")
     expect(table).to_have_attribute("aria-rowcount", "101")
     page.get_by_label("Find a station").fill("")
-    with page.expect_download() as download:
-        page.get_by_role("button", name="download what is drawn").click()
-    download.value.save_as(fed.folder / "stations.csv")
-    with (fed.folder / "stations.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_taken_along(page, page, fed.folder)
     assert [row["name"] for row in rows[: len(FIRST)]] == FIRST
     assert len(rows) == STATIONS
     assert (rows[0]["at_fault"], rows[0]["stage"], rows[0]["cost_of_waiting"]) == ("pump 2", "act", "1500")

@@ -1,10 +1,10 @@
 """One time range for the whole station page: what it shows, how it is left again, what it gives out."""
 
-import csv
 import re
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from browser_site import rows_taken_along
 from playwright.sync_api import expect
 
 from wetwell.protocols.recordings.recording import read_recording
@@ -55,11 +55,7 @@ def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(site, op
     assert from_iso(span["from"]) <= recording.time_ns[0] < recording.time_ns[-1] <= from_iso(span["to"]) + 1_000_000
     assert len(recording.time_ns) > 1000
     assert recording.pumps == 3
-    with page.expect_download() as download:
-        page.locator(".is-trends").get_by_role("button", name="download what is drawn").click()
-    download.value.save_as(tmp_path / "drawn.csv")
-    with (tmp_path / "drawn.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = rows_taken_along(page, page.locator(".is-trends"), tmp_path)
     assert len(rows) == page.evaluate(f"{TRENDS}[1].data[0].length")
     assert {"level_m", "pump2_flow_m3h"} <= rows[0].keys()
     page.get_by_role("button", name="Back", exact=True).click()

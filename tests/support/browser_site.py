@@ -1,6 +1,7 @@
 """Daemons of a site as processes, for a browser to look at."""
 
 import contextlib
+import csv
 import json
 import os
 import socket
@@ -143,3 +144,13 @@ def whole_site(folder, scenario_text, stale_s=10.0):
                 place.processes["dashboard"] = stack.enter_context(page)
             place.processes[name] = stack.enter_context(wetwell(*command, **(of_alarms if name == "alarms" else {})))
         yield place
+
+
+def rows_taken_along(page, panel, folder):
+    """Rows of the CSV file that a panel, or the page itself, gives of what it draws."""
+    with page.expect_download() as download:
+        panel.get_by_role("button", name="download what is drawn").click()
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    with path.open() as file:
+        return list(csv.DictReader(file))

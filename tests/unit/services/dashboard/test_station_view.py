@@ -80,14 +80,23 @@ def test_names_that_somebody_makes_up_have_a_bound(view, monkeypatch):
     assert view.stations["s1"].sample.seq == 2
 
 
-def test_a_plant_that_is_held_has_not_lost_its_samples(view):
-    status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
-    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=True))
+SIMULATOR = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
+ALIVE = "wetwell/alpha/alive/simulator"
+
+
+@pytest.fixture
+def held(view):
+    """A plant that is held, and is not missed."""
+    view.handle_presence(Presence(ALIVE, is_alive=True))
     view.handle_sample(sample(1).encode())
-    view.handle_status(Status(**status, figures={"held": 1.0}).encode())
+    view.handle_status(Status(**SIMULATOR, figures={"held": 1.0}).encode())
     assert frame_of(view, 100.0)["stale"] is False
-    view.handle_status(Status(**status, figures={"held": 0.0}).encode())
-    assert frame_of(view, 120.0)["stale"] is True
+    return view
+
+
+def test_a_plant_that_is_held_has_not_lost_its_samples(held):
+    held.handle_status(Status(**SIMULATOR, figures={"held": 0.0}).encode())
+    assert frame_of(held, 120.0)["stale"] is True
 
 
 def test_a_fault_of_the_main_ends_with_the_newest_verdict_on_it(view):
@@ -111,14 +120,9 @@ def test_a_fault_of_the_main_ends_with_the_newest_verdict_on_it(view):
     assert json.loads(station("alpha"))["state"] == "normal"
 
 
-def test_a_plant_that_was_held_and_has_died_has_lost_its_samples(view):
-    status = {"time": 0, "station": "alpha", "service": "simulator", "state": "running"}
-    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=True))
-    view.handle_sample(sample(1).encode())
-    view.handle_status(Status(**status, figures={"held": 1.0}).encode())
-    assert frame_of(view, 100.0)["stale"] is False
-    view.handle_presence(Presence("wetwell/alpha/alive/simulator", is_alive=False))
-    assert frame_of(view, 120.0)["stale"] is True
+def test_a_plant_that_was_held_and_has_died_has_lost_its_samples(held):
+    held.handle_presence(Presence(ALIVE, is_alive=False))
+    assert frame_of(held, 120.0)["stale"] is True
 
 
 def frame_of(view, now_s, station="alpha"):
