@@ -104,9 +104,9 @@ class SensorParameters:
 
     The sensor: $y = g\, x_\tau + o$ with x damped by one or two first-order lags in a row, of which `followed` and
     `followed_again` are the shares of a step that they follow within a second and `carried` what the first still
-    brings to the second of where it was before, then noise $y (1 + \sigma n)$ (the
-    level: $y + \sigma n$) with $n$ white or AR(1), then 0 below a cutoff. The telemetry: a delay, rounding to a
-    quantum, and a value that is held until it has moved by a deadband.
+    brings to the second of where it was before, then noise $y (1 + \sigma n)$ (the level: $y + \sigma n$) with $n$
+    white or AR(1), then 0 below a cutoff. The telemetry: a delay, rounding to a quantum, and a value that is held
+    until it has moved by a deadband.
     """
 
     gain: float = 1.0
