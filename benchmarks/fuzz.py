@@ -25,6 +25,7 @@ try:
 except ImportError:
     sys.exit("atheris is not installed: pip install atheris")
 
+os.environ["NUMBA_DISABLE_JIT"] = "1"  # the compiler does not take code that is instrumented
 with atheris.instrument_imports(
     include=["wetwell.protocols", "wetwell.services", "wetwell.detector.snapshot", "pymodbus"]
 ):

@@ -123,6 +123,8 @@ def words_of(question: Question, pdu: bytes) -> list[int]:
         answer = _decoder.decode(pdu)
         code = answer.exception_code if isinstance(answer, ExceptionResponse) else 0
         raise RefusedError(code, f"{question}: refused with exception {code:02X}{_meaning(code)}")
+    if len(pdu) < 2:
+        raise WrongAnswerError(f"answer to {question}: {len(pdu)} bytes, must be 2 or more")
     size = -(-question.count // 8) if question.table in BIT_TABLES else 2 * question.count
     if len(pdu) != 2 + size or pdu[0] != function or pdu[1] != size:
         raise WrongAnswerError(

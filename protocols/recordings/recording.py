@@ -229,6 +229,7 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
     try:
         if suffix == ".parquet":
             table = pa.parquet.read_table(path)
+            _ = [(field.name, getattr(field.type, "tz", None)) for field in table.schema]  # raises if no UTF-8
             return table, Origin.of_metadata(table.schema.metadata or {})
         mark, header = _csv_header(path)
         types = {name: pa.float64() for name in header if _is_measured(name)}

@@ -40,6 +40,7 @@ _GUARDED = ("/events", "/api/", "/reports/", "/metrics")
 _LOGIN = "/api/login"
 _OPEN = (_LOGIN, "/api/who")
 _NEEDED = (401, "a token is needed")
+_NOT_ENCODED = (400, "what is asked must be percent-encoded")
 
 
 class Guard:
@@ -83,7 +84,11 @@ class Guard:
                     safe[name] = value
             await send(message)
 
-        refusal = (foreign_name(headers) if self._is_local else None) or foreign_act(scope["method"], headers)
+        refusal = (
+            (foreign_name(headers) if self._is_local else None)
+            or foreign_act(scope["method"], headers)
+            or (None if scope["query_string"].isascii() else _NOT_ENCODED)
+        )
         if refusal is None and self._tokens_file is not None:
             token = token_in(headers)
             holder, refusal = self._admitted(scope["method"], path, token)

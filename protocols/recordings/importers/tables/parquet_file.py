@@ -26,11 +26,11 @@ class ParquetFile(ExportFile):
         try:
             path.open("rb").close()
             self._file = pa.parquet.ParquetFile(path)
+            self.names = tuple(self._file.schema_arrow.names)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-        except pa.ArrowException as error:
+        except (pa.ArrowException, UnicodeDecodeError) as error:
             raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
-        self.names = tuple(self._file.schema_arrow.names)
         if mapping and mapping.columns.time not in self.names:
             there = ", ".join(map(repr, self.names[:8]))
             raise RecordingError(f"{path}: columns.time: there is no '{mapping.columns.time}', there is {there}")

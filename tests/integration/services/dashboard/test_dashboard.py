@@ -8,6 +8,7 @@ import socket
 import httpx
 import pytest
 from memory_bus import MemoryBus
+from starlette.types import Message
 
 from wetwell.protocols.bus.keys import (
     alarm_act_key,
@@ -213,6 +214,25 @@ def test_what_is_no_question_to_the_historian_is_told(query) -> None:
     answer = get(f"/api/stations/alpha/history?{query}", app_state_with(MemoryBus()))
     assert answer.status_code == 400
     assert answer.json()["error"]
+
+
+@pytest.mark.parametrize("path", ["/events", "/api/stations/alpha/history", "/api/stations/alpha/history/"])
+def test_a_query_that_is_not_encoded_is_refused(path) -> None:
+    """Browsers encode what they ask; the framework raises where somebody else does not."""
+    told = []
+
+    async def send(message: Message) -> None:
+        told.append(message)
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    head = {"type": "http", "http_version": "1.1", "method": "GET", "scheme": "http", "root_path": ""}
+    scope = head | {"path": path, "raw_path": path.encode(), "query_string": b"station=\xa7"}
+    scope |= {"headers": [(b"host", b"127.0.0.1")], "client": ("127.0.0.1", 1), "server": ("127.0.0.1", 80)}
+    asyncio.run(dashboard_app(app_state_with(MemoryBus()))(scope, receive, send))
+    assert told[0]["status"] == 400
+    assert b"percent-encoded" in told[1]["body"]
 
 
 @pytest.mark.parametrize("form", ["messages", "columns"])

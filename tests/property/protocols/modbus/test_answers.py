@@ -8,6 +8,7 @@ import os
 import struct
 from itertools import chain
 
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -95,6 +96,12 @@ def test_damaged_answers(case):
 @example(Question(1, 1, "input", 0, 1), b"\x00\x01\x00\x00\x00\x03\x01\x80\x00")
 def test_noise(question, frame):
     check(question, frame)
+
+
+@given(questions, st.binary(max_size=1))
+def test_what_is_too_short_for_an_answer(question, pdu):
+    with pytest.raises(WrongAnswerError, match=f"{len(pdu)} bytes, must be 2 or more"):
+        words_of(question, pdu)
 
 
 @given(questions)

@@ -9,6 +9,7 @@ import pyarrow.parquet
 import pytest
 
 from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.recordings.importers.tables.parquet_file import ParquetFile
 from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.recordings.recording import Recording, read_recording, write_recording
 from wetwell.protocols.timestamps import from_iso
@@ -30,6 +31,21 @@ def test_local_stamps_get_their_zone_and_others_keep_theirs(tmp_path):
     path = written(tmp_path / "r.csv", "2025-01-31 08:00:00", "2025-01-31T06:00:01Z", "2025-07-31 08:00:00")
     expected = ["2025-01-31T06:00:00Z", "2025-01-31T06:00:01Z", "2025-07-31T05:00:00Z"]
     assert read_recording(path, HELSINKI).time_ns.tolist() == [from_iso(text) for text in expected]
+
+
+def damaged_parquet(path, **columns):
+    """A file in whose schema one letter of "Xay" is no UTF-8."""
+    pa.parquet.write_table(pa.table(columns), path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(b"Xay", b"\xffay"))
+    return path
+
+
+def test_a_name_in_parquet_that_is_no_text_gives_one_line(tmp_path):
+    path = damaged_parquet(tmp_path / "r.parquet", time=["2025-01-31T06:00:00Z"], Xay=[1.0])
+    with pytest.raises(RecordingError, match=r"^[^\n]*r\.parquet: [^\n]*utf-8[^\n]*$"):
+        read_recording(path)
+    with pytest.raises(RecordingError, match=r"^[^\n]*r\.parquet: [^\n]*utf-8[^\n]*$"):
+        ParquetFile(path, None)
 
 
 def test_local_stamps_of_parquet_get_their_zone(tmp_path):

@@ -1,7 +1,9 @@
 """Exports as systems write them: what is made of them, what is told, and what is refused in one line."""
 
 import datetime as dt
+import re
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pyarrow as pa
@@ -394,3 +396,13 @@ def test_a_workbook_with_times_texts_and_empty_cells(bench):
     np.testing.assert_array_equal(done.recording.columns["pump1_flow_m3h"], [10.0, np.nan, 7.5])
     with pytest.raises(RecordingError, match=r"sheet: got 'Tabelle2', there are Daten"):
         convert([bench.folder / "export.xlsx"], bench.mapping(WIDE, top='sheet = "Tabelle2"'))
+
+
+def test_a_workbook_without_sheets_gives_one_line(bench):
+    whole, empty = bench.folder / "whole.xlsx", bench.folder / "empty.xlsx"
+    write_workbook(whole, [["Zeit", "LT1"], ["2024-11-15 23:00:00", 1.5]])
+    with ZipFile(whole) as source, ZipFile(empty, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, re.sub(rb"<sheet [^>]*>", b"", source.read(name)))
+    with pytest.raises(RecordingError, match=r"empty\.xlsx: sheet: there is none"):
+        convert([empty], bench.mapping(WIDE))
