@@ -29,9 +29,9 @@ class ExcelFile(ExportFile):
         try:
             with path.open("rb"):
                 book = python_calamine.load_workbook(str(path))
-            name = (mapping.sheet if mapping else None) or next(iter(book.sheet_names), None)
             if not book.sheet_names:
                 raise RecordingError(f"{path}: sheet: there is none")
+            name = (mapping.sheet if mapping else None) or book.sheet_names[0]
             if name not in book.sheet_names:
                 raise RecordingError(f"{path}: sheet: got '{name}', there are {', '.join(book.sheet_names)}")
             self._sheet = book.get_sheet_by_name(name)
