@@ -48,6 +48,7 @@ def run(*command: object, cwd: Path, **more: Path) -> str:
     environment = {
         name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))
     } | {name: str(path) for name, path in more.items()}
+    environment["NUMBA_OPT"] = "0"  # a new place has no machine code yet, and this compiles it in half of the time
     done = subprocess.run(
         list(map(str, command)), cwd=cwd, env=environment, capture_output=True, text=True, check=False
     )

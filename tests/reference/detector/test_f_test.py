@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from scipy import stats
 from scipy.special import betaln
+from statsmodels.regression.linear_model import OLS
 
 from wetwell.detector.statistics.curve_drift import pump_curve_f_test, system_curve_f_test
 from wetwell.detector.statistics.f_distribution import log_f_survival
@@ -16,8 +16,8 @@ from wetwell.detector.statistics.rolling_f_test import RollingFTest, scan
 
 def statsmodels_answer(null, extra, response):
     """F, log p, AIC of both models; the paper's AIC has no constant term, statsmodels' has m (1 + ln 2 pi)."""
-    restricted = sm.OLS(response, null).fit()
-    full = sm.OLS(response, np.column_stack([null, extra])).fit()
+    restricted = OLS(response, null).fit()
+    full = OLS(response, np.column_stack([null, extra])).fit()
     f, p, _ = full.compare_f_test(restricted)
     constant = response.size * (1.0 + math.log(2.0 * math.pi))
     return f, math.log(p), restricted.aic - constant, full.aic - constant
@@ -78,7 +78,7 @@ def test_pump_and_system_windows_agree_with_statsmodels(seed, loss_m_per_s):
 def test_f_agrees_with_the_wald_form_of_statsmodels():
     time_s, flow, head, speed = station_window(3)
     null, extra = drift_designs(time_s, flow / speed, 2)
-    fit = sm.OLS(head / speed**2, np.column_stack([null, extra])).fit()
+    fit = OLS(head / speed**2, np.column_stack([null, extra])).fit()
     wald = fit.f_test(np.eye(6)[3:])
     test = pump_curve_f_test(time_s, flow, head, speed)
     assert test.f == pytest.approx(float(wald.fvalue), rel=1e-8)

@@ -101,7 +101,7 @@ def test_flow_meters_that_wander_over_the_day_take_a_day_to_learn_and_then_give_
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("seed", [92011, 92015, 92016])
+@pytest.mark.parametrize("seed", [92011, *(pytest.param(seed, marks=pytest.mark.long) for seed in (92015, 92016))])
 def test_meters_that_wander_beside_slow_noise_give_no_alarm_before_the_day_is_learnt(alpha, seed):
     """What they make of health was carried along as a fault that stays."""
     sensors = alpha.sensors.model_copy(update={"correlation": 0.95})
