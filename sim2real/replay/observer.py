@@ -108,7 +108,7 @@ def hides_cycles(traces: Traces, station: Station) -> bool:
     return bool(traces.rate_s * carried_m_s > high_m - low_m)
 
 
-def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observer:
+def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: Floats) -> Observer:
     r"""Observer of a level in rows, or of one whose inflow is not measured: Kalman's filter of level and inflow.
 
     $$x = \begin{pmatrix} L \\ b \end{pmatrix}, \quad F = \begin{pmatrix} 1 & \Delta t \\ 0 & 1 \end{pmatrix}, \quad
@@ -125,6 +125,8 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observ
     station : Station
     drift_m2_s3 : float
         q, by which the variance of an unknown inflow over the area grows. [m²/s³]
+    level_m : (n,) array
+        Level of the recording, or what of it was sent where only changes are: NaN is "no value".
 
     References
     ----------
@@ -139,7 +141,7 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observ
     level_gain, inflow_gain = np.zeros(traces.seconds), np.zeros(traces.seconds)
     variance_m2 = np.full(traces.seconds, np.nan)
     _filter(
-        np.isfinite(traces.level_m),
+        np.isfinite(level_m),
         open_m2,
         noise_m**2,
         drift_m2_s3 if is_free else 0.0,
@@ -152,7 +154,7 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float) -> Observ
         variance_m2,
     )
     return Observer(
-        level_m=traces.level_m,
+        level_m=level_m,
         level_gain=level_gain,
         inflow_gain=inflow_gain,
         deviation_m=np.sqrt(variance_m2),

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -87,8 +88,7 @@ class Replay:
         self._forcing = self._healthy(inflow_m3h, None)
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
-        self._told_level_m = np.where(repeated(traces.level_m), np.nan, traces.level_m)
-        self.observer = self._observer()
+        self.observer = self._observer_of(traces.level_m)
 
     def run(self, effects: Sequence[Acting] = ()) -> Prediction:
         """Predict under effects; of those that change from period to period, the plant is that of the last.
@@ -192,11 +192,7 @@ class Replay:
         for run in self._kept:
             if run.key == key:
                 return run
-        observer = self.observer
-        if is_held:
-            is_constant = observer.deviation_m is None
-            told_m = self._told_level_m
-            observer = constant_observer(told_m) if is_constant else replace(observer, level_m=told_m)
+        observer = self._observer_of_changes if is_held else self.observer
         level_m, reading = self._computed(acting, plant, self.traces.frequency_hz, observer)
         run = _Run(key=key, level_m=level_m, reading=reading)
         self._kept = (*self._kept[1 - KEPT_RUNS :], run)
@@ -232,19 +228,26 @@ class Replay:
         )
         return level_m, reading
 
-    def _observer(self) -> Observer:
-        """Observer of the recording; where the inflow is not measured, with its likeliest drift by rows at rest."""
+    @cached_property
+    def _observer_of_changes(self) -> Observer:
+        """The same where only changes of the level are sent: a value that repeats the last one is none."""
+        level_m = self.traces.level_m
+        return self._observer_of(np.where(repeated(level_m), np.nan, level_m))
+
+    def _observer_of(self, level_m: Floats) -> Observer:
+        """Observer of a level; where the inflow is not measured, with its likeliest drift by rows at rest."""
         traces, station = self.traces, self.station
         if hides_cycles(traces, station):
-            return forced_observer(traces)
+            forced = forced_observer(traces)
+            return forced if level_m is traces.level_m else replace(forced, level_m=level_m)
         if traces.inflow_m3h is not None:
-            return constant_observer(traces.level_m) if traces.is_each_second else row_observer(traces, station, 0.0)
+            return constant_observer(level_m) if traces.is_each_second else row_observer(traces, station, 0.0, level_m)
         plant = self._plant(self.own)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
-        regime, is_known = regimes_of(traces, station).of_station, np.isfinite(traces.level_m)
+        regime, is_known = regimes_of(traces, station).of_station, np.isfinite(level_m)
         settled = is_known & _settled(regime)
         rows, calm = (settled & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
-        observers = [row_observer(traces, station, drift * carried_m_s**2) for drift in DRIFTS]
+        observers = [row_observer(traces, station, drift * carried_m_s**2, level_m) for drift in DRIFTS]
         tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
         best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
         squares, _ = self._squares(best, plant, calm)

@@ -47,14 +47,14 @@ def test_a_level_of_each_second_is_followed_slowly_and_begun_anew_after_a_pause(
 
 
 def test_after_a_start_whose_moment_is_open_the_level_is_taken_from_the_row_and_nobody_is_blamed(alpha, traces):
-    observer = row_observer(traces, alpha, 0.0)
+    observer = row_observer(traces, alpha, 0.0, traces.level_m)
     carried_m = 50.0 * 3600.0**-1 / alpha.sump.area_m2
     assert observer.deviation_m[3600] > 10.0 * observer.deviation_m[3540] > 0.1 * carried_m
     assert observer.level_gain[3600] > 0.99 > observer.level_gain[3540]
 
 
 def test_an_inflow_that_is_not_measured_is_followed_but_for_what_a_start_may_hide(alpha, traces):
-    observer = row_observer(replace(traces, inflow_m3h=None), alpha, 1e-12)
+    observer = row_observer(replace(traces, inflow_m3h=None), alpha, 1e-12, traces.level_m)
     assert observer.inflow_gain[3540] > 0.0
     assert observer.inflow_gain[3600] < 0.1 * observer.inflow_gain[3540]
     assert np.all(observer.deviation_m[3660:3780:60] >= observer.deviation_m[3540])

@@ -1,0 +1,26 @@
+"""Replay of a level of which only changes are sent: nobody measures the inflow, so that the observer follows what is."""
+
+import numpy as np
+import pytest
+
+from wetwell.protocols.station.station_file import EffectTable
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
+
+FROM_S = 7_200
+"""The observer knows the inflow from then on."""
+
+
+@pytest.mark.parametrize("deadband_m", [0.02, 0.08])
+def test_between_what_is_sent_the_observer_does_not_swing(alpha, deadband_m):
+    sent = EffectTable(name="report_by_exception", channel="level_m", deadband=deadband_m)
+    simulation = Simulation(alpha.model_copy(update={"effect": (sent,)}), Scenario(name="plain"), 7, 0)
+    recording = simulation.advance(21_600, truth=True)
+    columns = {name: values for name, values in recording.columns.items() if name != "inflow_m3h"}
+    replay = Replay(traces_of(type(recording)(time_ns=recording.time_ns, columns=columns), alpha), alpha)
+    effect = EFFECTS["report_by_exception"](channel="level_m", deadband=deadband_m)
+    away_m = (replay.run([effect]).level_m - recording.truth["truth_level_m"])[FROM_S:]
+    assert np.sqrt(np.mean(away_m**2)) < deadband_m
