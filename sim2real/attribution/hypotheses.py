@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.presence import (
     are_there,
@@ -17,7 +17,7 @@ from wetwell.sim2real.attribution.presence import (
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import GOOD, POOR_FORM, Form, no_form
-from wetwell.sim2real.likelihood.evidence import Evidence, evidence, evidence_of_none
+from wetwell.sim2real.likelihood.evidence import Evidence, Member, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
@@ -151,9 +151,14 @@ class Hypotheses:
             for member, one in enumerate(fewer)
         ]
         slopes = self._fitter.slopes(fit)
+        of_member = np.repeat(np.arange(len(fit.points)), [point.size for point in fit.points])
         form = self._form(fit, signatures, self._plain - residuals, late)
         slopes = np.array([cells.means(column) for column in slopes.T]).T
-        found = evidence(cells, residuals, slopes, form, strengths_of(fit))
+        members = [
+            Member(parameters=np.flatnonzero(of_member == k), neutral=neutral, absent=signature)
+            for k, (neutral, signature) in enumerate(zip(strengths_of(fit), signatures, strict=True))
+        ]
+        found = evidence(cells, residuals, slopes, form, members)
         told = [
             member
             for member, (signature, its) in enumerate(zip(signatures, late, strict=True))
@@ -164,7 +169,9 @@ class Hypotheses:
             fit=fit,
             evidence=found,
             form=form,
-            is_there=None not in fewer and are_there(fit, found) and self._are_apart(fit, told, signatures, slopes),
+            is_there=None not in fewer
+            and are_there(found, [len(one.neutral) for one in members])
+            and self._are_apart(of_member, told, signatures, slopes),
             told=tuple(sorted(fit.names[member] for member in told)),
         )
 
@@ -185,9 +192,10 @@ class Hypotheses:
         time_s = np.hypot(self._fitter.station.materiality.time_s, POOR_FORM * time_constant_s(fit, member))
         return np.asarray(time_s * self._cells.means(rate_of(self._fitter.bins, explained)), dtype=np.float64)
 
-    def _are_apart(self, fit: Fit, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats) -> bool:
+    def _are_apart(
+        self, of_member: Integers, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats
+    ) -> bool:
         """Whether each effect that is told does more than is allowed that the others that are told cannot do."""
-        of_member = np.repeat(np.arange(len(fit.points)), [point.size for point in fit.points])
         least = self._cells.group_squares(self._cells.allowed)
         for member in told:
             others = slopes[:, np.isin(of_member, told) & (of_member != member)]

@@ -1,42 +1,34 @@
-"""Whether each effect of a set is there, by what the likelihood leaves open of its strengths."""
+"""Whether each effect of a set is there, and what of it the others could do."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import gammaincinv
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 SURE = 0.95
-"""Probability of the region of an effect's strengths that must not hold neutral. [1]"""
-LEAST_KNOWN = 1.0
-"""Precision from which a parameter is known at all: a standard deviation of its whole range."""
+"""Probability with which the recording must be likelier with an effect than without it."""
 
 
-def are_there(fit: Fit, found: Evidence) -> bool:
-    r"""Whether no effect's strengths may all be neutral at once.
+def are_there(found: Evidence, strengths: Sequence[int]) -> bool:
+    r"""Whether the recording needs each effect of a set: whether it can be neutral is asked of the simulator.
 
-    $$(x - x_0)^T \Sigma^{-1} (x - x_0) > \chi^2_{.95}$$
+    $$2 \ln \frac{p(z \mid \hat x)}{p(z \mid \hat x_{-i},\ \text{without } i)} > \chi^2_{.95}$$
 
-    with the strengths x, their neutral values, and the covariance Σ of the likelihood, all other parameters free.
-    A strength without a slope, such as a limit, is there where it is not neutral; its signature tells its worth.
+    under the same errors, all parameters of the other effects at their best. A limit has no slope at its place, and a
+    deadband a different one at each: no straight line leads from them to neutral.
 
     Parameters
     ----------
-    fit : Fit
     found : Evidence
-        Its parameters are those of the fit.
+    strengths : sequence of int
+        How many strengths each effect has: the degrees of freedom of χ².
     """
-    is_known = np.diag(found.precision) > LEAST_KNOWN
-    covariance = np.zeros_like(found.precision)
-    among = np.ix_(is_known, is_known)
-    covariance[among] = np.linalg.pinv(found.precision[among])
-    for neutral in strengths_of(fit):
-        place = np.array(list(neutral), dtype=np.int64)
-        away = found.step[place] - np.array(list(neutral.values()))
-        if place.size and not _is_away(away, covariance[np.ix_(place, place)], is_known[place]):
-            return False
-    return True
+    quantiles = 2.0 * gammaincinv(np.maximum(strengths, 1) / 2.0, SURE)  # scipy.stats would take .3 s to load
+    return bool(np.all(found.needed > quantiles))
 
 
 def strengths_of(fit: Fit) -> list[dict[int, float]]:
@@ -93,12 +85,3 @@ def _times_s(fit: Fit, member: int) -> list[float]:
         for free, one in zip(candidate.free, point, strict=True)
         if free.unit == "s" and free.neutral is not None
     ]
-
-
-def _is_away(away: Floats, covariance: Floats, is_known: Flags) -> bool:
-    if np.any(away[~is_known] != 0.0):
-        return True
-    inverse = np.linalg.pinv(covariance[np.ix_(is_known, is_known)])
-    square = float(away[is_known] @ inverse @ away[is_known])
-    quantile = 2.0 * float(gammaincinv(is_known.sum() / 2.0, SURE))  # of χ²; scipy.stats would take .3 s to load
-    return square > quantile

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import solve
 from scipy.special import logsumexp
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
 from wetwell.sim2real.likelihood.ways import likeliest
@@ -25,6 +25,25 @@ class Stirred:
 
     block: Block
     swing: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """An effect of a set.
+
+    Attributes
+    ----------
+    parameters : (k,) array
+        Its parameters, by number.
+    neutral : mapping of int to float
+        The way from the place of each of its strengths to neutral, over its range: it may have all of them, or one.
+    absent : (cells,) array
+        Change of the residuals without it, all other parameters as they are.
+    """
+
+    parameters: Integers
+    neutral: Mapping[int, float]
+    absent: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +64,9 @@ class Evidence:
         Inverse of the covariance of the parameters, over their ranges.
     stirred : tuple of Stirred
         Each block with its likeliest surge and swing.
+    needed : (effects,) array
+        By how much each effect makes the recording likelier, twice the logarithm, under the same errors and with the
+        parameters of the others at their best without it.
     """
 
     log: float
@@ -53,6 +75,7 @@ class Evidence:
     step: Floats
     precision: Floats
     stirred: tuple[Stirred, ...]
+    needed: Floats
 
 
 def evidence(
@@ -60,7 +83,7 @@ def evidence(
     residuals: Floats,
     slopes: Floats,
     form: Form,
-    neutral: Sequence[Mapping[int, float]] = (),
+    members: Sequence[Member] = (),
 ) -> Evidence:
     r"""Laplace's approximation around a fit.
 
@@ -79,31 +102,32 @@ def evidence(
     slopes : (cells, parameters) array
         Change of the residuals over the range of each parameter, at the fit.
     form : Form
-    neutral : sequence of mapping of int to float
-        Of each effect the way from the place of each of its strengths to neutral, over its range: an effect may
-        have all of them, or one alone.
+    members : sequence of Member
+        The effects.
 
     References
     ----------
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
     count = slopes.shape[1]
-    columns, step = np.column_stack([residuals, slopes]), np.zeros(count)
+    columns, step = np.column_stack([residuals, slopes, *(one.absent for one in members)]), np.zeros(count)
+    fitted = slice(0, 1 + count)
     for _ in range(WEIGHINGS if count else 1):
         left = residuals + slopes @ step
         likely = [
             weighed(block, columns[block.rows], left[block.rows], form.chosen(block.rows)) for block in cells.blocks
         ]
         inner = np.sum([products for _, products, _ in likely], axis=0)
-        precision, slope = inner[1:, 1:], inner[1:, 0]
+        precision, slope = inner[1 : 1 + count, 1 : 1 + count], inner[1 : 1 + count, 0]
         step = _step(precision, slope)
     along = np.r_[1.0, step]
-    by_block = np.array([log - 0.5 * float(along @ products @ along) for log, products, _ in likely])
-    peak = float(along @ inner @ along)
+    by_block = np.array([log - 0.5 * float(along @ products[fitted, fitted] @ along) for log, products, _ in likely])
+    peak = float(along @ inner[fitted, fitted] @ along)
     logs = [
-        _of_part(inner, fixed) + 0.5 * peak
+        _of_part(inner[fitted, fitted], fixed) + 0.5 * peak
         for fixed in (
-            dict(chain.from_iterable(one.items() for one in parts)) for parts in product(*map(_partly, neutral))
+            dict(chain.from_iterable(one.items() for one in parts))
+            for parts in product(*(_partly(one.neutral) for one in members))
         )
     ]
     return Evidence(
@@ -113,6 +137,7 @@ def evidence(
         step=step,
         precision=precision,
         stirred=tuple(one for _, _, one in likely),
+        needed=np.array([_needed(inner, one, 1 + count + k, count, peak) for k, one in enumerate(members)]),
     )
 
 
@@ -136,11 +161,23 @@ def _of_part(inner: Floats, fixed: Mapping[int, float]) -> float:
     for k, way in fixed.items():
         first[1 + k] = way
     free = [1 + k for k in range(inner.shape[0] - 1) if k not in fixed]
-    precision, slope = inner[np.ix_(free, free)], inner[free] @ first
-    peak = float(first @ inner @ first)
+    volume = np.linalg.slogdet(np.eye(len(free)) + inner[np.ix_(free, free)] / (2.0 * np.pi))[1]
+    return -0.5 * (_least(inner, first, free) + float(volume))
+
+
+def _needed(inner: Floats, member: Member, column: int, count: int, peak: float) -> float:
+    """Of an effect whose absence is a column behind those of the `count` parameters."""
+    first = np.zeros(inner.shape[0])
+    first[0] = first[column] = 1.0
+    return _least(inner, first, [1 + k for k in range(count) if k not in member.parameters]) - peak
+
+
+def _least(inner: Floats, first: Floats, free: Sequence[int]) -> float:
+    """Least weighed sum of squares of columns of which some are free, near the fit."""
+    slope = inner[free] @ first
+    precision = inner[np.ix_(free, free)]
     step = _step(precision, slope)
-    peak += float(2.0 * slope @ step + step @ precision @ step)
-    return -0.5 * (peak + float(np.linalg.slogdet(np.eye(len(free)) + precision / (2.0 * np.pi))[1]))
+    return float(first @ inner @ first + 2.0 * slope @ step + step @ precision @ step)
 
 
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:

@@ -64,6 +64,19 @@ class Observer:
             inflow_gain=np.r_[self.inflow_gain[late_s:], none],
         )
 
+    def of_lagging_level(self, followed: float) -> "Observer":
+        """The same where the sensor lags, and follows the level by a share a second: it is followed no faster.
+
+        An inflow that is corrected by what has not yet come through would swing with the time of the lag.
+        """
+        if followed >= 1.0:
+            return self
+        known = np.flatnonzero(np.isfinite(self.level_m))
+        most = np.ones(self.level_m.size)
+        most[known] = 1.0 - (1.0 - followed) ** np.diff(known, prepend=-1)
+        share = np.where(self.level_gain < BEGUN_ANEW, most / np.maximum(self.level_gain, most), 1.0)
+        return replace(self, level_gain=self.level_gain * share, inflow_gain=self.inflow_gain * share**2)
+
 
 def constant_observer(level_m: Floats) -> Observer:
     """Observer of a level of each second under a measured inflow, which follows it with `LEVEL_TIME_S`.

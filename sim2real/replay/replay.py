@@ -206,6 +206,7 @@ class Replay:
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         is_held = observer.level_m is not traces.level_m
         observer = observer.of_late_level(int(plant.sensors[LEVEL].delay_s))
+        observer = observer.of_lagging_level(plant.sensors[LEVEL].followed)
         known = np.flatnonzero(np.isfinite(observer.level_m))
         first = observer.level_m[known[:FIRST]]  # a single value may be wrong
         first_level_m = float(np.median(first)) if known.size else self.station.middle_level_m
@@ -240,8 +241,10 @@ class Replay:
         if hides_cycles(traces, station):
             forced = forced_observer(traces)
             return forced if level_m is traces.level_m else replace(forced, level_m=level_m)
+        if traces.inflow_m3h is not None and traces.is_each_second:
+            return constant_observer(level_m)
         if traces.inflow_m3h is not None:
-            return constant_observer(level_m) if traces.is_each_second else row_observer(traces, station, 0.0, level_m)
+            return row_observer(traces, station, 0.0, level_m)
         plant = self._plant(self.own)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         regime, is_known = regimes_of(traces, station).of_station, np.isfinite(level_m)

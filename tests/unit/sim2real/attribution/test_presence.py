@@ -1,49 +1,36 @@
-"""Whether an effect is there: all its strengths at once, not one by one."""
+"""Whether an effect is there: the recording needs it, and no other does the same."""
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fitting import Fit
-from wetwell.sim2real.attribution.presence import are_there, own_signature
+from wetwell.sim2real.attribution.presence import SURE, are_there, own_signature
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 
-def found(precision):
-    count = precision.shape[0]
+def needed(*squares):
     return Evidence(
-        log=0.0, by_block=np.zeros(0), residuals=np.zeros(0), step=np.zeros(count), precision=precision, stirred=()
+        log=0.0,
+        by_block=np.zeros(0),
+        residuals=np.zeros(0),
+        step=np.zeros(0),
+        precision=np.zeros((0, 0)),
+        stirred=(),
+        needed=np.array(squares),
     )
 
 
-def fit_of(name, move):
-    """A fit of the first candidate of a name, its strengths moved from neutral by shares of their ranges."""
-    candidate = next(one for one in candidates_of(1, 1) if one.name == name)
-    neutral = [0.5 if free.neutral is None else free.normalised(free.neutral) for free in candidate.free]
-    point = np.array(neutral) + np.array(move[: len(neutral)])
-    return Fit(candidates=(candidate,), points=(np.clip(point, 0.0, 1.0),), residuals=np.zeros(0))
+@pytest.mark.parametrize("strengths", [1, 2, 3])
+def test_an_effect_is_there_where_the_recording_is_surely_likelier_with_it(strengths):
+    quantile = stats.chi2.ppf(SURE, strengths)
+    assert are_there(needed(1.001 * quantile), [strengths])
+    assert not are_there(needed(0.999 * quantile), [strengths])
 
 
-@pytest.mark.parametrize(("deviation", "expected"), [(0.01, True), (0.2, False)])
-def test_one_strength_has_to_be_away_from_neutral(deviation, expected):
-    fit = fit_of("friction_bias", [0.1])
-    assert are_there(fit, found(np.eye(fit.position.size) / deviation**2)) is expected
-
-
-def test_two_strengths_that_take_each_others_place_are_there_together():
-    """Each alone may as well be neutral, both at once may not."""
-    fit = fit_of("pump_wear", [-0.1, 0.1])
-    assert fit.position.size == 2
-    along, across = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
-    precision = np.outer(along, along) / 0.5**2 + np.outer(across, across) / 0.01**2
-    spread = np.sqrt(np.diag(np.linalg.inv(precision)))
-    assert np.all(1.96 * spread > 0.1)
-    assert are_there(fit, found(precision))
-
-
-def test_a_limit_without_a_slope_is_there_where_it_is_not_neutral():
-    assert are_there(fit_of("flow_low_cutoff", [0.2]), found(np.zeros((1, 1))))
-    assert not are_there(fit_of("flow_low_cutoff", [0.0]), found(np.zeros((1, 1))))
+def test_each_effect_of_a_set_must_be_there():
+    assert are_there(needed(), [])
+    assert are_there(needed(9.0, 9.0), [1, 2])
+    assert not are_there(needed(9.0, 0.0), [1, 1])
 
 
 def test_of_two_effects_that_undo_each_other_neither_has_anything_of_its_own():

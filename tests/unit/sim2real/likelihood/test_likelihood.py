@@ -20,7 +20,7 @@ from wetwell.sim2real.likelihood.covariance import (
     no_form,
     projected,
 )
-from wetwell.sim2real.likelihood.evidence import evidence, evidence_of_none
+from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
@@ -201,6 +201,24 @@ def test_a_parameter_is_integrated_over_its_range(cells):
     inner = np.exp(logs - logs[best])
     variance = float(np.sum(inner * (grid - grid[best]) ** 2) / inner.sum())
     assert 1.0 / found.precision[0, 0] == pytest.approx(variance, rel=0.2)
+
+
+def test_what_needs_an_effect_that_goes_straight_is_its_distance_from_neutral(cells):
+    """Wald's square, with the parameter of the other effect free; a limit has no slope, and is needed all the same."""
+    rng = np.random.default_rng(13)
+    slopes = 400.0 * rng.normal(size=(cells.group.size, 2)) * cells.allowed[:, None]
+    residuals = np.sqrt(cells.variance) * rng.normal(size=cells.group.size)
+    way = 0.004
+    members = [
+        Member(parameters=np.array([k]), neutral={k: way}, absent=way * slopes[:, k] * (1 + k)) for k in range(2)
+    ]
+    found = evidence(cells, residuals, slopes, no_form(cells), members)
+    for k in range(2):
+        away = way * (1 + k) - found.step[k]
+        assert found.needed[k] == pytest.approx(away**2 / np.linalg.inv(found.precision)[k, k], rel=0.05)
+    limit = Member(parameters=np.array([0]), neutral={0: way}, absent=members[0].absent)
+    blunt = evidence(cells, residuals, np.zeros((cells.group.size, 1)), no_form(cells), [limit])
+    assert blunt.needed[0] > 10.0
 
 
 def test_an_offset_under_the_allowed_size_gains_little_and_one_over_it_does(cells):
