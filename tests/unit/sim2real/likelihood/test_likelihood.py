@@ -204,7 +204,7 @@ def test_a_parameter_is_integrated_over_its_range(cells):
 
 
 def test_what_needs_an_effect_that_goes_straight_is_its_distance_from_neutral(cells):
-    """Wald's square, with the parameter of the other effect free; a limit has no slope, and is needed all the same."""
+    """Wald's square, the parameter of the other effect free; a limit has no slope, and is needed all the same."""
     rng = np.random.default_rng(13)
     slopes = 400.0 * rng.normal(size=(cells.group.size, 2)) * cells.allowed[:, None]
     residuals = np.sqrt(cells.variance) * rng.normal(size=cells.group.size)

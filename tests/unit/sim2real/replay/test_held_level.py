@@ -1,4 +1,4 @@
-"""Replay of a level of which only changes are sent: nobody measures the inflow, so that the observer follows what is."""
+"""Replay of a level of which only changes are sent: without an inflow meter the observer follows what is."""
 
 import numpy as np
 import pytest
