@@ -1,7 +1,8 @@
 """The likelihood against dense matrices, and what it must and must not gain from."""
 
+import math
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -21,8 +22,8 @@ from wetwell.sim2real.likelihood.covariance import (
     projected,
 )
 from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none
-from wetwell.sim2real.likelihood.flexible import flexible_factor
-from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
+from wetwell.sim2real.likelihood.flexible import _of_any_number, flexible_factor
+from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, KNOWN, OWN_WAYS, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, LEVEL, Bins
 
@@ -146,8 +147,9 @@ def log_densities(cells, residuals):
                 own=of_ways(own),
                 changing=of_ways([changing[k] for k in block.group]),
             )
+            shares = KNOWN.shares(block.regime)
             prior = sum(
-                log_prior(ways, choices)
+                log_prior(ways, choices, shares)
                 for ways, choices in (
                     (span, SPAN_WAYS),
                     (own, OWN_WAYS),
@@ -167,14 +169,14 @@ def of_ways(ways):
     )
 
 
-def log_prior(ways, choices):
+def log_prior(ways, choices, shares):
     """Of what was chosen, whether in a block that is prone to be poor or in one that is not."""
     poor = sum(way.is_poor for way in choices)
     return np.logaddexp.reduce(
         [
             np.log(of_block)
             + sum(np.log(share / poor if way.is_poor else (1.0 - share) / (len(choices) - poor)) for way in ways)
-            for of_block, share in ((1.0 - POORLY, POORLY), (POORLY, 1.0 - POORLY))
+            for share, of_block in shares
         ]
     )
 
@@ -243,6 +245,14 @@ def test_only_what_is_far_over_the_allowed_size_asks_for_something_unknown(cells
     assert factor(noise + 0.7 * cells.allowed) < 0.0
     assert factor(noise + 12.0 * cells.allowed) > 0.0
     assert factor(noise + 12.0 * rng.normal(size=cells.group.size) * cells.allowed) > 0.0
+
+
+def test_something_unknown_may_act_in_any_number_of_blocks():
+    """Against the sum over all sets of blocks, each number of blocks as likely, and each such set."""
+    log_odds = [-1.5, -0.3, 2.0, 0.4]
+    sets = [rows for number in range(1, 5) for rows in combinations(log_odds, number)]
+    expected = sum(np.exp(sum(rows)) / (4 * math.comb(4, len(rows))) for rows in sets)
+    assert _of_any_number(log_odds) == pytest.approx(np.log(expected), rel=1e-12)
 
 
 def test_an_error_of_a_whole_cycle_is_less_of_a_surprise_than_as_many_of_single_cells(cells):
