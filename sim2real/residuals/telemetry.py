@@ -146,8 +146,8 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
         quantum = _lattice(np.concatenate(parts))
         if quantity == "level_m" and quantum >= MIN_QUANTUM_M and moves.all.size >= MIN_MOVES:
             found.append(Pattern(quantity=quantity, quantum=quantum))
-        elif moves.held_share > HELD_SHARE:
-            pattern = _held(quantity, moves, STORED_MOVES * quantum)
+        if moves.held_share > HELD_SHARE:
+            pattern = _held(quantity, moves, quantum)
             found += [pattern] if pattern is not None else []
     return found
 
@@ -189,13 +189,15 @@ def _moves(parts: list[Floats], is_ramp: Flags) -> _Moves:
     )
 
 
-def _held(quantity: AnalogueQuantity, moves: _Moves, least: float) -> Pattern | None:
+def _held(quantity: AnalogueQuantity, moves: _Moves, quantum: float) -> Pattern | None:
     """Pattern of a channel that is held: its deadband lies under the smallest moves that follow another soon.
+
+    A move that is stored in steps may be off by one of them.
 
     Where such are few, and nearly all values are held, it lies over the largest move outside ramps, which its time
     being up has brought about.
     """
-    soon = moves.soon
+    soon, least = moves.soon, STORED_MOVES * quantum
     if moves.held_share > NEARLY_ALL and soon.size < MIN_MOVES and moves.calm.size >= FEWEST:
         largest = float(moves.calm.max())
         return Pattern(quantity=quantity, deadband=largest, within=BY_TIME) if largest > least else None
@@ -206,8 +208,10 @@ def _held(quantity: AnalogueQuantity, moves: _Moves, least: float) -> Pattern | 
         return None
     if soon.size < MIN_MOVES:
         return Pattern(quantity=quantity, deadband=float(np.quantile(moves.all, SMALL)), within=IN_RAMPS)
-    within = SEEN_SHARES if moves.is_soon_calm.sum() >= MIN_MOVES else IN_RAMPS
-    return Pattern(quantity=quantity, deadband=float(np.quantile(soon, FEW)), within=within)
+    deadband = float(np.quantile(soon, FEW))
+    low, high = SEEN_SHARES if moves.is_soon_calm.sum() >= MIN_MOVES else IN_RAMPS
+    rounding = quantum / deadband
+    return Pattern(quantity=quantity, deadband=deadband, within=(low * (1.0 - rounding), high * (1.0 + rounding)))
 
 
 def _has_edge(jumps: Floats) -> bool:

@@ -96,3 +96,14 @@ def test_a_held_level_is_no_coarse_one_in_whatever_it_was_stored(recorded):
     station, recording = recorded
     level_m = 0.01 * np.round(held(recording.columns["level_m"], 0.06, 10**6) / 0.01)
     assert all(pattern.quantum <= 0.01 + 1e-9 for pattern in patterns(station, recording, level_m=level_m))
+
+
+@pytest.mark.parametrize("deadband_m", [0.0489, 0.06, 0.09])
+def test_a_held_level_is_seen_though_it_is_stored_to_a_centimetre(recorded, deadband_m):
+    """Its moves are whole centimetres, so that the deadband is known to one."""
+    station, recording = recorded
+    level_m = 0.01 * np.round(held(recording.columns["level_m"], deadband_m, 900) / 0.01)
+    found = [one for one in patterns(station, recording, level_m=level_m) if one.deadband > 0.0]
+    assert [one.quantity for one in found] == ["level_m"]
+    assert found[0].missed(deadband_m) == 0.0
+    assert min(found[0].missed(0.0), found[0].missed(2.0 * deadband_m)) > 0.0
