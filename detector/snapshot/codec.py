@@ -134,9 +134,19 @@ def decode_snapshot(
         if "steady_samples" in arrays:
             arrays["steady_samples"] = arrays["steady_samples"].view(STEADY_SAMPLE)[:, 0]
         systems = state["system"] if isinstance(state["system"], list) else [state["system"]]
+        _check_counts(systems, state["pumps"], datasheet)
         return arrays, systems, state["pumps"]
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise SnapshotError(f"snapshot of station '{station}': not what '{SCHEMA}' holds, {error}") from error
+
+
+def _check_counts(systems: Sequence[SystemPrior], pumps: Sequence[PumpMemory], datasheet: Datasheet) -> None:
+    for name, held, wanted in (
+        ("mains", len(systems), len(datasheet.mains)),
+        ("pumps", len(pumps), len(datasheet.curves)),
+    ):
+        if held != wanted:
+            raise ValueError(f"{held} {name}, the station has {wanted}")
 
 
 def _fingerprint(datasheet: Datasheet) -> str:

@@ -228,8 +228,9 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
     mark = ""
     try:
         if suffix == ".parquet":
+            _check_once(pa.parquet.read_schema(path).names, path)
             table = pa.parquet.read_table(path)
-            _ = [(field.name, getattr(field.type, "tz", None)) for field in table.schema]  # raises if no UTF-8
+            _ = [getattr(field.type, "tz", None) for field in table.schema]  # raises, as the names, if no UTF-8
             return table, Origin.of_metadata(table.schema.metadata or {})
         mark, header = _csv_header(path)
         types = {name: pa.float64() for name in header if _is_measured(name)}
@@ -262,10 +263,14 @@ def _csv_header(path: Path) -> tuple[str, list[str]]:
         if line.startswith(MARK):
             mark, line = line, str(file.readline())
     header = [name.strip('"') for name in line.rstrip("\r\n").split(",")]
-    repeated = sorted({name for name in header if header.count(name) > 1})
+    _check_once(header, path)
+    return mark, header
+
+
+def _check_once(names: list[str], path: Path) -> None:
+    repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise RecordingError(f"{path}: column '{repeated[0]}' stands twice")
-    return mark, header
 
 
 def _numbers(column: pa.ChunkedArray, name: str, path: Path | str) -> Floats:

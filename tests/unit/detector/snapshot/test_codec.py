@@ -1,5 +1,6 @@
 """Snapshots of the detector: exact at any sample, versioned, refused when damaged."""
 
+import hashlib
 import json
 
 import pytest
@@ -47,8 +48,13 @@ def test_a_restored_detector_goes_on_bit_for_bit(alpha, samples, uninterrupted):
 
 def damaged(data: bytes) -> dict[str, bytes]:
     head, body = data.split(b"\n", 1)
-    header = json.loads(head)
+    header, state = json.loads(head), json.loads(body)
+    fewer = json.dumps(
+        {"dict": [[key, part[:-1] if key == "pumps" else part] for key, part in state["dict"]]}
+    ).encode()
+    sealed = header | {"sha256": hashlib.sha256(fewer).hexdigest()}
     return {
+        "2 pumps, the station has 3": json.dumps(sealed).encode() + b"\n" + fewer,
         "damaged, its first line is no header": data[100:],
         "damaged, its checksum differs": data[:-20],
         "format 'wetwell.detector-snapshot/9'": json.dumps(header | {"schema": SCHEMA[:-1] + "9"}).encode()

@@ -48,6 +48,13 @@ def test_a_name_in_parquet_that_is_no_text_gives_one_line(tmp_path):
         ParquetFile(path, None)
 
 
+def test_a_column_that_stands_twice_in_parquet_is_refused(tmp_path):
+    table = pa.Table.from_arrays([pa.array([1.0])] * 2, names=["level_m", "level_m"])
+    pa.parquet.write_table(table, tmp_path / "r.parquet")
+    with pytest.raises(RecordingError, match=r"r\.parquet: column 'level_m' stands twice"):
+        read_recording(tmp_path / "r.parquet")
+
+
 def test_local_stamps_of_parquet_get_their_zone(tmp_path):
     time = pa.array([from_iso("2025-01-31T08:00:00Z")], pa.timestamp("ns"))
     pa.parquet.write_table(pa.table({"time": time, "pump1_flow_m3h": [1.0]}), tmp_path / "r.parquet")
