@@ -9,10 +9,10 @@ from scipy.special import expit, logsumexp
 
 Verdict = Literal["effect", "none", "unknown"]
 
-UNKNOWN_PRIOR = 0.1
-"""Probability that something acts that the library does not hold. [1]"""
+UNKNOWN_PRIOR = 1.0 / 3.0
+"""Probability that something acts that the library does not hold: as likely as none, and as effects. [1]"""
 NONE_PRIOR = 0.5
-"""Probability that nothing of the library acts. [1]"""
+"""Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
 MISJUDGED = 0.28

@@ -18,13 +18,9 @@ from wetwell.sim2real.likelihood.covariance import (
     Errors,
     Form,
 )
-from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 
 POORLY = 0.1
-"""Probability that a right model is poor in a span or group of starts and stops; and that a block is one where it
-mostly is. [1]"""
-STEADILY_POOR = 0.01
-"""Probability that it is poor in one of steady running. [1]"""
+"""Probability that a right model is poor in a span or group; and that a block is one where it mostly is. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,22 +51,11 @@ CHANGING_WAYS = tuple(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ways:
-    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle.
-
-    Where something unknown acts in some of its spans and groups, it is poor in any of them as likely as not.
-    """
+    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle."""
 
     span: Sequence[Way] = SPAN_WAYS
     own: Sequence[Way] = OWN_WAYS
     changing: Sequence[Way] = CHANGING_WAYS
-    is_known: bool = True
-
-    def shares(self, regime: int) -> tuple[tuple[float, float], ...]:
-        """Shares of the spans or groups of a regime in which it may be poor, and how probable each is."""
-        if not self.is_known:
-            return ((0.5, 1.0),)
-        usual = STEADILY_POOR if regime in (STEADY, MULTI_PUMP) else POORLY
-        return (usual, 1.0 - 2.0 * POORLY), (0.5, POORLY), (1.0 - POORLY, POORLY)
 
 
 KNOWN = Ways()
@@ -96,7 +81,7 @@ def likeliest(
     log_prior, allowance : float, Allowance
         What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow.
     """
-    counts, shares = block.group_sums(np.ones(residuals.size)), ways.shares(block.regime)
+    counts = block.group_sums(np.ones(residuals.size))
     mean, noise, allowed, signature, swinging, late = (
         block.group_sums(values) / counts
         for values in (
@@ -114,9 +99,7 @@ def likeliest(
 
     scatter = block.group_sums((residuals - mean[block.group]) ** 2)
     changes = noise + swing**2 * swinging + variances(ways.changing)
-    changing, log_prior = _chosen(
-        -0.5 * ((counts - 1.0) * np.log(changes) + scatter / changes), ways.changing, shares
-    )
+    changing, log_prior = _chosen(-0.5 * ((counts - 1.0) * np.log(changes) + scatter / changes), ways.changing)
     of_mean = _picked(changes, changing) / counts
 
     spans = np.bincount(block.span)
@@ -125,12 +108,12 @@ def likeliest(
     middle = np.bincount(block.span, weight * mean) / np.bincount(block.span, weight)
     freedom = (1.0 - 1.0 / spans)[block.span]
     away = (mean - middle[block.span]) ** 2
-    own, prior = _chosen(-0.5 * (freedom * np.log(apart) + away / apart), ways.own, shares)
+    own, prior = _chosen(-0.5 * (freedom * np.log(apart) + away / apart), ways.own)
     log_prior += prior
 
     left = np.bincount(block.span, _picked(apart, own)) / spans**2 + np.bincount(block.span, late) / spans
     alike = left + np.array([np.bincount(block.span, one) / spans for one in variances(ways.span)])
-    span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span, shares)
+    span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span)
     log_prior += prior
     return log_prior, Allowance(
         span=_errors(ways.span, span[block.span]),
@@ -140,22 +123,20 @@ def likeliest(
     )
 
 
-def _chosen(logs: Floats, ways: Sequence[Way], shares: Sequence[tuple[float, float]]) -> tuple[Integers, float]:
+def _chosen(logs: Floats, ways: Sequence[Way]) -> tuple[Integers, float]:
     """(n,) likeliest of the ways by their (ways, n) logarithms, and what not knowing them adds to the logarithm.
 
     That is the sum over all ways, each with its probability, over the likeliest: ways that say the same cost nothing.
-    `shares` of the members of a block may be poor, each with its probability.
+    A block is prone to be poor with the probability with which one of its members is where it is not.
     """
     poor = np.array([way.is_poor for way in ways])
     if poor.all():
         return np.argmax(logs, axis=0), 0.0
     tried = []
-    for share, probability in shares:
+    for share, log_prone in ((POORLY, np.log(1.0 - POORLY)), (1.0 - POORLY, np.log(POORLY))):
         log_priors = np.log(np.where(poor, share / poor.sum(), (1.0 - share) / (~poor).sum()))
         joint = logs + log_priors[:, None]
-        tried.append(
-            (float(np.logaddexp.reduce(joint, axis=0).sum()) + np.log(probability), np.argmax(joint, axis=0))
-        )
+        tried.append((float(np.logaddexp.reduce(joint, axis=0).sum()) + log_prone, np.argmax(joint, axis=0)))
     _, best = max(tried, key=lambda one: one[0])
     return best, float(np.logaddexp.reduce([total for total, _ in tried]) - _picked(logs, best).sum())
 

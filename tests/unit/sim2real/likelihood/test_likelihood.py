@@ -1,8 +1,7 @@
 """The likelihood against dense matrices, and what it must and must not gain from."""
 
-import math
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 import pytest
@@ -22,8 +21,8 @@ from wetwell.sim2real.likelihood.covariance import (
     projected,
 )
 from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none
-from wetwell.sim2real.likelihood.flexible import _of_any_number, flexible_factor
-from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, KNOWN, OWN_WAYS, SPAN_WAYS
+from wetwell.sim2real.likelihood.flexible import flexible_factor
+from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, LEVEL, Bins
 
@@ -147,9 +146,8 @@ def log_densities(cells, residuals):
                 own=of_ways(own),
                 changing=of_ways([changing[k] for k in block.group]),
             )
-            shares = KNOWN.shares(block.regime)
             prior = sum(
-                log_prior(ways, choices, shares)
+                log_prior(ways, choices)
                 for ways, choices in (
                     (span, SPAN_WAYS),
                     (own, OWN_WAYS),
@@ -169,14 +167,14 @@ def of_ways(ways):
     )
 
 
-def log_prior(ways, choices, shares):
+def log_prior(ways, choices):
     """Of what was chosen, whether in a block that is prone to be poor or in one that is not."""
     poor = sum(way.is_poor for way in choices)
     return np.logaddexp.reduce(
         [
             np.log(of_block)
             + sum(np.log(share / poor if way.is_poor else (1.0 - share) / (len(choices) - poor)) for way in ways)
-            for share, of_block in shares
+            for of_block, share in ((1.0 - POORLY, POORLY), (POORLY, 1.0 - POORLY))
         ]
     )
 
@@ -247,14 +245,6 @@ def test_only_what_is_far_over_the_allowed_size_asks_for_something_unknown(cells
     assert factor(noise + 12.0 * rng.normal(size=cells.group.size) * cells.allowed) > 0.0
 
 
-def test_something_unknown_may_act_in_any_number_of_blocks():
-    """Against the sum over all sets of blocks, each number of blocks as likely, and each such set."""
-    log_odds = [-1.5, -0.3, 2.0, 0.4]
-    sets = [rows for number in range(1, 5) for rows in combinations(log_odds, number)]
-    expected = sum(np.exp(sum(rows)) / (4 * math.comb(4, len(rows))) for rows in sets)
-    assert _of_any_number(log_odds) == pytest.approx(np.log(expected), rel=1e-12)
-
-
 def test_an_error_of_a_whole_cycle_is_less_of_a_surprise_than_as_many_of_single_cells(cells):
     rng = np.random.default_rng(11)
     level = next(block for block in cells.blocks if block.signal == LEVEL)
@@ -277,3 +267,16 @@ def test_surges_of_an_inflow_without_a_meter_are_no_surprise_in_the_level_and_on
             flexible_factor(evidence_of_none(each, residuals), no_form(each)) for each in (with_meter, without)
         ]
         assert (factors[1] < factors[0] - 0.1) == gains
+
+
+def test_what_no_surge_makes_is_no_likelier_unknown_where_there_may_be_one():
+    """What is known and what is not are weighed with the same surge."""
+    noise = np.random.default_rng(14).normal(size=made(has_inflow=True).group.size)
+    factors = []
+    for has_inflow in (True, False):
+        cells = made(has_inflow=has_inflow)
+        residuals = 0.3 * noise * np.sqrt(cells.variance)
+        for block in cells.blocks:
+            residuals[block.rows] += (block.signal == LEVEL) * 3.0 * cells.allowed[block.rows]
+        factors.append(flexible_factor(evidence_of_none(cells, residuals), no_form(cells)))
+    assert factors[1] == pytest.approx(factors[0], abs=0.05)
