@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import math
+import re
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from types import NoneType, UnionType
@@ -60,6 +61,7 @@ _ADDED: Mapping[str, Mapping[str, Callable[[], Any]]] = {
 }
 """Fields that snapshots of form 2 may lack, and what makes what stands for them then."""
 _STORED_FIELDS = {name: {new: old for old, new in fields.items()} for name, fields in _FIELDS.items()}
+_DTYPE = re.compile(r"[<>|]?[a-zA-Z]\d+")
 _ARRAYS: Mapping[str, str] = {
     "pace": "sampling_period",
     "rows": "steady_samples",
@@ -219,8 +221,15 @@ def _decoded(value: Any, datasheet: Datasheet) -> Any:
 
 def _array(content: list[Any], _datasheet: Datasheet) -> Any:
     dtype, shape, order, data = content
-    dtype = dtype if isinstance(dtype, str) else [(name, kind) for name, kind in dtype]
+    dtype = _dtype(dtype) if isinstance(dtype, str) else [(name, _dtype(kind)) for name, kind in dtype]
     return np.frombuffer(base64.b64decode(data), dtype=dtype).reshape(shape, order=order).copy(order)
+
+
+def _dtype(text: str) -> str:
+    """A type of numbers as `dtype.str` writes it: numpy takes any other text for Python, and fails as that does."""
+    if not _DTYPE.fullmatch(text):
+        raise ValueError(f"'{text}' is no type of an array")
+    return text
 
 
 def _object(content: list[Any], datasheet: Datasheet) -> Any:
