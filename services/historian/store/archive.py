@@ -8,6 +8,7 @@ columns, of which four are lists as long as `columns_of`, so that a file is read
 import logging
 import os
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -214,20 +215,33 @@ class Archive:
         Raises
         ------
         StoreError
-            If the file cannot be read, is not what was written, or is that of another station or day.
+            If the file cannot be read, is not what was written, or is that of another form, station or day.
         """
         path = self.path(form, station, day_ns)
         try:
-            table = pa.parquet.ParquetFile(path, page_checksum_verification=True).read(columns)
+            file = pa.parquet.ParquetFile(path, page_checksum_verification=True)
+            table, names = file.read(columns), set(file.schema_arrow.names)
             said = Origin.of_metadata(table.schema.metadata or {}).station
         except FileNotFoundError:
             return None
         except (OSError, ValueError, pa.ArrowException) as error:
             raise StoreError(f"{path}: cannot be read: {error}") from error
+        if not names.issuperset(_columns(form, names)):
+            raise StoreError(f"{path}: holds no {form}")
         time_ns = _stamps(table)
         if said not in (station, None) or not np.all((time_ns >= day_ns) & (time_ns < day_ns + DAY_NS)):
             raise StoreError(f"{path}: is of station '{said}' or of another day")
         return table
+
+
+def _columns(form: Form, names: Iterable[str]) -> set[str]:
+    """Columns that a file of a form has, by those that tell how many pumps it is of."""
+    if form == "tens":
+        return {"time", *_SUMMARY}
+    values = columns_of(pumps_of(names))
+    if form == "samples":
+        return {"time", "seq", "quality", *values}
+    return {"time", *values, *(f"{name}_{end}" for name in values for end in ("count", "min", "max"))}
 
 
 def _check(path: Path, kept: Samples | Summary | None, given: Samples | Summary, names: tuple[str, ...]) -> None:

@@ -18,7 +18,7 @@ from wetwell.services.doctor.verify import verify_kept
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import DAY_NS, Batch
+from wetwell.services.historian.store.interface import DAY_NS, Batch, StoreError
 from wetwell.services.runtime.settings import (
     AlarmSettings,
     DetectorSettings,
@@ -201,6 +201,27 @@ def test_the_chain_goes_on_after_a_restart_and_behind_lines_of_an_earlier_versio
     lines = path.read_text().splitlines()
     path.write_text("\n".join([lines[0], *lines[2:]]) + "\n")
     assert broken_lines(path) == [2]
+
+
+def test_a_daily_file_of_another_form_is_put_aside(kept, tmp_path):
+    folder = tmp_path / "history"
+    shutil.copytree(kept / "history", folder)
+    (file,) = (folder / "samples" / "station=alpha").glob("*.parquet")
+    wrong = folder / "minutes" / "station=beta" / file.name
+    wrong.parent.mkdir(parents=True)
+    shutil.copyfile(file, wrong)
+    (tens,) = (folder / "tens" / "station=alpha").glob("*.parquet")
+    shutil.copyfile(tens, file)
+    text = verified(tmp_path)["error"][0].text
+    assert f"{wrong}: holds no minutes" in text
+    assert f"{file}: holds no samples" in text
+    with contextlib.closing(FolderStore(folder)) as store:
+        with pytest.raises(StoreError, match="holds no samples"):
+            store.samples("alpha", 0, 2**62)
+        for _ in store.scrub():
+            pass
+        store.samples("alpha", 0, 2**62)
+    assert {path.parent.name for path in folder.rglob("*.refused")} == {"station=alpha", "station=beta"}
 
 
 def test_a_daily_file_of_another_station_or_day_is_put_aside_by_a_look_through(kept, tmp_path):
