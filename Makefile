@@ -32,7 +32,7 @@ browser: $(VENV)/.dev  ## What of `make check` looks at the page, one test after
 	$(BIN)/pytest -q --durations=10 -m "check and not long and not soak" tests/browser
 
 others: $(VENV)/.dev  ## What of `make check` looks at no page; it gives way to the browser
-	nice -n 5 $(PYTEST) -m "check and not long and not soak" --ignore=tests/browser
+	nice -n 5 $(PYTEST) -m "check and not long and not soak" tests --ignore=tests/browser
 
 long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each other Python
 	$(PYTEST) -m "long and not soak"
@@ -50,9 +50,8 @@ types: $(VENV)/.dev  ## mypy
 imports: $(VENV)/.dev  ## import contract
 	$(BIN)/lint-imports
 
-kernels: $(VENV)/.dev  ## Compile the kernels for the tests, if they or what they call have changed
-	$(BIN)/pytest -q tests/unit/services/test_cli.py tests/reference/sim2real/test_truth_plant.py \
-	  -k "test_simulate_then_detect or test_duty_point_of_one_pump"
+kernels: $(VENV)/.dev  ## Compile the kernels for the tests, if they or what they call have changed, and the tests themselves
+	$(BIN)/pytest -q -k "test_simulate_then_detect or test_duty_point_of_one_pump"
 
 format: $(VENV)/.dev  ## Bring all files into form
 	$(BIN)/ruff check --fix .

@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from jsonschema import Draft202012Validator
 
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.order import Plan
@@ -43,8 +42,8 @@ def test_each_schema_has_one():
 
 
 @pytest.mark.parametrize(("name", "example"), EACH)
-def test_the_schema_takes_it(name, example):
-    assert [error.message for error in Draft202012Validator(schema_named(name)).iter_errors(example)] == []
+def test_the_schema_takes_it(name, example, validator):
+    assert [error.message for error in validator(schema_named(name)).iter_errors(example)] == []
 
 
 @pytest.mark.parametrize(
@@ -58,7 +57,7 @@ def test_the_model_takes_it(name, example):
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_what_a_key_shows_is_allowed_there(name):
+def test_what_a_key_shows_is_allowed_there(name, validator):
     schema = schema_named(name)
     shown = [
         (key, value, {**rule, "$defs": schema.get("$defs", {})})
@@ -68,7 +67,7 @@ def test_what_a_key_shows_is_allowed_there(name):
     ]
     assert shown
     for key, value, rule in shown:
-        assert Draft202012Validator(rule).is_valid(value), key
+        assert validator(rule).is_valid(value), key
 
 
 def unseen(schema):

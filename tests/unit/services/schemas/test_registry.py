@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from jsonschema import Draft202012Validator
 
 from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.messages.verdict import Verdict
@@ -20,14 +19,15 @@ STATIONS = sorted((ROOT / "simulator" / "stations").glob("*.toml"))
 SCENARIOS = sorted((ROOT / "simulator" / "scenarios").glob("*.toml"))
 
 
-def errors(name, value):
-    return [error.message for error in Draft202012Validator(schema_named(name)).iter_errors(value)]
+@pytest.fixture
+def errors(validator):
+    return lambda name, value: [error.message for error in validator(schema_named(name)).iter_errors(value)]
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_each_is_a_schema_and_says_what_it_is(name):
+def test_each_is_a_schema_and_says_what_it_is(name, validator):
     schema = schema_named(name)
-    Draft202012Validator.check_schema(schema)
+    validator.check_schema(schema)
     assert schema["description"]
     assert schema["properties"]
 
@@ -37,11 +37,11 @@ def test_each_is_a_schema_and_says_what_it_is(name):
     [*(("station", path) for path in STATIONS), *(("scenario", path) for path in SCENARIOS)],
     ids=lambda value: value if isinstance(value, str) else value.stem,
 )
-def test_files_that_come_with_the_package_are_taken(name, path):
+def test_files_that_come_with_the_package_are_taken(name, path, errors):
     assert errors(name, tomllib.loads(path.read_text())) == []
 
 
-def test_the_example_of_the_gateway_is_taken():
+def test_the_example_of_the_gateway_is_taken(errors):
     assert errors("plc", tomllib.loads((ROOT / "services" / "gateway" / "example.toml").read_text())) == []
 
 
@@ -61,7 +61,7 @@ BASE = {"name": "s", "sump": {"area_m2": 8.0}, "pump": [{"curve": [36.0, -0.02, 
     ],
     ids=json.dumps,
 )
-def test_what_the_station_file_refuses_the_schema_refuses(wrong, tmp_path, run_wetwell):
+def test_what_the_station_file_refuses_the_schema_refuses(wrong, tmp_path, run_wetwell, errors):
     assert errors("station", BASE) == []
     assert errors("station", BASE | wrong) != []
     file = tmp_path / "s.toml"
@@ -88,7 +88,7 @@ def test_each_number_of_a_station_file_has_a_unit():
     assert [(name, key) for name, key, rule in numbers if "unit" not in rule] == []
 
 
-def test_messages_are_taken():
+def test_messages_are_taken(errors):
     verdict = Verdict(
         time=0, station="alpha", pump=2, state="normal", probability={"normal": 1.0}, evidence={}, window=(0, 1)
     )
@@ -96,7 +96,7 @@ def test_messages_are_taken():
     assert errors("verdict", json.loads(verdict.encode()) | {"state": "tired"}) != []
 
 
-def test_rows_of_a_recording_are_taken():
+def test_rows_of_a_recording_are_taken(errors):
     row = {"time": "2025-01-01T00:00:00Z", "level_m": 1.0, "pump12_flow_m3h": None, "truth_fault": "blockage"}
     assert errors("recording", row) == []
     assert errors("recording", row | {"pump1_flow_m3h": "much"}) != []
