@@ -5,7 +5,12 @@ In each step the heads of the pumps and of what comes back in the mains are one 
 $$\sum_i q_i(H) = Q(H), \qquad B Q + R |Q| Q = H - C$$
 
 with $q_i(H)$ the flow of pump i through its branch against the head H of the main, and C what comes back
-in it. The left side falls with H and the right side rises; Newton's method finds where they meet.
+in it. The left side falls with H and the right side rises; Newton's method finds where they meet. Where H falls to
+that of vapour the column parts: a cavity takes what leaves and does not come, until it has closed again [1].
+
+References
+----------
+.. [1] After E. B. Wylie, V. L. Streeter, Fluid Transients in Systems: discrete vapour cavities.
 """
 
 import math
@@ -29,6 +34,8 @@ _MACHINE_ROWS = 15
 _SEEN_FIRST, _SEEN, _AIR, _REGISTER, _RUNNING, _TURN = range(6)
 _HEADER_TRIES = 30
 _OLDEST_S = 120
+VAPOUR_M = -10.0
+"""Head at the inlet of a main at which its water column parts: that of vapour, over the air at the pumps. [m]"""
 
 
 class Weather(NamedTuple):
@@ -86,6 +93,7 @@ def integrate(
         well=np.array([level_m, level_m, spec.air_limit_m, level_m, 0.0, 0.0]),
         head_m=np.full(nodes, spec.lift_m),
         flow=np.zeros(nodes),
+        cavity_m3=np.zeros(spec.reaches.size),
         readings=np.full(_OLDEST_S, level_m),
     )
     rows: dict[str, Any] = {
@@ -98,7 +106,7 @@ class State(NamedTuple):
     """What changes from step to step, in place: rows of pumps and well as named above, nodes of the mains.
 
     `terms` are those of the pumps' heads over their flows, `readings` the level of the last seconds, `order` that in
-    which the running pumps have started.
+    which the running pumps have started, `cavity_m3` the vapour at the inlets of the mains.
     """
 
     pump: Floats
@@ -107,6 +115,7 @@ class State(NamedTuple):
     well: Floats
     head_m: Floats
     flow: Floats
+    cavity_m3: Floats
     readings: Floats
 
 
@@ -230,6 +239,7 @@ def _pump(spec: ElasticSpec, state: State, lift_m: float, loss_factor: float, le
         loss /= reaches
         back_m = head[m, 1] - spec.impedance[m] * flow[m, 1]
         top_m = _header_m(spec, pump, terms, m, branch_loss, inertia, head[m, 0], back_m, loss)
+        top_m = _parted_m(spec, state, m, branch_loss, inertia, top_m, back_m, loss)
         for i in range(pump.shape[1]):
             if spec.main_of[i] == m:
                 pump[FLOW, i] = _branch(spec, pump, terms, i, branch_loss, inertia, top_m)[0]
@@ -245,6 +255,28 @@ def _pump(spec: ElasticSpec, state: State, lift_m: float, loss_factor: float, le
             pump[HEAD, i] = max(terms[0, i] + (terms[1, i] + terms[2, i] * forward) * forward, 0.0)
             pump[POWER, i] = input_w(spec, i, pump[_FREQUENCY, i], pump[_SPEED, i], forward)
     return out
+
+
+@inlined
+def _parted_m(
+    spec: ElasticSpec,
+    state: State,
+    m: int,
+    branch_loss: float,
+    inertia: float,
+    top_m: float,
+    back_m: float,
+    loss: float,
+) -> float:
+    """Head of a main at its inlet, that of vapour while there is a cavity of what left and did not come. [m]."""
+    if state.cavity_m3[m] <= 0.0 and top_m >= VAPOUR_M:
+        return top_m
+    grown = carried(VAPOUR_M - back_m, spec.impedance[m], loss)
+    for i in range(state.pump.shape[1]):
+        if spec.main_of[i] == m:
+            grown -= _branch(spec, state.pump, state.terms, i, branch_loss, inertia, VAPOUR_M)[0]
+    state.cavity_m3[m] = max(state.cavity_m3[m] + grown * TICK_S, 0.0)
+    return VAPOUR_M if state.cavity_m3[m] > 0.0 else top_m
 
 
 @inlined
