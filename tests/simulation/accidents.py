@@ -97,11 +97,13 @@ async def _one(site: "Site", accident: Accident) -> None:
 @contextlib.asynccontextmanager
 async def _kill(site: "Site", accident: Accident, _dice: random.Random) -> AsyncIterator[None]:
     names = {"site": DAEMONS, "machine": KEEPERS}.get(accident.target, (accident.target,))
-    for name in names:
-        await site.processes[name].kill()
+    twins = site.twins if accident.target in {"site", "machine"} else ()
+    processes = [*(site.processes[name] for name in names), *twins]
+    for process in processes:
+        await process.kill()
     yield
-    for name in names:
-        site.processes[name].start_again()
+    for process in processes:
+        process.start_again()
 
 
 @contextlib.asynccontextmanager
@@ -135,8 +137,10 @@ async def _cut(site: "Site", accident: Accident, _dice: random.Random) -> AsyncI
 async def _twin(site: "Site", accident: Accident, _dice: random.Random) -> AsyncIterator[None]:
     """A second daemon on the same folder: one of the two must end with a line of its own."""
     twin = site.twin_of(accident.target)
+    site.twins.append(twin)
     twin.start_again()
     yield
+    site.twins.remove(twin)
     await twin.kill()
 
 
@@ -167,14 +171,15 @@ async def _lie(site: "Site", _accident: Accident, dice: random.Random) -> AsyncI
     """The disks say that they have written what they have not; then the power fails."""
     disks = {name: LyingDisk(site.folder_of(name)) for name in KEEPERS}
     yield
-    for name in KEEPERS:
-        await site.processes[name].kill()
+    processes = [*(site.processes[name] for name in KEEPERS), *site.twins]
+    for process in processes:
+        await process.kill()
     for name, disk in disks.items():
         if disk.lose(dice):
             site.harm("lie", name)
     await asyncio.sleep(dice.uniform(0.0, AFTER_S))
-    for name in KEEPERS:
-        site.processes[name].start_again()
+    for process in processes:
+        process.start_again()
 
 
 @contextlib.asynccontextmanager

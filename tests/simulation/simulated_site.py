@@ -260,6 +260,7 @@ class Site:
             "alarms": self._alarm,
         }
         self.processes = {name: Process(self, name, work) for name, work in self._work.items()}
+        self.twins: list[Process] = []
 
     async def live(self) -> None:
         """Let the site live from the first to the last sample, with its accidents, and become quiet."""
