@@ -34,7 +34,7 @@ class Block:
         Variance that surges of the inflow may add, over `variance`; each as likely.
     span : (groups,) array
         Span of the time since the regime began, and condition, of each group: numbers from 0; pumps have the same.
-    surge : float
+    surge : float or (k,) array
         The one that is supposed.
     """
 
@@ -47,7 +47,7 @@ class Block:
     allowed: Floats
     surges: tuple[float, ...]
     span: Integers
-    surge: float = 0.0
+    surge: float | Floats = 0.0
 
     def group_sums(self, values: Floats) -> Floats:
         """(groups, ...) sums of (k, ...) values."""

@@ -11,7 +11,8 @@ from scipy.special import logsumexp
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
-from wetwell.sim2real.likelihood.ways import likeliest
+from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
+from wetwell.sim2real.likelihood.ways import POORLY, likeliest
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -21,10 +22,25 @@ WEIGHINGS = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stirred:
-    """A block with a surge of the inflow, and the error of the course of what swings."""
+    """A block with a surge of the inflow and its rain, and the error of the course of what swings.
+
+    Attributes
+    ----------
+    block : Block
+    swing : float
+    log_rain : float
+        What not knowing where it rains adds to the logarithm of the probability.
+    dry : Block, optional
+        The block without its rain, where there is some.
+    log_dry : float
+        Logarithm of the probability that it is dry in all cycles.
+    """
 
     block: Block
     swing: float
+    log_rain: float = 0.0
+    dry: Block | None = None
+    log_dry: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,12 +222,24 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
     """
     tried = []
     for surge, swing in product(block.surges, SWINGS if np.any(form.swinging) else SWINGS[:1]):
-        one = Stirred(block=replace(block, surge=surge), swing=swing)
+        one = _rained_on(replace(block, surge=surge), residuals, swing)
         log_prior, allowance = likeliest(one.block, residuals, form, swing)
         products, log_det = projected(one.block, columns, form, allowance)
-        tried.append((log_prior - 0.5 * log_det, products, one))
+        tried.append((one.log_rain + log_prior - 0.5 * log_det, products, one))
     totals = np.array([log - 0.5 * float(products[0, 0]) for log, products, _ in tried])
     best = int(np.argmax(totals))
     log, products, stirred = tried[best]
     unsure = float(logsumexp(totals) - totals[best] - np.log(len(tried)))
     return log + unsure, products, stirred
+
+
+def _rained_on(block: Block, residuals: Floats, swing: float) -> Stirred:
+    """A block with its likeliest rain, if its inflow has no meter."""
+    if len(block.surges) == 1:
+        return Stirred(block=block, swing=swing)
+    is_rainy, log_rain = rainy_cells(block, residuals)
+    if not is_rainy.any():
+        return Stirred(block=block, swing=swing, log_rain=log_rain)
+    wet = replace(block, surge=block.surge + RAIN * is_rainy)
+    log_dry = (int(block.cycle.max()) + 1) * float(np.log1p(-POORLY))
+    return Stirred(block=wet, swing=swing, log_rain=log_rain, dry=block, log_dry=log_dry)

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.likelihood.cells import Block
 from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, projected
 from wetwell.sim2real.likelihood.evidence import Evidence, Stirred
 from wetwell.sim2real.likelihood.ways import KNOWN, Way, Ways, likeliest
@@ -49,7 +50,14 @@ def flexible_factor(found: Evidence, form: Form) -> float:
 
 
 def _log(one: Stirred, residuals: Floats, form: Form, ways: Ways) -> float:
-    """Logarithm of the probability of the residuals of a block, its surge and its swing as they are."""
-    log_prior, allowance = likeliest(one.block, residuals, form, one.swing, ways)
-    products, log_det = projected(one.block, residuals[:, None], form, allowance)
+    """Logarithm of the probability of the residuals of a block, its surge and swing as they are, with rain or dry."""
+    wet = one.log_rain + _of_block(one.block, one.swing, residuals, form, ways)
+    if one.dry is None:
+        return wet
+    return float(np.logaddexp(wet, one.log_dry + _of_block(one.dry, one.swing, residuals, form, ways)))
+
+
+def _of_block(block: Block, swing: float, residuals: Floats, form: Form, ways: Ways) -> float:
+    log_prior, allowance = likeliest(block, residuals, form, swing, ways)
+    products, log_det = projected(block, residuals[:, None], form, allowance)
     return log_prior - 0.5 * (float(products[0, 0]) + log_det)
