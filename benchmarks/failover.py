@@ -34,7 +34,7 @@ SETTLE_S = 5.0
 
 
 async def measure(
-    site: PairSite, player: Player, kinds: list[str], rounds: int, seed: int
+    site: PairSite, player: Player, kinds: list[str], rounds: int, seed: int, apart_s: float
 ) -> dict[str, list[tuple[float, float, float]]]:
     """Of each kind its rounds: when the accident was, when all was well again, after how long the lease was taken."""
     shifts = random.Random(seed)
@@ -45,6 +45,7 @@ async def measure(
             for kind in kinds:
                 began_s, taken_s = await site.disturb(kind, shifts.choice(SHIFTS_S))
                 found[kind].append((began_s, time.monotonic(), taken_s))
+                await asyncio.sleep(apart_s)
             print(f"round {number + 1} of {rounds}", file=sys.stderr)
         await asyncio.sleep(SETTLE_S)
         await player.end_of_samples()
@@ -74,6 +75,9 @@ def main() -> None:
     parser.add_argument("--stations", type=int, default=16)
     parser.add_argument("--speed", type=float, default=200.0, help="how many times as fast as life the samples come")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--apart-s", type=float, default=0.0, help="pause before the next accident, in which all recover"
+    )
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="wetwell-failover-") as name, running_server() as server:
         folder = Path(name)
@@ -81,7 +85,9 @@ def main() -> None:
         files = (word for one in stations for word in ("--station", str(folder / f"{one.name}.toml")))
         site = PairSite(server.url, folder, ["detector", *files])
         player = Player(stations, arguments.speed, arguments.seed)
-        rounds = asyncio.run(measure(site, player, list(arguments.kinds), arguments.rounds, arguments.seed))
+        rounds = asyncio.run(
+            measure(site, player, list(arguments.kinds), arguments.rounds, arguments.seed, arguments.apart_s)
+        )
         judged = player.judged()
     counts = {name: getattr(judged, name) for name in ("expected", "missing", "twice", "otherwise", "plain_twice")}
     result = {

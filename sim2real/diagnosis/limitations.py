@@ -5,7 +5,7 @@ import numpy as np
 from wetwell.sim2real.recording.traces import Traces
 
 WITHOUT = {
-    "inflow_m3h": "no inflow: errors of the balance are unseen, and what the level does in a few cycles is taken for rain",
+    "inflow_m3h": "no inflow: errors of the balance are unseen; what the level does in few cycles is taken for rain",
     "level_m": "no level: nothing can be said of sump, controller and level sensor",
     "flow_m3h": "no flow: pump, rising main and head sensor are hard to tell apart",
     "head_m": "no head: pump, rising main and flow meter are hard to tell apart",

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES
 from wetwell.sim2real.residuals.bins import LEVEL, Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
@@ -32,6 +32,8 @@ class Block:
         As of `Cells`.
     surges : tuple of float
         Variance that surges of the inflow may add, over `variance`; each as likely.
+    in_storm : (cycles,) array
+        Whether several pumps run in a cycle: more comes in than one carries.
     span : (groups,) array
         Span of the time since the regime began, and condition, of each group: numbers from 0; pumps have the same.
     surge : float or (k,) array
@@ -46,6 +48,7 @@ class Block:
     variance: Floats
     allowed: Floats
     surges: tuple[float, ...]
+    in_storm: Flags
     span: Integers
     surge: float | Floats = 0.0
 
@@ -138,19 +141,22 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
     counts = np.bincount(of_bin).astype(np.float64)
     noise = np.bincount(of_bin, bins.floor) / counts
     variance, allowed = noise / counts, np.hypot(np.bincount(of_bin, bins.material) / counts, np.sqrt(1.0 - noise))
+    in_storm = np.bincount(bins.cycle, bins.regime == MULTI_PUMP) > 0.0
     block_of = (signal * len(REGIMES) + regime)[group]
     blocks = []
     for key in np.unique(block_of):
         rows = np.flatnonzero(block_of == key)
+        its_cycles, its_cycle = np.unique(cycle[rows], return_inverse=True)
         blocks.append(
             Block(
                 signal=int(key) // len(REGIMES),
                 regime=int(key) % len(REGIMES),
                 rows=rows,
                 group=np.unique(group[rows], return_inverse=True)[1],
-                cycle=np.unique(cycle[rows], return_inverse=True)[1],
+                cycle=its_cycle,
                 variance=variance[rows],
                 allowed=allowed[rows],
+                in_storm=in_storm[its_cycles],
                 span=np.unique(span[np.unique(group[rows])], return_inverse=True)[1],
                 surges=(0.0,) if has_inflow or key // len(REGIMES) != LEVEL else SURGES,
             )

@@ -11,8 +11,8 @@ from scipy.special import logsumexp
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
-from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
-from wetwell.sim2real.likelihood.ways import POORLY, likeliest
+from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
+from wetwell.sim2real.likelihood.ways import likeliest
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -240,6 +240,6 @@ def _rained_on(block: Block, residuals: Floats, swing: float) -> Stirred:
     is_rainy, log_rain = rainy_cells(block, residuals)
     if not is_rainy.any():
         return Stirred(block=block, swing=swing, log_rain=log_rain)
-    wet = replace(block, surge=block.surge + RAIN * is_rainy)
-    log_dry = (int(block.cycle.max()) + 1) * float(np.log1p(-POORLY))
+    wet = replace(block, surge=np.where(is_rainy, block.surge + RAIN, block.surge))
+    log_dry = float(log_priors(block)[0].sum())
     return Stirred(block=wet, swing=swing, log_rain=log_rain, dry=block, log_dry=log_dry)

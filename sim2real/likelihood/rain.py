@@ -17,7 +17,7 @@ def rainy_cells(block: Block, residuals: Floats) -> tuple[Flags, float]:
     $$\sum_c \ln\left((1 - p)\,p(r_c \mid \text{dry}) + p\,p(r_c \mid \text{rain})\right)
     - \ln p(r_c \mid \text{chosen})$$
 
-    It rains in a cycle with the probability `POORLY` p.
+    It rains in a cycle with the probability p: `POORLY`, but where several pumps run it is dry with that one.
 
     Parameters
     ----------
@@ -25,10 +25,17 @@ def rainy_cells(block: Block, residuals: Floats) -> tuple[Flags, float]:
         With the surge that is supposed while it is dry.
     residuals : (k,) array
     """
-    dry, rain = _logs(block, residuals, 0.0) + np.log(1.0 - POORLY), _logs(block, residuals, RAIN) + np.log(POORLY)
-    is_rainy = rain > dry
-    unsure = np.logaddexp(dry, rain) - np.where(is_rainy, rain - np.log(POORLY), dry - np.log(1.0 - POORLY))
+    log_dry, log_rain = log_priors(block)
+    dry, rain = _logs(block, residuals, 0.0), _logs(block, residuals, RAIN)
+    is_rainy = rain + log_rain > dry + log_dry
+    unsure = np.logaddexp(dry + log_dry, rain + log_rain) - np.where(is_rainy, rain, dry)
     return is_rainy[block.cycle], float(unsure.sum())
+
+
+def log_priors(block: Block) -> tuple[Floats, Floats]:
+    """(cycles,) logarithms of the probabilities that it is dry, and that it rains."""
+    rain = np.where(block.in_storm, 1.0 - POORLY, POORLY)
+    return np.log1p(-rain), np.log(rain)
 
 
 def _logs(block: Block, residuals: Floats, rain: float) -> Floats:

@@ -272,7 +272,7 @@ def test_surges_of_an_inflow_without_a_meter_are_no_surprise_in_the_level_and_on
 
 
 def test_what_no_surge_makes_is_no_likelier_unknown_where_there_may_be_one():
-    """What is known and what is not are weighed with the same surge; rain in all cycles is unlikely, not impossible."""
+    """What is known and what is not are weighed with the same surge; rain in all cycles is unlikely only."""
     noise = np.random.default_rng(14).normal(size=made(has_inflow=True).group.size)
     factors = []
     for has_inflow in (True, False):
@@ -297,7 +297,7 @@ def test_rain_in_some_cycles_is_nothing_unknown_and_the_same_in_all_is():
 
 def test_rain_is_summed_over_as_it_would_be_cycle_by_cycle():
     (block,) = [block for block in made(has_inflow=False).blocks if block.signal == LEVEL]
-    block = replace(block, surge=1.0)
+    block = replace(block, surge=1.0, in_storm=np.arange(CYCLES) == 1)
     residuals = np.random.default_rng(16).normal(size=block.rows.size) * np.where(block.cycle < 3, 6.0, 1.0)
     is_rainy, log = rainy_cells(block, residuals)
     assert set(block.cycle[is_rainy]) <= {0, 1, 2}
@@ -310,5 +310,21 @@ def test_rain_is_summed_over_as_it_would_be_cycle_by_cycle():
             surging = 0.5 * (1.0 + rain) * block.variance[at]
             whole = np.diag(expected_squares(block)[at] + surging) + np.outer(np.sqrt(surging), np.sqrt(surging))
             logs.append(multivariate_normal(cov=whole).logpdf(residuals[at]))
-        expected += logsumexp(logs, b=[1.0 - POORLY, POORLY]) - logs[int(is_rainy[at[0]])]
+        rain = 1.0 - POORLY if cycle == 1 else POORLY
+        expected += logsumexp(logs, b=[1.0 - rain, rain]) - logs[int(is_rainy[at[0]])]
     assert log == pytest.approx(expected)
+
+
+def test_several_pumps_tell_of_rain():
+    """However many cycles it is: the level of those is no sign of something unknown."""
+    cells = made(has_inflow=False)
+    noise = np.random.default_rng(17).normal(size=cells.group.size) * np.sqrt(cells.variance)
+    factors = []
+    for in_storm in (False, True):
+        blocks = tuple(replace(block, in_storm=np.full(CYCLES, in_storm)) for block in cells.blocks)
+        each = replace(cells, blocks=blocks)
+        (level,) = [block for block in blocks if block.signal == LEVEL]
+        residuals = noise.copy()
+        residuals[level.rows] += 5.0 * cells.allowed[level.rows]
+        factors.append(flexible_factor(evidence_of_none(each, residuals), no_form(each)))
+    assert factors[0] > 5.0 > 0.0 > factors[1]
