@@ -7,7 +7,8 @@ SCENARIO ?= demo
 IMAGE ?= wetwell:latest
 BUILDER ?= docker
 BASE ?= python:3.11-slim-bookworm
-PYTEST := $(BIN)/pytest -q --numprocesses=4 --dist=worksteal --durations=10
+WORKERS := 3
+PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=worksteal --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
@@ -21,6 +22,7 @@ help:  ## Show the targets
 up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C stops
 	@exec $(BIN)/wetwell up --scenario $(SCENARIO)
 
+test: WORKERS := 4
 test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard each commit
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint imports types kernels
 	$(PYTEST) -m "not check and not long and not soak"
