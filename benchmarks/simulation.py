@@ -29,10 +29,7 @@ MEMORY = Path("/dev/shm")  # noqa: S108 -- each site has a folder of its own the
 def lived(task: tuple[str, int, int, float, int]) -> tuple[int, list[str], Counter[str], float]:
     """Seed, broken rules, accidents and seconds of one core of a site."""
     begin_s = time.process_time()
-    try:
-        rules, accidents = life_of(task)
-    except Exception as error:  # noqa: BLE001 - what was kept cannot be read: told with its seed, as a broken rule
-        rules, accidents = [f"it ended with {error!r}"], []
+    rules, accidents = life_of(task)
     return task[1], rules, Counter(accidents), time.process_time() - begin_s
 
 
@@ -41,7 +38,11 @@ def life_of(task: tuple[str, int, int, float, int], plan: Plan | None = None) ->
     kind, seed, stations, days, period_s = task
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
         site = KINDS[kind](seed, stations, days, period_s, Path(folder), plan)
-        life = broken_rules(site), site.accidents
+        try:
+            rules = broken_rules(site)
+        except Exception as error:  # noqa: BLE001 - what was kept cannot be read: a broken rule, too
+            rules = [f"it ended with {error!r}"]
+        life = rules, site.accidents
     del site
     gc.collect()  # a site is full of circles, and the detector has frozen what was there when it began
     return life

@@ -37,7 +37,7 @@ class Stirred:
     """
 
     block: Block
-    swing: float
+    swing: float = SWINGS[0]
     log_rain: float = 0.0
     dry: Block | None = None
     log_dry: float = 0.0
@@ -221,8 +221,9 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
         surge and swing.
     """
     tried = []
-    for surge, swing in product(block.surges, SWINGS if np.any(form.swinging) else SWINGS[:1]):
-        one = _rained_on(replace(block, surge=surge), residuals, swing)
+    rained = [_rained_on(replace(block, surge=surge), residuals) for surge in block.surges]
+    for still, swing in product(rained, SWINGS if np.any(form.swinging) else SWINGS[:1]):
+        one = replace(still, swing=swing)
         log_prior, allowance = likeliest(one.block, residuals, form, swing)
         products, log_det = projected(one.block, columns, form, allowance)
         tried.append((one.log_rain + log_prior - 0.5 * log_det, products, one))
@@ -233,13 +234,13 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
     return log + unsure, products, stirred
 
 
-def _rained_on(block: Block, residuals: Floats, swing: float) -> Stirred:
+def _rained_on(block: Block, residuals: Floats) -> Stirred:
     """A block with its likeliest rain, if its inflow has no meter."""
     if len(block.surges) == 1:
-        return Stirred(block=block, swing=swing)
+        return Stirred(block=block)
     is_rainy, log_rain = rainy_cells(block, residuals)
     if not is_rainy.any():
-        return Stirred(block=block, swing=swing, log_rain=log_rain)
+        return Stirred(block=block, log_rain=log_rain)
     wet = replace(block, surge=np.where(is_rainy, block.surge + RAIN, block.surge))
     log_dry = float(log_priors(block)[0].sum())
-    return Stirred(block=wet, swing=swing, log_rain=log_rain, dry=block, log_dry=log_dry)
+    return Stirred(block=wet, log_rain=log_rain, dry=block, log_dry=log_dry)

@@ -4,14 +4,14 @@ import asyncio
 import contextlib
 import math
 import random
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from disks import LyingDisk, backup_of, bring_back, flip_bit, misdirect
 
 if TYPE_CHECKING:
-    from simulated_site import Site
+    from simulated_site import Process, Site
 
 RARE_S, CONSTANT_S = 172_800.0, 14_400.0
 """Mean time between two accidents of a kind, of which a seed has rolled one or the other."""
@@ -96,14 +96,18 @@ async def _one(site: "Site", accident: Accident) -> None:
 
 @contextlib.asynccontextmanager
 async def _kill(site: "Site", accident: Accident, _dice: random.Random) -> AsyncIterator[None]:
-    names = {"site": DAEMONS, "machine": KEEPERS}.get(accident.target, (accident.target,))
-    twins = site.twins if accident.target in {"site", "machine"} else ()
-    processes = [*(site.processes[name] for name in names), *twins]
+    names = {"site": DAEMONS, "machine": KEEPERS}.get(accident.target)
+    processes = [site.processes[accident.target]] if names is None else _with_twins(site, names)
     for process in processes:
         await process.kill()
     yield
     for process in processes:
         process.start_again()
+
+
+def _with_twins(site: "Site", names: Iterable[str]) -> "list[Process]":
+    """All that ends with a machine."""
+    return [*(site.processes[name] for name in names), *site.twins]
 
 
 @contextlib.asynccontextmanager
@@ -171,7 +175,7 @@ async def _lie(site: "Site", _accident: Accident, dice: random.Random) -> AsyncI
     """The disks say that they have written what they have not; then the power fails."""
     disks = {name: LyingDisk(site.folder_of(name)) for name in KEEPERS}
     yield
-    processes = [*(site.processes[name] for name in KEEPERS), *site.twins]
+    processes = _with_twins(site, KEEPERS)
     for process in processes:
         await process.kill()
     for name, disk in disks.items():
