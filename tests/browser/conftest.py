@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import pytest
-from browser_site import CLOGGING, SCENARIO, free_port, until, whole_site
+from browser_site import CLOGGING, SCENARIO, until, whole_site
 from playwright.sync_api import expect, sync_playwright
+from ports import free_port
 
 CHROMIUM = Path("/usr/bin/chromium")
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"

@@ -6,8 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
-from browser_site import Site, free_port, rows_taken_along, until, wetwell
+from browser_site import Site, rows_taken_along, until, wetwell
 from playwright.sync_api import expect
+from ports import free_port
 
 from wetwell.detector.verdict.station_model import StationModel
 from wetwell.protocols.bus.keys import alarm_key, gap_key, model_key, sample_key, verdict_key

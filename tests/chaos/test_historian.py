@@ -5,7 +5,6 @@ import contextlib
 import os
 import random
 import shutil
-import socket
 import sqlite3
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ports import free_port
 
 from wetwell.protocols.bus.keys import history_key, sample_key
 from wetwell.protocols.bus.zenoh.link import open_router
@@ -73,9 +73,7 @@ def test_a_historian_that_is_killed_again_and_again_loses_nothing_acknowledged(t
 
 
 async def killed_beside_a_station(folder: Path) -> tuple[History, int]:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        place = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+    place = f"tcp/127.0.0.1:{free_port()}"
     command = [sys.executable, "-m", "wetwell.services", "historian", "--data", str(folder), "--zenoh", place]
     question = HistoryQuery(kind="samples", raw=True, points=2000)
     with open_router(place) as bus:

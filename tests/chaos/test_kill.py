@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from ports import free_port
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
@@ -39,9 +39,7 @@ class Site:
     """Processes of a site that can be killed and started again."""
 
     def __init__(self, folder: Path, speed: int = SPEED) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.folder = folder
         self._log = folder / "log"
         self._commands = {

@@ -4,7 +4,6 @@ import math
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from ports import free_port
 from walks import LEFT_OUT_PAGES, WALKS, Walk
 
 from wetwell.services.reports.text_table import SCREEN_WIDTH
@@ -186,11 +186,7 @@ def wait_for_a_word(process: subprocess.Popen[bytes], said: Path) -> None:
 
 def free_ports() -> dict[str, str]:
     """A free port for each of the usual ones."""
-    probes = [socket.create_server(("127.0.0.1", 0)) for _ in PORTS]
-    free = [str(probe.getsockname()[1]) for probe in probes]
-    for probe in probes:
-        probe.close()
-    return dict(zip(PORTS, free, strict=True))
+    return {port: str(free_port()) for port in PORTS}
 
 
 def environment_of(folder: Path, ports: dict[str, str]) -> dict[str, str]:

@@ -5,13 +5,13 @@ import contextlib
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from ports import free_port
 from typer.testing import CliRunner
 
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alarm_report_key, verdict_key
@@ -124,9 +124,7 @@ async def life(bus: ZenohBus, endpoint: str, folder: Path) -> list[tuple[str, st
 
 
 def test_a_killed_daemon_raises_nothing_twice_and_loses_no_act(tmp_path: Path) -> None:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
     with open_router(endpoint) as bus:
         told = asyncio.run(life(bus, endpoint, tmp_path))
     states = [state for _, state in told]

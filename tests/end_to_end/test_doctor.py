@@ -2,12 +2,12 @@
 
 import asyncio
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from ports import free_port
 
 from wetwell.protocols.bus.keys import alarm_report_key
 from wetwell.protocols.bus.zenoh.link import open_router
@@ -17,12 +17,6 @@ from wetwell.services.doctor.finding import Finding, exit_code
 pytestmark = pytest.mark.check
 
 LISTEN_S = 1.5
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 def start(*arguments: str) -> subprocess.Popen[bytes]:

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -11,6 +10,7 @@ import time
 import numpy as np
 import pytest
 import zenoh
+from ports import free_port
 
 pytestmark = pytest.mark.check
 
@@ -18,12 +18,6 @@ SPEED = 20
 SAMPLES = 30
 DEADLINE_S = 90.0
 SCENARIO = 'name = "soon"\ninitial_level_m = 1.9\ninflow = {kind = "empirical"}\n'
-
-
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 @contextlib.contextmanager

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import zenoh
+from ports import free_port
 
 SCENARIO = """
 name = "quick-blockage"
@@ -32,12 +33,6 @@ after = "hold"
 """
 
 DEADLINE_S = 90.0
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 @contextlib.contextmanager

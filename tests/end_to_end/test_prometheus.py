@@ -14,7 +14,8 @@ from pathlib import Path
 import httpx
 import pytest
 import yaml
-from browser_site import CLOGGING, Site, free_port, until
+from browser_site import CLOGGING, Site, until
+from ports import free_port
 
 pytestmark = [
     pytest.mark.check,
@@ -44,9 +45,7 @@ def scrape_config(ports):
 
 @contextlib.contextmanager
 def running(command, **environment):
-    process = subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | environment
-    )
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=os.environ | environment)
     try:
         yield process
     finally:
@@ -79,10 +78,10 @@ def prometheus(tmp_path_factory):
         assert answer["status"] == "success", (parameters, answer)
         return answer["data"]
 
-    with running(up, **told), running(watcher):
-        until(lambda: pumps_of(site) == ["system_fault"] * 3)
+    with running(up, **told) as services, running(watcher) as server:
+        until(lambda: pumps_of(site) == ["system_fault"] * 3, services, server)
         told_s = time.time()
-        until(lambda: float(ask("query", query="min(timestamp(up))")["result"][0]["value"][1]) > told_s + 2.0)
+        until(lambda: float(ask("query", query="min(timestamp(up))")["result"][0]["value"][1]) > told_s + 2.0, server)
         yield ask
 
 

@@ -4,7 +4,6 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from ports import free_port
 
 from wetwell.protocols.timestamps import MAX_STAMP_NS
 from wetwell.services.historian.store.folder_store import FolderStore
@@ -24,12 +24,6 @@ PARTS = ("alarms", "dashboard", "detector", "historian", "simulator", "watch")
 STARTS = 20
 COLD = (0, 7, 14)
 """Of these starts the kernels are compiled; in the others they are loaded."""
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 def kept(folder: Path) -> list[int]:

@@ -2,15 +2,14 @@
 
 import json
 import os
-import socket
 import subprocess
 import sys
 
+from ports import free_port
+
 
 def free_address(host: str) -> str:
-    with socket.socket() as probe:
-        probe.bind((host, 0))
-        return f"{host}:{probe.getsockname()[1]}"
+    return f"{host}:{free_port(host)}"
 
 
 class Router:

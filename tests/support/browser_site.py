@@ -4,7 +4,6 @@ import contextlib
 import csv
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from ports import free_port
 
 DEADLINE_S = 180.0
 SCENARIO = """
@@ -48,12 +48,6 @@ after = "hold"
 """
 
 
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
-
-
 @contextlib.contextmanager
 def wetwell(*arguments, **environment):
     """A command as a process; killed at the end if it has not ended."""
@@ -71,10 +65,12 @@ def wetwell(*arguments, **environment):
         process.communicate()
 
 
-def until(is_so):
-    """Wait until something is so that real processes do: there is no virtual time here."""
+def until(is_so, *processes):
+    """Wait until something is so that these processes do: there is no virtual time here."""
     end = time.monotonic() + DEADLINE_S
     while time.monotonic() < end:
+        for process in processes:
+            assert process.poll() is None, f"{process.args} has ended"
         with contextlib.suppress(httpx.TransportError):
             if is_so():
                 return

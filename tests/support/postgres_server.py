@@ -3,11 +3,12 @@
 import contextlib
 import os
 import shutil
-import socket
 import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+
+from ports import free_port
 
 
 def _programs() -> list[Path]:
@@ -40,9 +41,7 @@ class PostgresServer:
     def __init__(self, programs: Path, folder: Path) -> None:
         self._programs, self._folder = programs, folder
         self._user = ["runuser", "-u", "postgres", "--"] if os.getuid() == 0 else []
-        with socket.socket() as listener:
-            listener.bind(("127.0.0.1", 0))
-            self.port = listener.getsockname()[1]
+        self.port = free_port()
         self.url = f"postgresql://wetwell@127.0.0.1:{self.port}/postgres"
         self._run("initdb", "-D", folder / "data", "-U", "wetwell", "--auth=trust", "--no-sync")
 

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import trustme
+from ports import free_port
 
 from wetwell.protocols.bus.keys import alarm_act_key, alive_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.access import ZenohAccess
@@ -44,9 +44,7 @@ class Router:
 
 @contextlib.contextmanager
 def running_router(folder: Path, scheme: str, **settings: str) -> Iterator[Router]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"{scheme}/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"{scheme}/127.0.0.1:{free_port()}"
     environment = os.environ | {f"WETWELL_ZENOH__{name.upper()}": value for name, value in settings.items()}
     command = [sys.executable, "-m", "wetwell.services", "router", "--zenoh", endpoint]
     log = folder / f"{scheme}.log"
@@ -139,9 +137,7 @@ def test_wrong_certificate_is_refused_and_logged(by_certificate, folder, name, a
 
 
 def test_a_router_of_another_authority_is_not_trusted(folder):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tls/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tls/127.0.0.1:{free_port()}"
     with (
         open_router(endpoint, holder(folder, "false-router", "other-ca.pem")),
         pytest.raises(LinkError, match="one of the certificates"),

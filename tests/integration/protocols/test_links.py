@@ -2,12 +2,12 @@
 
 import asyncio
 import contextlib
-import socket
 import threading
 from collections.abc import Iterator
 
 import pytest
 from memory_bus import MemoryBus
+from ports import free_port
 
 from wetwell.protocols.bus.interface import Bus, Presence, Publisher, Subscription
 from wetwell.protocols.bus.zenoh.link import open_client, open_router
@@ -22,9 +22,7 @@ def buses(request: pytest.FixtureRequest) -> Iterator[Pair]:
         bus = MemoryBus()
         yield bus, bus
         return
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
     with contextlib.ExitStack() as stack:
         router = stack.enter_context(open_router(endpoint))
         if request.param == "one_zenoh_router":

@@ -4,11 +4,11 @@ import asyncio
 import contextlib
 import os
 import signal
-import socket
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+from ports import free_port
 
 pytest.importorskip("distributed")
 
@@ -75,9 +75,7 @@ async def judged_and_wanted(tmp_path: Path) -> tuple[Verdicts, Verdicts]:
     (tmp_path / "stations").mkdir()
     for name in NAMES[:3]:
         (tmp_path / "stations" / f"{name}.toml").write_text(station_file(name))
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
     with open_router(endpoint) as bus:
         verdicts = bus.subscribe(verdict_key("*"), history=100, capacity=100_000)
         async with running_fleet(tmp_path, bus, endpoint) as (_, client):

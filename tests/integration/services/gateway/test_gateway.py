@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import shutil
-import socket
 import ssl
 import subprocess
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 import trustme
 from memory_bus import MemoryBus
+from ports import free_port
 from pyModbusTCP.server import DataBank
 from pyModbusTCP.server import ModbusServer as ForeignServer
 from pyModbusTCP.utils import encode_ieee, long_list_to_word
@@ -154,9 +154,7 @@ def test_pymodbustcp(tmp_path):
     show(100, nan, nan, 9.5, nan)
     show(120, nan, nan, nan, 7.75)
     bank.set_input_registers(128, [1])
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     server = ForeignServer("127.0.0.1", port, no_block=True, data_bank=bank)
     server.start()
     try:

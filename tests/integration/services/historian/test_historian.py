@@ -2,8 +2,9 @@
 
 import asyncio
 import contextlib
-import socket
 from pathlib import Path
+
+from ports import free_port
 
 from wetwell.protocols.bus.keys import history_key, sample_block_key, sample_key
 from wetwell.protocols.bus.zenoh.link import open_client, open_router
@@ -17,9 +18,7 @@ from wetwell.services.historian.store.folder_store import FolderStore
 
 
 def endpoint() -> str:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 async def over_zenoh(folder: Path) -> None:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pytest
 from memory_bus import MemoryBus
+from ports import free_port
 from prometheus_client.parser import text_string_to_metric_families
 
 from wetwell.protocols.errors import LinkError
@@ -173,12 +174,6 @@ def test_without_systemd_or_with_a_dead_socket_nothing_happens(tmp_path, monkeyp
         monkeypatch.setenv("NOTIFY_SOCKET", f"@wetwell-test-{os.getpid()}")
         notify("READY=1")
         assert receiver.recv(64) == b"READY=1"
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 @contextlib.contextmanager
