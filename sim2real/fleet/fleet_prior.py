@@ -1,7 +1,8 @@
 """Prior of a station from the diagnoses of others: how usual effects are, and how their parameters are spread."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -92,7 +93,7 @@ def fleet_prior(findings: Sequence[Finding], without: str | None = None) -> Flee
        Journal of the Royal Statistical Society A 172, 2009 (what it says of a further one).
     """
     heard = [one for one in findings if one.station != without]
-    free = {one.name: {each.name: each.unit for each in one.free} for one in candidates_of(1, 1)}
+    free = _free_parameters()
     counts = {name: sum(name in {effect.name for effect in one.effects} for one in heard) for name in free}
     mean = float(np.mean([count + ADDED for count in counts.values()]))
     found: dict[str, dict[str, UsualParameter]] = {}
@@ -110,6 +111,12 @@ def fleet_prior(findings: Sequence[Finding], without: str | None = None) -> Flee
         effects={name: UsualEffect(stations=count, weight=(count + ADDED) / mean) for name, count in counts.items()},
         parameters=found,
     )
+
+
+@cache
+def _free_parameters() -> Mapping[str, Mapping[str, str]]:
+    """Of each effect the units of its free parameters."""
+    return {one.name: {each.name: each.unit for each in one.free} for one in candidates_of(1, 1)}
 
 
 def _values(effects: Sequence[FoundEffect], parameter: str) -> tuple[Floats, Floats]:

@@ -143,7 +143,7 @@ def left_beside(one: Signature, other: Signature) -> float:
     """What is left of a cause when another one is taken out as far as it goes; of its worst form. [noise]."""
     limits = other.cause.limits
     return min(
-        math.sqrt(2.0 * lsq_linear(other.columns, sign * column, limits).cost)
+        math.sqrt(2.0 * lsq_linear(other.columns, sign * column, limits, method="bvls").cost)
         for column in one.columns.T
         for sign in one.cause.signs
     )

@@ -1,5 +1,7 @@
 """Records of an inlet station with two mains, two sizes of pumps and no meter of head: solved here a second time."""
 
+import math
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -63,7 +65,8 @@ def duty_flows_m3h(curves, speed, lift_m, friction_h2_m5):
         c0, c1, c2 = curve
         if ratio <= 0.0 or c0 * ratio**2 <= head_m:
             return 0.0
-        return float(np.max(np.roots([c2, c1 * ratio, c0 * ratio**2 - head_m]).real))
+        slope = c1 * ratio
+        return (slope + math.sqrt(slope**2 - 4.0 * c2 * (c0 * ratio**2 - head_m))) / (-2.0 * c2)
 
     def flows(head_m):
         return np.array([flow(curve, ratio, head_m) for curve, ratio in zip(curves, speed, strict=True)])

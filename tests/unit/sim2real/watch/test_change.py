@@ -20,7 +20,11 @@ def test_noise_alone_is_taken_for_a_change_about_as_seldom_as_promised():
     looks, false = 20_000, 0
     for _ in range(looks):
         values = rng.normal(size=(2, 10, 5))
-        now, before = ({str(k): shift_of(row) for k, row in enumerate(part)} for part in values)
+        means, errors = values.mean(axis=-1).tolist(), (values.std(axis=-1, ddof=1) / np.sqrt(5)).tolist()
+        now, before = (
+            {str(k): Shift(mean=means[part][k], error=errors[part][k], cycles=5) for k in range(10)}
+            for part in range(2)
+        )
         false += bool(changed_groups(now, before, least=0.0))
     assert false <= 4 * FALSE_CHANGES * looks
 
