@@ -53,11 +53,13 @@ class Subscription(Protocol[T]):
 
     Characteristics: buffered: up to `capacity`, and a bound in bytes · when full: drops the oldest and counts it in
     `dropped`; one that recovers what is lost leaves it to the publisher until there is room · filled from any
-    thread · a link that comes back goes on in the same subscription · `missed` counts what nobody has any more.
+    thread · a link that comes back goes on in the same subscription · `missed` counts what nobody has any more ·
+    `is_behind` tells whether publishers keep messages that have yet to come.
     """
 
     dropped: int
     missed: int
+    is_behind: bool
 
     async def receive(self) -> list[T]:
         """Wait until a message is there, then return all that are, oldest first."""

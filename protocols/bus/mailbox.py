@@ -35,6 +35,8 @@ class Mailbox(Generic[T]):
         Messages for which there was no room.
     missed : int
         Messages that were lost on the way and that nobody has any more; the link counts them.
+    is_behind : bool
+        Whether publishers keep messages that have yet to come; the link tells it.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Mailbox(Generic[T]):
             raise ValueError(f"capacity must be at least 1, got {capacity}")
         self.dropped = 0
         self.missed = 0
+        self.is_behind = False
         self._capacity = capacity
         self._size_bytes = size_bytes
         self._most_bytes = most_bytes

@@ -61,7 +61,7 @@ async def _judge_in_turn(settings: Settings, stations: Sequence[Station]) -> Non
                 follower = Follower(bus, [station.name for station in stations], kept_s)
                 following = asyncio.create_task(follower.run(), name="detector.follow")
                 try:
-                    await role.take(bus)
+                    await role.take(bus, follower.is_ready)
                 finally:
                     following.cancel()
 

@@ -116,6 +116,10 @@ class Follower:
         self._came: deque[tuple[float, Waiting, int]] = deque()
         self.samples = bus.collect(list(self._keys), history=ALL_KEPT, capacity=CAPACITY)
 
+    def is_ready(self) -> bool:
+        """Whether all samples have come that publishers keep."""
+        return not self.samples.is_behind
+
     async def run(self) -> None:
         """Let what comes wait, for ever."""
         while True:

@@ -57,15 +57,16 @@ class Claim:
         """Whether this process may act now."""
         return not self.tenure.is_over(self._clock())
 
-    async def take(self) -> bool:
-        """Take the lease if nobody has it; whether it was taken.
+    async def take(self, *, is_ready: bool = True) -> bool:
+        """Take the lease if nobody has it; whether it was taken. Who is not ready does not show that it stands by.
 
         Raises
         ------
         LinkError
             If the database does not answer in time.
         """
-        return await self._ask(lambda lease, now_s: lease.taken(self.holder, now_s, self._ttl_s))
+        holder = self.holder if is_ready else None
+        return await self._ask(holder, lambda lease, now_s: lease.taken(self.holder, now_s, self._ttl_s))
 
     async def renew(self) -> bool:
         """Renew the lease; False if another has it.
@@ -76,7 +77,7 @@ class Claim:
             If the database does not answer in time.
         """
         token = self.tenure.token
-        return await self._ask(lambda lease, now_s: lease.renewed(token, now_s, self._ttl_s))
+        return await self._ask(None, lambda lease, now_s: lease.renewed(token, now_s, self._ttl_s))
 
     async def release(self) -> None:
         """Give the lease back.
@@ -87,11 +88,11 @@ class Claim:
             If the database does not answer in time.
         """
         token, self.tenure = self.tenure.token, Tenure(self.tenure.token, float("-inf"))
-        await self._leases.change(self.holder, lambda lease, _: lease.released(token))
+        await self._leases.change(None, lambda lease, _: lease.released(token))
 
-    async def _ask(self, change: Change) -> bool:
+    async def _ask(self, shown: str | None, change: Change) -> bool:
         asked_s = self._clock()
-        lease = await self._leases.change(self.holder, change)
+        lease = await self._leases.change(shown, change)
         if lease is None:
             return False
         self.lease, self.tenure = lease, Tenure.asked(lease.token, asked_s, self._ttl_s)
@@ -146,13 +147,21 @@ class Membership:
         token = self.token
         return Fence(lambda database: check_token(database, self.name, token), unfrozen(self._patience_s))
 
-    async def take(self, bus: Bus) -> None:
-        """Stand by until the lease is taken; only while the bus can be reached."""
+    async def take(self, bus: Bus, is_ready: Callable[[], bool] = lambda: True) -> None:
+        """Stand by until the lease is taken; only while the bus can be reached.
+
+        Parameters
+        ----------
+        bus : Bus
+        is_ready : callable
+            Whether it could go on at once. One that could not takes the lease as well, if nobody has it, but does not
+            show that it stands by.
+        """
         log.info("role '%s': %s stands by", self.name, self._claim.holder)
         is_told = False
         while True:
             try:
-                if bus.is_connected and await self._claim.take():
+                if bus.is_connected and await self._claim.take(is_ready=is_ready()):
                     break
                 is_told = False
             except LinkError as error:

@@ -16,7 +16,7 @@ FORGOTTEN_S = 3600.0
 
 
 class Member(NamedTuple):
-    """A life of a member, and how many seconds ago it was seen."""
+    """A life of a member, and how many seconds ago it was seen to stand by."""
 
     holder: str
     age_s: float
@@ -34,8 +34,10 @@ class Standing(NamedTuple):
 class Leases(Protocol):
     """Leases that are changed by compare-and-set."""
 
-    async def change(self, holder: str, change: Change) -> Lease | None:
+    async def change(self, shown: str | None, change: Change) -> Lease | None:
         """The lease as it was changed; None if it was left, or somebody else changed it meanwhile.
+
+        A member that is `shown` stands by now.
 
         Raises
         ------
@@ -57,24 +59,27 @@ class LeaseTable:
         self._database = database
         self._role = role
 
-    async def change(self, holder: str, change: Change) -> Lease | None:
+    async def change(self, shown: str | None, change: Change) -> Lease | None:
         """The lease as it was changed; None if it was left, or somebody else changed it meanwhile.
+
+        A member that is `shown` stands by now.
 
         Raises
         ------
         LinkError
             If the database does not answer in time.
         """
-        return await self._database.call(lambda database: _change(database, self._role, holder, change))
+        return await self._database.call(lambda database: _change(database, self._role, shown, change))
 
 
-def _change(database: psycopg.Connection[Any], role: str, holder: str, change: Change) -> Lease | None:
+def _change(database: psycopg.Connection[Any], role: str, shown: str | None, change: Change) -> Lease | None:
     rows = database.execute(
         "WITH seen AS (INSERT INTO wetwell.member "
-        "VALUES (%(role)s, %(holder)s, extract(epoch FROM clock_timestamp())) "
-        "ON CONFLICT (role, holder) DO UPDATE SET seen_s = excluded.seen_s RETURNING seen_s) "
-        "SELECT seen_s, holder, token, since_s, expires_s FROM seen LEFT JOIN wetwell.lease ON role = %(role)s",
-        {"role": role, "holder": holder},
+        "SELECT %(role)s, %(shown)s, extract(epoch FROM clock_timestamp()) WHERE %(shown)s::text IS NOT NULL "
+        "ON CONFLICT (role, holder) DO UPDATE SET seen_s = excluded.seen_s) "
+        "SELECT extract(epoch FROM clock_timestamp())::float8, holder, token, since_s, expires_s "
+        "FROM (SELECT) AS asked LEFT JOIN wetwell.lease ON role = %(role)s",
+        {"role": role, "shown": shown},
     ).fetchall()
     now_s, *kept = rows[0]
     before = Lease() if kept[1] is None else Lease(*kept)

@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import psycopg
 from cut_line import CutLine
+from ports import free_port
 from shifted_clock import shift_file
 
 from wetwell.protocols.bus.zenoh.link import ZenohBus, open_router
@@ -63,7 +63,7 @@ class PairSite:
         """Start all; members by their names."""
         parts = psycopg.conninfo.conninfo_to_dict(self._url)
         async with contextlib.AsyncExitStack() as stack:
-            port = _free_port()
+            port = free_port()
             self.endpoint = f"tcp/127.0.0.1:{port}"
             self.bus: ZenohBus = stack.enter_context(open_router(self.endpoint))
             for name in names:
@@ -124,13 +124,14 @@ class PairSite:
                 await asyncio.sleep(0.05)
 
     async def both_there(self) -> None:
-        """Wait until all members have been seen just now."""
+        """Wait until one member owns the role, and all others stand by."""
         async with asyncio.timeout(PATIENCE_S):
             while True:
                 standing = await self.standings()
-                fresh = [one for one in standing.members if one.age_s < FRESH_S] if standing else []
-                if len({one.holder.partition("/")[0] for one in fresh}) == len(self.members):
-                    return
+                if standing is not None and standing.now_s < standing.lease.expires_s:
+                    there = {one.holder for one in standing.members if one.age_s < FRESH_S} | {standing.lease.holder}
+                    if len({holder.partition("/")[0] for holder in there}) == len(self.members):
+                        return
                 await asyncio.sleep(0.1)
 
     def kill(self, member: Process) -> None:
@@ -198,8 +199,3 @@ class PairSite:
 def _mend(lines: Sequence[CutLine]) -> None:
     for line in lines:
         line.mend()
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        return int(free.getsockname()[1])

@@ -51,6 +51,7 @@ class ZenohSubscription:
         self.history = history
         self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
+        self._questions = 0
         self._mailbox = mailbox
         self._deliver = deliver
         self._tails: deque[tuple[str, bytes]] = deque()
@@ -74,6 +75,14 @@ class ZenohSubscription:
     def is_crowded(self) -> bool:
         """Whether so much waits that what its publishers keep is better left with them."""
         return self.recovers and (self._mailbox.is_crowded or bool(self.sequencer.ready))
+
+    def await_answers(self, more: int) -> None:
+        """Count the questions of this subscription that wait for an answer up or down."""
+        self._questions += more
+        self._tell_behind()
+
+    def _tell_behind(self) -> None:
+        self._mailbox.is_behind = self._questions > 0 or bool(self.sequencer.ready)
 
     def fetch(self, now_s: float) -> None:
         """Take what has come, in order, and pass it on; where it is crowded only note what to ask for."""
@@ -105,6 +114,7 @@ class ZenohSubscription:
         while ready and not self._mailbox.is_crowded:
             self._deliver(ready[: self._mailbox.half])
             del ready[: self._mailbox.half]
+        self._tell_behind()
 
     def handle_page(self, key: str, page: Page, *, is_from_next: bool) -> None:
         """Take an answer; what its publisher does not keep any more is told."""

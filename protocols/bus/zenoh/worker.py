@@ -9,6 +9,7 @@ import random
 import threading
 import time
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,7 +95,7 @@ class ZenohWorker(threading.Thread):
     def add_subscription(self, subscription: ZenohSubscription) -> None:
         """Serve a subscription from now on, beginning with what is kept of it."""
         if subscription.history:
-            self._due.extend(RecoveryQuery(subscription, key) for key in subscription.keys)
+            self._plan(RecoveryQuery(subscription, key) for key in subscription.keys)
         self._subscriptions.append(subscription)
         self._begin()
 
@@ -150,7 +151,7 @@ class ZenohWorker(threading.Thread):
             for publisher in self._publishers:
                 publisher.stir(now_s)
             due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
-            self._due.extend(
+            self._plan(
                 RecoveryQuery(subscription, key, due_s=due_s)
                 for subscription in self._subscriptions
                 if subscription.recovers
@@ -163,6 +164,11 @@ class ZenohWorker(threading.Thread):
             told += publisher.rests_until_s <= now_s and publisher.settle(now_s)
             if told == TOLD_AT_ONCE:
                 break
+
+    def _plan(self, queries: Iterable[RecoveryQuery]) -> None:
+        for query in queries:
+            query.subscription.await_answers(1)
+            self._due.append(query)
 
     def _handle_answers(self, now_s: float) -> None:
         """Take the answers that have come."""
@@ -203,6 +209,7 @@ class ZenohWorker(threading.Thread):
             is_done = not stream.is_missing
             stream.is_asked = not is_done
         if is_done:
+            query.subscription.await_answers(-1)
             return
         query.tries += 1
         is_patient = stream is not None and not query.subscription.sequencer.is_replaced(stream)
@@ -210,6 +217,7 @@ class ZenohWorker(threading.Thread):
             if stream is not None:
                 stream.is_asked = False
                 query.subscription.give_up(stream)
+            query.subscription.await_answers(-1)
             return
         if query.tries > 1:
             longest_s = min(FIRST_WAIT_S * 2.0 ** (query.tries - 1), LONGEST_WAIT_S)
@@ -221,7 +229,7 @@ class ZenohWorker(threading.Thread):
         for subscription in self._subscriptions:
             for stream in subscription.sequencer.wanted.values():
                 stream.is_asked = True
-                self._due.append(RecoveryQuery(subscription, stream.key, stream))
+                self._plan([RecoveryQuery(subscription, stream.key, stream)])
             subscription.sequencer.wanted.clear()
         if not self._due or not (self._is_router or self._session.info.routers_zid()):
             return

@@ -3,7 +3,6 @@ import contextlib
 import json
 import logging
 import queue
-import socket
 import subprocess
 import sys
 import time
@@ -11,6 +10,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 import zenoh
+from ports import free_port
 
 from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.zenoh.access import ZenohAccess
@@ -22,9 +22,7 @@ LIMIT_S = 20.0
 
 @pytest.fixture
 def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @pytest.fixture
@@ -216,6 +214,29 @@ def test_what_nobody_has_any_more_is_counted_and_told(endpoint, caplog):
         missed = asyncio.run(read_late())
     assert missed > 0
     assert "messages are lost, nobody has them" in caplog.text
+
+
+def test_a_subscription_says_whether_all_has_come_that_is_kept(endpoint):
+    """Its mailbox has room for 200; there is something to come as long as it does not read."""
+    want = [b"%05d" % number for number in range(5_000)]
+
+    async def read() -> list[bytes]:
+        messages = follower.subscribe("wetwell/alpha/sample", history=len(want), capacity=200)
+        assert messages.is_behind
+        await asyncio.to_thread(wait_until, lambda: messages.is_crowded)
+        assert messages.is_behind
+        got: list[bytes] = []
+        async with asyncio.timeout(LIMIT_S):
+            while got[-1:] != want[-1:]:
+                got += await messages.receive()
+            await asyncio.to_thread(wait_until, lambda: not messages.is_behind)
+        return got
+
+    with open_router(endpoint), open_client(endpoint) as source, open_client(endpoint) as follower:
+        publisher = source.publisher("wetwell/alpha/sample", history=len(want))
+        for payload in want:
+            publisher.put(payload)
+        assert asyncio.run(read()) == want
 
 
 def test_what_is_declared_without_router_works_afterwards(endpoint):

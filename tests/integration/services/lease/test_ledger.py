@@ -68,6 +68,20 @@ def test_the_table_does_what_the_pure_lease_says(site, postgres):
     asyncio.run(run())
 
 
+def test_one_that_is_not_ready_does_not_show_that_it_stands_by_and_is_better_than_nobody(site, postgres):
+    async def run():
+        a, b = site.claim("a"), site.claim("b")
+        assert await a.take()
+        assert not await b.take(is_ready=False)
+        with psycopg.connect(postgres.url) as database:
+            standing = next(one for one in standings(database) if one.role == site.role)
+        assert [one.holder for one in standing.members] == ["a"]
+        await a.release()
+        assert await b.take(is_ready=False)
+
+    asyncio.run(run())
+
+
 def test_of_many_that_ask_at_once_one_gets_the_lease(site, postgres):
     async def run():
         databases = [LeaseDatabase(postgres.url, None, 5.0) for _ in range(5)]
