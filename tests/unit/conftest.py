@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
@@ -87,8 +88,7 @@ def learnt(alpha):
     """A detector that has learnt the paper's station; to be copied before it is used."""
     before = Simulation(alpha, Scenario(name="healthy"), SEED).advance(LEARNT_S)
     detector = Detector(alpha.name, datasheet_of(alpha))
-    told = [verdict for sample in before.samples(alpha.name) for verdict in detector.update(sample)]
-    last = {verdict.pump: verdict.state for verdict in told}
+    last = {verdict.pump: verdict.state for verdict in verdicts_on(detector, before)}
     assert last == {1: "normal", 2: "normal", 3: "normal"}
     return detector
 
@@ -103,7 +103,6 @@ def judge_after_learning(alpha, learnt):
         if change is not None:
             change(after.columns)
         detector = copy.deepcopy(learnt)
-        verdicts = [verdict for sample in after.samples(alpha.name, LEARNT_S) for verdict in detector.update(sample)]
-        return [*verdicts, *detector.finish()]
+        return [*verdicts_on(detector, after, LEARNT_S), *detector.finish()]
 
     return judge

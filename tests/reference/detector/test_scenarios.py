@@ -6,6 +6,7 @@ Measured before: macro F1 .980 in the mean and .944 in the worst of seeds 0 to 1
 from functools import cache
 
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
@@ -29,8 +30,7 @@ def judged(name, seed):
         scenario = scenario.model_copy(update={"inflow": DiurnalInflow(surges=Surges(flow_m3h=80.0))})
     recording = Simulation(station, scenario, seed).advance(172_800)
     detector = Detector(station.name, datasheet_of(station))
-    verdicts = [verdict for sample in recording.samples(station.name) for verdict in detector.update(sample)]
-    return recording, [*verdicts, *detector.finish()]
+    return recording, [*verdicts_on(detector, recording), *detector.finish()]
 
 
 def delay_s(verdicts, recording, state):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SnapshotError
-from wetwell.detector.stream.block import blocks
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.stations import find_station
 from wetwell.simulator.faults.pump.blockage import Blockage
@@ -31,7 +31,7 @@ def recorded(station, seed, start_ns, *faults):
 
 def told(detector, recording):
     """Verdicts of each pump."""
-    verdicts = [verdict for block in blocks(recording, 4) for verdict in detector.update_block(block)]
+    verdicts = verdicts_on(detector, recording)
     return {pump: [verdict for verdict in verdicts if verdict.pump == pump] for pump in range(1, 5)}
 
 

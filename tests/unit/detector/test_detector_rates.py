@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.inference.posterior import FAULT_STATES
-from wetwell.detector.stream.block import blocks
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_scenario
 from wetwell.simulator.faults.pump.blockage import Blockage
@@ -45,8 +45,7 @@ def stored(recording, period_s, value):
 
 def judged(recording, station):
     detector = Detector(station.name, datasheet_of(station))
-    verdicts = [verdict for block in blocks(recording, len(station.pump)) for verdict in detector.update_block(block)]
-    return detector, [*verdicts, *detector.finish()]
+    return detector, [*verdicts_on(detector, recording), *detector.finish()]
 
 
 @pytest.mark.parametrize("value", ["instant", "mean", "held"])

@@ -1,10 +1,10 @@
 """Sizes of faults through a whole detector: what a verdict calls at fault is as large as its run shows."""
 
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.stream.block import blocks
 from wetwell.simulator.faults import FAULTS
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -18,9 +18,7 @@ SUDDEN = {"start_s": 25_200, "end_s": 27_000}
 def verdicts(station, fault, seed):
     assert fault["kind"] in FAULTS
     recording = Simulation(station, Scenario.model_validate({"name": "f", "fault": [fault]}), seed).advance(43_200)
-    datasheet = datasheet_of(station)
-    detector = Detector(station.name, datasheet)
-    return [verdict for block in blocks(recording, datasheet.pumps) for verdict in detector.update_block(block)]
+    return verdicts_on(Detector(station.name, datasheet_of(station)), recording)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

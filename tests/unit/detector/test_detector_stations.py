@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
@@ -24,8 +25,7 @@ FROM_NOON = {"shape": "step", "start_s": 12 * HOUR_S, "end_s": 13 * HOUR_S}
 def judged(station, recording):
     """Detector after a recording, and verdicts by second since its start."""
     detector, start_ns = Detector(station.name, datasheet_of(station)), int(recording.time_ns[0])
-    verdicts = [verdict for sample in recording.samples(station.name) for verdict in detector.update(sample)]
-    return detector, [((verdict.time - start_ns) / NS_PER_S, verdict) for verdict in verdicts]
+    return detector, [((verdict.time - start_ns) / NS_PER_S, verdict) for verdict in verdicts_on(detector, recording)]
 
 
 def false_ones(told, until_s):

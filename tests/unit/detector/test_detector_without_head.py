@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
@@ -28,10 +29,9 @@ def recorded(station, *faults, hours=13, has_head=False):
     return replace(recording, columns=columns)
 
 
-def verdicts_on(station, recording):
+def told_on(station, recording):
     detector = Detector(station.name, datasheet_of(station))
-    told = [verdict for block in blocks(recording, len(station.pump)) for verdict in detector.update_block(block)]
-    return told + list(detector.finish())
+    return [*verdicts_on(detector, recording), *detector.finish()]
 
 
 def late_states(verdicts, recording, pump):
@@ -47,7 +47,7 @@ def late_states(verdicts, recording, pump):
 )
 def test_the_other_pumps_tell_a_fault_of_one_from_one_of_the_main(alpha, fault, expected):
     recording = recorded(alpha, fault)
-    verdicts = verdicts_on(alpha, recording)
+    verdicts = told_on(alpha, recording)
     assert [late_states(verdicts, recording, pump) for pump in (1, 2, 3)] == [{state} for state in expected]
     (last,) = [verdict for verdict in verdicts if verdict.pump == 2][-1:]
     assert last.evidence["missing"] == ["head_m"]
@@ -64,7 +64,7 @@ def test_a_pump_that_is_alone_on_its_main_is_told_to_have_moved_and_no_crew_is_c
         | {"control": {"start_levels_m": [1.6], "stop_levels_m": [0.5]}}
     )
     recording = recorded(alone, Blockage(pump=1, speed_loss=0.1, **HELD))
-    verdicts = verdicts_on(alone, recording)
+    verdicts = told_on(alone, recording)
     assert late_states(verdicts, recording, 1) == {"unknown"}
     assert "cannot be told apart" in verdicts[-1].evidence["advice"]
     assert {verdict.state for verdict in verdicts} == {"learning", "unknown", "normal"}
@@ -78,7 +78,7 @@ def test_a_healthy_station_is_normal_and_a_snapshot_goes_on_bit_for_bit(alpha):
         restored.restore(detector.snapshot())
         detector = restored
         told += detector.update_block(block)
-    assert [v.encode() for v in told] == [v.encode() for v in verdicts_on(alpha, recording)[: len(told)]]
+    assert [v.encode() for v in told] == [v.encode() for v in told_on(alpha, recording)[: len(told)]]
     assert {verdict.state for verdict in told} == {"learning", "unknown", "normal"}
     assert [v.state for v in told].count("unknown") == 3, "the first run of each pump, before its head is missed"
 
@@ -92,7 +92,7 @@ def test_a_head_that_comes_while_learning_begins_the_learning_anew(alpha):
     for name, values in columns.items():
         if name.endswith("head_m"):
             values[~late] = float("nan")
-    verdicts = verdicts_on(alpha, replace(recording, columns=columns))
+    verdicts = told_on(alpha, replace(recording, columns=columns))
     last = [verdict for verdict in verdicts if verdict.pump == 1][-1]
     assert last.state == "normal"
     assert last.evidence["signals"][:3] == ["flow", "head", "frequency"]
@@ -105,6 +105,6 @@ def test_a_head_that_is_lost_while_learning_is_waited_for(alpha):
         name: np.where(lost, np.nan, values) if name.endswith("head_m") else values
         for name, values in recording.columns.items()
     }
-    told = [verdict for verdict in verdicts_on(alpha, replace(recording, columns=columns)) if verdict.pump == 1]
+    told = [verdict for verdict in told_on(alpha, replace(recording, columns=columns)) if verdict.pump == 1]
     assert told[-1].state == "unknown"
     assert told[-1].evidence["reason"] == "without head_m pump and system cannot be told apart"

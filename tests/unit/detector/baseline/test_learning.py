@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from judging import verdicts_on
 
 from wetwell.detector.baseline.learning import DAY_S, Learning, sibling_rejection, stationarity_rejection
 from wetwell.detector.baseline.model import MIN_RUNS
@@ -178,7 +179,7 @@ def test_the_papers_blockage_within_learning_is_never_learnt(alpha):
     recording = Simulation(alpha, find_scenario("blockage"), 0).advance(55_000)
     start_ns = int(recording.time_ns[0])
     detector = Detector(alpha.name, datasheet_of(alpha))
-    verdicts = [verdict for sample in recording.samples(alpha.name) for verdict in detector.update(sample)]
+    verdicts = verdicts_on(detector, recording)
     first_judged_s = {}
     for verdict in verdicts:
         if verdict.state != "learning":
