@@ -56,10 +56,10 @@ class Cable:
 
     async def cut(self) -> None:
         self._server.close()
-        for writer in self._writers:
-            writer.transport.abort()
-        await asyncio.gather(*self._tasks)
-        self._writers.clear()
+        while self._tasks:  # one more may have been accepted a moment ago
+            for writer in self._writers:
+                writer.transport.abort()
+            await asyncio.wait(self._tasks, timeout=0.1)
 
     async def flap(self) -> None:
         """Heal for as long as it takes to see that something is missing, not to get it; then again for good."""
@@ -76,6 +76,9 @@ class Cable:
         self._flows.set()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if not self._server.is_serving():
+            writer.transport.abort()
+            return
         task = asyncio.create_task(self._join(reader, writer))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -87,9 +90,11 @@ class Cable:
             far_reader, far_writer = await asyncio.open_connection(host, int(port))
         except OSError:
             writer.transport.abort()
+            self._writers.discard(writer)
             return
         self._writers.add(far_writer)
         await asyncio.gather(self._pump(reader, far_writer), self._pump(far_reader, writer))
+        self._writers -= {writer, far_writer}
 
     async def _pump(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError):
