@@ -14,7 +14,7 @@ export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: help up test check browser others long soak lint types imports kernels format docs requirements clean sbom audit release sign verify image
+.PHONY: help up test check browser others long soak lint types imports kernels modules format docs requirements clean sbom audit release sign verify image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -24,7 +24,7 @@ up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C 
 
 test: WORKERS := 4
 test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard each commit
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint imports types kernels
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync kernels types modules lint imports
 	$(PYTEST) -m "not check and not long and not soak"
 
 check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
@@ -52,8 +52,13 @@ types: $(VENV)/.dev  ## mypy
 imports: $(VENV)/.dev  ## import contract
 	$(BIN)/lint-imports
 
-kernels: $(VENV)/.dev  ## Compile the kernels for the tests, if they or what they call have changed, and the tests themselves
-	$(BIN)/pytest -q -k "test_simulate_then_detect or test_duty_point_of_one_pump"
+kernels: $(VENV)/.dev  ## Compile the kernels for the tests, if they or what they call have changed
+	$(BIN)/pytest -q -k "test_simulate_then_detect or test_duty_point_of_one_pump" \
+	  tests/unit/services/test_cli.py tests/reference/sim2real/test_truth_plant.py
+
+modules: $(VENV)/.dev  ## Compile the modules of the tests once: each process that runs tests would do so
+	@mkdir -p build
+	@$(BIN)/pytest -qqq --collect-only > build/modules.txt || { cat build/modules.txt; exit 1; }
 
 format: $(VENV)/.dev  ## Bring all files into form
 	$(BIN)/ruff check --fix .
