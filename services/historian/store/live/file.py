@@ -12,17 +12,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.historian.store.live.connection import UNREADABLE, connect
 from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, read_end, write_end
 from wetwell.services.historian.store.live.refused_rows import RefusedRows
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
 from wetwell.services.historian.store.live.salvage import salvage
-from wetwell.services.historian.store.live.schema import prepare
+from wetwell.services.historian.store.live.schema import prepare, schema_damages
 from wetwell.services.historian.store.live.tally import miscounts, settle
 
 log = logging.getLogger(__name__)
-
-BUSY_S = 10.0
-"""So long one process waits for another that writes."""
 
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
@@ -70,7 +68,7 @@ class LiveFile:
             self.replaced = End.of(self._writer).lost_since(read_end(path))
         except sqlite3.OperationalError as error:
             raise StoreError(f"{path}: {error}") from error
-        except sqlite3.DatabaseError as error:
+        except UNREADABLE as error:
             self._begin_anew(error)
         if self.replaced is not None:
             self.damages += 1
@@ -103,7 +101,7 @@ class LiveFile:
                 self._writer.execute(COUNT_COMMIT)
                 self._writer.execute("COMMIT")
                 self.damages += damages
-            except sqlite3.Error as error:
+            except (sqlite3.Error, UnicodeDecodeError) as error:
                 self._note(error)
                 raise StoreError(f"{self._path}: {error}") from error
             finally:
@@ -115,10 +113,10 @@ class LiveFile:
     def reading(self) -> Iterator[sqlite3.Connection]:
         """Connection that sees one moment."""
         try:
-            with contextlib.closing(sqlite3.connect(self._path, timeout=BUSY_S)) as database:
+            with contextlib.closing(connect(self._path)) as database:
                 database.execute("PRAGMA query_only = 1")
                 yield database
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             self._note(error)
             raise StoreError(f"{self._path}: {error}") from error
 
@@ -134,6 +132,7 @@ class LiveFile:
         """
         with self.reading() as database:
             told = [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
+            told += schema_damages(database)
             found = [] if told else list(miscounts(database))
         if told:
             self.is_damaged = True
@@ -153,9 +152,13 @@ class LiveFile:
                 sizes += path.stat().st_size
         return sizes
 
-    def _note(self, error: sqlite3.Error) -> None:
+    def _note(self, error: sqlite3.Error | UnicodeDecodeError) -> None:
         """Know from now on that the file is damaged, if that is what the error says."""
-        if getattr(error, "sqlite_errorcode", None) in _DAMAGE:
+        if isinstance(error, UnicodeDecodeError):
+            if not error.object.startswith(b"malformed"):
+                raise error
+            self.is_damaged = True
+        elif getattr(error, "sqlite_errorcode", None) in _DAMAGE:
             self.is_damaged = True
 
     def _begin_anew(self, reason: object) -> None:
@@ -180,16 +183,20 @@ class LiveFile:
         )
 
     def _open(self) -> sqlite3.Connection:
-        database = sqlite3.connect(self._path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+        database = connect(self._path, isolation_level=None, check_same_thread=False)
         try:
             database.execute("PRAGMA journal_mode = WAL")
             database.execute("PRAGMA synchronous = FULL")
             database.create_function("is_intact", 7, is_sample_intact, deterministic=True)
             prepare(database, self._path, self._alone)
             database.execute("SELECT count(*) FROM station").fetchone()
+            damages = schema_damages(database)
         except BaseException:
             database.close()
             raise
+        if damages:
+            database.close()
+            raise sqlite3.DatabaseError(damages[0])
         return database
 
 

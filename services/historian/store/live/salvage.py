@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from wetwell.services.historian.rows import HOUR_NS
+from wetwell.services.historian.store.live.connection import UNREADABLE, connect
 from wetwell.services.historian.store.live.end import End, read_end
 from wetwell.services.historian.store.live.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
+from wetwell.services.historian.store.live.schema import schema_damages
+from wetwell.services.historian.store.live.station_names import station_rows
 from wetwell.services.historian.store.live.tally import miscounts
 
 Row = tuple[Any, ...]
@@ -24,13 +27,16 @@ MOST_SKIPPED = 10_000
 
 def damage_of(path: Path) -> list[str]:
     """What is wrong in a live database, and what in it is not what was written; nothing is changed."""
+    told: list[str] = []
+    counts: dict[str, int] = {}
     try:
         with _reading(path) as database:
-            told = [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
+            told += [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
             version = int(database.execute("PRAGMA user_version").fetchone()[0])
+            told += schema_damages(database) if version >= COUNTED_VERSION else []
             crc = "crc" if version >= CHECKED_VERSION else "NULL"
             messages = database.execute(f"SELECT kind, station, time_ns, digest, payload, {crc} FROM event")  # noqa: S608
-            counts = {"messages": sum(not is_event_intact(*row) for row in messages)}
+            counts["messages"] = sum(not is_event_intact(*row) for row in messages)
             if version >= CHECKED_VERSION:
                 samples = database.execute(f"SELECT {_SAMPLE} FROM sample")  # noqa: S608 - names of above
                 counts["rows of samples"] = sum(not _is_sample(row) for row in samples)
@@ -40,8 +46,8 @@ def damage_of(path: Path) -> list[str]:
                 told += map(str, miscounts(database))
                 known = read_end(path)  # after the database: it only goes on
                 told += [] if (lost := End.of(database).lost_since(known)) is None else [lost]
-    except sqlite3.Error as error:
-        return [str(error)]
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        told.append(str(error))
     return [*told, *(f"{count} {what} are not what was written" for what, count in counts.items() if count)]
 
 
@@ -69,7 +75,7 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
                         continue
                     with contextlib.suppress(sqlite3.IntegrityError, sqlite3.InterfaceError):
                         saved += target.execute(insert, row).rowcount
-    except sqlite3.DatabaseError:
+    except UNREADABLE:
         target.execute("ROLLBACK")
         return 0, 0
     target.execute("COMMIT")
@@ -78,9 +84,9 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
 
 def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], Callable[[Row], bool]]]:
     """Of each table how a row is inserted, its rows as far as they can be read, and whether one is intact."""
-    stations = _readable(database, "SELECT id, name, first_ns, last_ns FROM station")
-    yield "INSERT OR IGNORE INTO station VALUES (?, ?, ?, ?)", iter(stations), _is_station
-    numbers = [row[0] for row in stations if _is_station(row)]
+    stations = station_rows(database)
+    yield "INSERT OR IGNORE INTO station VALUES (?, ?, ?, ?)", iter(stations), lambda _: True
+    numbers = {row[0] for row in stations}
     samples = (row for number in numbers for row in _samples(database, number))
     yield "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", samples, _is_sample
     yield (
@@ -130,13 +136,9 @@ def _read(database: sqlite3.Connection, query: str, values: Row) -> tuple[list[R
     rows: list[Row] = []
     try:
         rows.extend(database.execute(query, values))
-    except sqlite3.DatabaseError:
+    except UNREADABLE:
         return rows, False
     return rows, True
-
-
-def _is_station(row: Row) -> bool:
-    return isinstance(row[0], int) and isinstance(row[1], str)
 
 
 def _is_sample(row: Row) -> bool:
@@ -150,5 +152,5 @@ def _is_hour(row: Row) -> bool:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[sqlite3.Connection]:
-    with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+    with contextlib.closing(connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
         yield database

@@ -1,9 +1,12 @@
 """The tables of the live database, and the upgrade of those of an earlier version."""
 
+import contextlib
 import logging
 import sqlite3
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
@@ -99,6 +102,32 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
             while (version := _version(database)) < VERSION:  # else another has done it meanwhile
                 database.executescript(_UPGRADES[version])
                 log.info("%s: upgraded from version %d to %d", path, version, version + 1)
+
+
+def schema_damages(database: sqlite3.Connection) -> list[str]:
+    """Say which tables and triggers of a database of this version are not as they were made; empty if none.
+
+    SQLite itself takes a word of its schema that a disk has changed for another name.
+    """
+    made, there = _made(), _parts(database)
+    return [f"schema: {name} is not as it was made" for name in sorted(made) if there.get(name) != made[name]]
+
+
+@cache
+def _made() -> dict[str, object]:
+    with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as database:
+        database.executescript(_LIVE_TABLES)
+        return _parts(database)
+
+
+def _parts(database: sqlite3.Connection) -> dict[str, object]:
+    """Of each table its columns, whose texts differ after an upgrade, and of each trigger its text."""
+    columns = database.execute(
+        'SELECT m.name, c.name, c.type, c."notnull", c.dflt_value, c.pk FROM sqlite_master AS m, '
+        "pragma_table_info(m.name) AS c WHERE m.type = 'table' ORDER BY m.name, c.cid"
+    ).fetchall()
+    tables = {name: [column[1:] for column in of] for name, of in groupby(columns, lambda column: column[0])}
+    return tables | dict(database.execute("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'"))
 
 
 def _version(database: sqlite3.Connection) -> int:

@@ -27,7 +27,7 @@ def sample(station: str, number: int) -> Sample:
 
 
 def payload(station: str, number: int) -> bytes:
-    return f"verdict {number} of {station}".encode()
+    return f'{{"number":{number},"station":"{station}"}}'.encode()
 
 
 def batch(station: str, first: int, last: int) -> Batch:
@@ -160,3 +160,58 @@ def test_a_message_whose_place_was_changed_is_not_told_twice_when_it_comes_again
         told = [payload("alpha", number) for number in range(0, TIMES, 10)]
         assert store.events("verdicts", "alpha", 0, 2**62, 10_000) == told
     assert damage_of(tmp_path / "live.sqlite") == ["1 messages are not what was written"]
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_a_broken_word_in_the_schema_is_damage_though_it_is_no_text(content, tmp_path, caplog, is_open):
+    changed = content.replace(b"AFTER DELETE", b"AFTER DEL\xc5TE", 1)
+    assert changed != content
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(content if is_open else changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        if is_open:
+            path.write_bytes(changed)
+            with pytest.raises(StoreError, match="codec can't decode byte"):
+                store.file.check()
+            assert "codec can't decode byte" in damage_of(path)[0]
+        store.write(batch("alpha", 0, TIMES))
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(TIMES))
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+    assert "a new one is begun" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("word", "broken", "part"),
+    [
+        (b"coalesce(OLD.crc", b"coalesce(OMD.crc", "event_goes"),
+        (b"data BLOB NOT NULL, crc", b"dada BLOB NOT NULL, crc", "hour"),
+    ],
+)
+def test_a_word_of_the_schema_that_names_another_thing_is_damage(content, tmp_path, caplog, word, broken, part):
+    changed = content.replace(word, broken, 1)
+    assert changed != content
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(changed)
+    assert f"schema: {part}" in " ".join(damage_of(path))
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(batch("alpha", 0, TIMES))
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(TIMES))
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+    assert f"schema: {part}" in caplog.text
+
+
+@pytest.mark.parametrize("place", ["table", "index"])
+def test_a_station_whose_name_was_changed_keeps_its_own(content, tmp_path, place):
+    changed = bytearray(content)
+    found = [at for at in range(len(changed)) if changed.startswith(b"beta", at) and changed[at - 1] != ord('"')]
+    assert len(found) == 2
+    changed[found[place == "table"]] ^= 0x80  # no UTF-8 any longer
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(changed)
+    assert damage_of(path)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        with contextlib.suppress(StoreError):
+            store.file.check()
+        store.write(Batch())
+        assert [span.station for span in store.stations()] == ["alpha", "beta"]
+        assert len(store.samples("beta", 0, 2**62)) == TIMES
