@@ -21,6 +21,8 @@ SHORTEST_S, LONGEST_S = 1.0, 7_200.0
 AFTER_S = 60.0
 """Between the end of all accidents and the last sample."""
 CLOCK_STEP_S = 3_600.0
+REFUSED_S = 60.0
+"""Within which one of two daemons of a name must have ended."""
 SLOW_S = 20.0
 """How long a write waits for a slow disk."""
 
@@ -144,6 +146,9 @@ async def _twin(site: "Site", accident: Accident, _dice: random.Random) -> Async
     site.twins.append(twin)
     twin.start_again()
     yield
+    both_s = min(twin.lived_s, site.processes[accident.target].lived_s)
+    if both_s > REFUSED_S:
+        site.crashes.append(f"{accident.target}: two worked on one folder for {both_s:.0f} s")
     site.twins.remove(twin)
     await twin.kill()
 
@@ -164,9 +169,15 @@ async def _backup(site: "Site", accident: Accident, _dice: random.Random) -> Asy
 @contextlib.asynccontextmanager
 async def _damage(site: "Site", accident: Accident, dice: random.Random) -> AsyncIterator[None]:
     act = flip_bit if accident.kind == "rot" else misdirect
+    process = site.processes[accident.target]
+    is_away = dice.random() < 0.5  # what is read at a start only must be found then
+    if is_away:
+        await process.kill()
     file = act(site.folder_of(accident.target), dice)
     if file is not None:
         site.harm(accident.kind, accident.target)
+    if is_away:
+        process.start_again()
     yield
 
 

@@ -8,15 +8,16 @@ import hashlib
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
-from accidents import CLOCK_STEP_S
+from accidents import CLOCK_STEP_S, KEEPERS
 from judged import once
 from network import Sent
 from simulated_site import Site
-from windows import MARGIN_S, Way, until_s
+from windows import MARGIN_S, Way, blocked, until_s
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.protocols.bus.keys import alarm_key, sample_key
+from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
@@ -30,12 +31,15 @@ from wetwell.services.historian.store.interface import StoreError
 Key = tuple[int, int]
 """Time and number of a sample."""
 NEVER_S = float("-inf")
+LOOKED_THROUGH_S = 21_600.0
+"""In which the historian has looked through all that it keeps, if nothing kept it from that."""
 
 
 def broken_rules(site: Site) -> list[str]:
     """In words; empty if all is well."""
     with site.heard():
-        return [*site.crashes, *_judged(site), *_verdicts(site), *_verified(site), *_history(site), *_alarms(site)]
+        rules = (_judged, _verdicts, _verified, _history, _alarms, _told_late)
+        return [*site.crashes, *(broken for rule in rules for broken in rule(site))]
 
 
 def fingerprint(site: Site) -> str:
@@ -235,6 +239,7 @@ def _alarms(site: Site) -> Iterator[str]:
     is_stepped = any(accident.startswith("clock") for accident in site.accidents)
     step_ns = round(len(site.accidents) * CLOCK_STEP_S * NS_PER_S) if is_stepped else 0
     is_harmed = any(harm.name == "alarms" for harm in site.harms)
+    is_full = any(span.what == "full" for span in site.spans)
     for (station, name), changes in site.alarms.items():
         raised = [change.raised for change in changes if change.raised is not None]
         if any(later < earlier - step_ns for earlier, later in pairwise(raised)) and not is_harmed:
@@ -242,6 +247,8 @@ def _alarms(site: Site) -> Iterator[str]:
         for before, after in pairwise(changes):
             if before.is_active and after.is_active and after.raised != before.raised and not is_harmed:
                 yield f"{station}: alarm {name} is raised twice"
+            if is_raised_anew(before, after) and not is_harmed and not is_stepped and not is_full:
+                yield f"{station}: alarm {name} is raised anew for what has returned"
     way = Way(site, "detector", "alarms", MARGIN_S)
     for station in site.stations:
         told = site.told.get(station.name, {})
@@ -255,13 +262,41 @@ def _alarms(site: Site) -> Iterator[str]:
             yield f"{station.name}: pump faults {sorted(faulty - alarmed)} raised no alarm"
 
 
+def is_raised_anew(before: Alarm, after: Alarm) -> bool:
+    """Whether an alarm that had returned is back with the time at which it was raised before, or an earlier one."""
+    if before.is_active or not after.is_active or before.raised is None or after.raised is None:
+        return False
+    return after.raised <= before.raised
+
+
+def _told_late(site: Site) -> Iterator[str]:
+    """Who comes at the end hears of each alarm that stands, where the alarms could keep it and say what became."""
+    if any(harm.name == "alarms" for harm in site.harms):
+        return
+    in_the_way = blocked(site.spans, ["alarms", "machine"], ["mute", "stalled", "full", "slow"])
+    for (station, name), changes in site.alarms.items():
+        said_s = min(
+            one.at_s for one in site.network.sent[alarm_key(station, name)] if one.payload == changes[-1].encode()
+        )
+        is_free = all(end_s < said_s - MARGIN_S for _, end_s in in_the_way)
+        if changes[-1].is_active and is_free and (station, name) not in site.told_late:
+            yield f"{station}: alarm {name} stands, and who comes late does not hear of it"
+
+
 def _verified(site: Site) -> Iterator[str]:
-    """What no accident has harmed is what was written."""
+    """What no accident has harmed is what was written; the historian has found itself what is harmed."""
     harmed = {harm.name for harm in site.harms}
-    checks = {"history": "historian", "detector": "detector", "alarms": "alarms", "audit": "alarms"}
+    owners = {"history": {"historian"}, "detector": {"detector"}, "alarms": {"alarms"}, "audit": set(KEEPERS)}
+    _, last_s = _harms_s(site)
+    way = Way(site, "historian", "historian", LOOKED_THROUGH_S)
+    is_looked_through = way.is_open(last_s, site.seconds)
     for finding in verify_kept(site.settings):
-        if finding.level == "error" and checks[finding.check] not in harmed:
+        if finding.level != "error":
+            continue
+        if not owners[finding.check] & harmed:
             yield f"doctor --verify: {finding}"
+        elif finding.check == "history" and is_looked_through:
+            yield f"the historian has not found what doctor --verify finds: {finding}"
 
 
 def _faulty_pumps(verdicts: Iterable[Verdict]) -> set[int]:

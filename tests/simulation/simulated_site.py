@@ -55,6 +55,8 @@ RESTART_S = 10.0
 """After so long a daemon that has ended with an error is started again."""
 QUIET_S = 1_800.0
 """Virtual time after the last sample in which everything may settle."""
+LATE_S = 60.0
+"""So long somebody listens then who comes new."""
 
 
 class Span(NamedTuple):
@@ -92,6 +94,7 @@ class Process:
         self._away = 1
         self._stalls = 0
         self._gone_s: float | None = 0.0
+        self._since_s = 0.0
         self._cut_s = {"mute": 0.0, "deaf": 0.0}
         self.bus: SimulatedBus | None = None
         self.task: asyncio.Task[None] | None = None
@@ -106,7 +109,7 @@ class Process:
     def _begin(self) -> None:
         assert self._gone_s is not None
         self._site.spans.append(Span("away", self.name, self._gone_s, _now_s()))
-        self._gone_s = None
+        self._gone_s, self._since_s = None, _now_s()
         self.bus = self._site.network.join(self.name)
         self.bus.mute_s, self.bus.deaf_s = self._cut_s["mute"], self._cut_s["deaf"]
         self.life = Life(self.name, disk_s=self._site.disk_s)
@@ -156,6 +159,11 @@ class Process:
         self._stalls += 1
         if not self._away:
             self._stand()
+
+    @property
+    def lived_s(self) -> float:
+        """For how long it has worked without a break; 0 while it does not. [s]"""
+        return 0.0 if self.task is None or self.task.done() else _now_s() - self._since_s
 
     def go_on(self) -> None:
         """End one stall; it goes on when there is no other."""
@@ -210,7 +218,9 @@ class Site:
     spans, harms : list
         When what could not work, and what was done to files.
     crashes : list of str
-        Errors of the program itself that have ended a daemon.
+        Errors of the program itself that have ended a daemon, and pairs that worked on one folder.
+    told_late : set of (str, str)
+        Alarms that one hears of who comes at the end, by station and id.
     log : list of Told
         What the operator was told by the logs.
     judged : Judged
@@ -232,6 +242,7 @@ class Site:
     harms: list[Harm] = field(default_factory=list)
     crashes: list[str] = field(default_factory=list)
     log: list[Told] = field(default_factory=list)
+    told_late: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.dice = random.Random(self.seed)
@@ -274,6 +285,10 @@ class Site:
                 group.create_task(happen(self, self.plan), name="accidents")
             await self.processes["gateway"].stop()
             await asyncio.sleep(QUIET_S)
+            newcomer = Process(self, "newcomer", self._come_late)
+            newcomer.start_again()
+            await asyncio.sleep(LATE_S)
+            await newcomer.kill()
             for name in ("detector", "alarms", "historian"):
                 await self.processes[name].stop()
             await observer.kill()
@@ -348,6 +363,13 @@ class Site:
         async with asyncio.TaskGroup() as group:
             group.create_task(_each(verdicts, self._note_verdict))
             group.create_task(_each(alarms, self._note_alarm))
+
+    async def _come_late(self, bus: SimulatedBus) -> None:
+        await _each(bus.subscribe(alarm_key("*"), history=1, capacity=1_000_000), self._note_late)
+
+    def _note_late(self, payload: bytes) -> None:
+        alarm = Alarm.decode(payload)
+        self.told_late.add((alarm.station, alarm.id))
 
     def _note_verdict(self, payload: bytes) -> None:
         verdict = Verdict.decode(payload)

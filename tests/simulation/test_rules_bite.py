@@ -1,6 +1,9 @@
 """Defects of the project's past, each put back beside the accident that shows it: a rule must break."""
 
 import contextlib
+import random
+import sqlite3
+from pathlib import Path
 from unittest import mock
 
 import pytest
@@ -25,6 +28,19 @@ def always(*_: object) -> bool:
     return True
 
 
+def flip_bit_of_row(folder: Path, dice: random.Random) -> Path:
+    """What a disk has changed in the values of one row of samples."""
+    path = folder / "live.sqlite"
+    with contextlib.closing(sqlite3.connect(path)) as database, database:
+        rows = database.execute("SELECT station, time_ns, seq, data FROM sample").fetchall()
+        *key, data = dice.choice(rows)
+        changed = bytearray(data)
+        changed[dice.randrange(len(changed))] ^= 1 << dice.randrange(8)
+        query = "UPDATE sample SET data = ? WHERE station = ? AND time_ns = ? AND seq = ?"
+        database.execute(query, (bytes(changed), *key))
+    return path
+
+
 STORE = "wetwell.services.historian.store"
 DEFECTS = {
     "two detectors on a folder": (
@@ -32,9 +48,8 @@ DEFECTS = {
         [Accident("twin", "detector", at_s, 3_000.0) for at_s in EVERY_H],
     ),
     "rows of samples are not checked": (
-        [mock.patch(f"{STORE}.{module}.is_sample_intact", always) for module in ("live.database", "live.salvage")],
-        [Accident("stop", "historian", at_s, 1.0) for at_s in EVERY_H]  # what is in its log comes into the file
-        + [Accident("rot", "historian", at_s + number, 1.0, number) for at_s in EVERY_H for number in range(60, 120)],
+        [mock.patch(f"{STORE}.live.{module}.is_sample_intact", always) for module in ("database", "file", "salvage")],
+        [Accident("rot", "historian", at_s, 1.0, seed) for seed, at_s in enumerate(EVERY_H)],
     ),
     "what the store refuses is lost": (
         [mock.patch.object(Spool, "put_back")],
@@ -51,8 +66,9 @@ DEFECTS = {
 def test_a_defect_breaks_a_rule_that_holds_without_it(folder, name):
     patches, accidents = DEFECTS[name]
     plan = tuple(sorted(accidents, key=lambda accident: accident.at_s))
-    assert broken_rules(light_site(3, 1, 1.0, 300, folder / "without", plan)) == []
     with contextlib.ExitStack() as defect:
+        defect.enter_context(mock.patch("accidents.flip_bit", flip_bit_of_row))
+        assert broken_rules(light_site(3, 1, 1.0, 300, folder / "without", plan)) == []
         for patch in patches:
             defect.enter_context(patch)
         assert broken_rules(light_site(3, 1, 1.0, 300, folder / "with", plan)) != []
