@@ -217,6 +217,8 @@ class AlarmService:
         if self.registry.rates.look(now.wall_ns):
             log.warning("alarm flood has %s", "begun" if self.registry.rates.is_flood else "ended")
         self.commit()
+        if self._file.errors:
+            self.save()  # the disk may take it again
 
     def commit(self) -> None:
         """Keep what has changed, then publish it."""

@@ -28,11 +28,15 @@ _OF_EARLIER = {"schema", "answers", "verdicts", "acts"}
 
 @dataclass(frozen=True)
 class Told:
-    """What was told: answers to orders that were carried out, by their ids, last verdicts, acts of maintenance."""
+    """What was told: answers to orders that were carried out, by their ids, last verdicts, acts of maintenance.
+
+    `heard` is time and number of the last sample that came before that, let through by the gate or not.
+    """
 
     answers: Mapping[str, Verdict]
     verdicts: Sequence[Verdict] = ()
     acts: Sequence[MaintenanceRecord] = ()
+    heard: tuple[int, int] | None = None
 
 
 class Checkpoint:
@@ -87,6 +91,7 @@ class Checkpoint:
             "answers": {name: answer.model_dump(mode="json") for name, answer in told.answers.items()},
             "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
             "acts": [record.model_dump(mode="json") for record in told.acts],
+            "heard": told.heard,
         }
         snapshot = detector.snapshot()
         checked = head | {_CHECKSUM: _checksum(head, snapshot)}
@@ -123,8 +128,9 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
         verdicts = [Verdict.model_validate(verdict) for verdict in header["verdicts"]]
         acts = [MaintenanceRecord.model_validate(record) for record in header.get("acts", [])]
-        return Told(answers, verdicts, acts), rest
-    except (ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
+        heard = header.get("heard")  # earlier versions did not know it
+        return Told(answers, verdicts, acts, None if heard is None else (int(heard[0]), int(heard[1]))), rest
+    except (ValueError, KeyError, AttributeError, TypeError, IndexError, RecursionError) as error:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
 
 

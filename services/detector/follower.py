@@ -18,6 +18,10 @@ BEHIND_BYTES = 512 * 1024 * 1024
 """Messages that wait while their stations catch up: what a thousand publishers keep."""
 
 
+Stamp = tuple[int, int]
+"""Time and number of a sample. [ns, -]"""
+
+
 class Room:
     """Bytes that all stations that catch up may hold together."""
 
@@ -60,28 +64,33 @@ class Waiting:
         for message in self.messages:
             yield from _samples(message)
 
-    def cut(self, last: tuple[int, int]) -> int | None:
-        """Take the messages before the last sample of this time and number; its place in the first that is left.
+    def cut(self, last: Stamp) -> set[Stamp] | None:
+        """Take the messages before the last sample of this stamp; those of the first that is left, as far as to it.
 
-        The place counts from 1. None, and all messages wait on, if there is no such sample.
+        None, and all messages wait on, if there is no such sample.
         """
         for number in range(len(self.messages), 0, -1):
-            stamps = [(one.time, one.seq) for one in _samples(self.messages[number - 1])]
+            stamps = [stamp_of(one) for one in _samples(self.messages[number - 1])]
             if last in stamps:
                 for _ in range(number - 1):
                     self.pop()
-                return len(stamps) - stamps[::-1].index(last)
+                return set(stamps[: len(stamps) - stamps[::-1].index(last)])
             if stamps and all(_is_before(stamp, last) for stamp in stamps):
                 return None
         return None
 
-    def is_before(self, last: tuple[int, int]) -> bool:
-        """Whether the newest sample that waits is older than one of this time and number, or nothing waits."""
+    def is_before(self, last: Stamp) -> bool:
+        """Whether the newest sample that waits is older than one of this stamp, or nothing waits."""
         newest = next(iter(_samples(self.messages[-1])), None) if self.messages else None
-        return newest is None or _is_before((newest.time, newest.seq), last)
+        return newest is None or _is_before(stamp_of(newest), last)
 
 
-def _is_before(stamp: tuple[int, int], last: tuple[int, int]) -> bool:
+def stamp_of(sample: Sample) -> Stamp:
+    """What tells a sample from others of its station."""
+    return sample.time, sample.seq
+
+
+def _is_before(stamp: Stamp, last: Stamp) -> bool:
     """Whether a sample was sent before another, by its time and by its number."""
     return stamp[0] < last[0] and stamp[1] < last[1]
 

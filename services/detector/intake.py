@@ -1,6 +1,7 @@
 """Samples and orders of many stations from the bus to their judges: one subscription for all of them."""
 
 import asyncio
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from wetwell.protocols.bus.interface import Bus
@@ -10,7 +11,7 @@ from wetwell.protocols.messages.history import LONGEST_NS
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.services.detector.backfill import missed_samples
-from wetwell.services.detector.follower import Follower, Waiting
+from wetwell.services.detector.follower import Follower, Stamp, Waiting, stamp_of
 from wetwell.services.detector.station_detector import StationDetector
 
 KEPT_S = 2.0
@@ -20,6 +21,8 @@ STILL_COMING_S = 30.0
 LOOK_AGAIN_S = 0.05
 BACKFILLS_AT_ONCE = 8
 """Stations that ask the historian at the same time."""
+PAGES_KEPT = 2
+"""Of what the historian gave: the last ones may come from their publishers, too, which keep less than a page."""
 ORDERS_PACE_S = 0.1
 """Orders come from people. [s]"""
 SAMPLES_AT_ONCE = 500
@@ -107,47 +110,54 @@ class Intake:
         """
         waiting = self._behind[judge]
         has_heard = judge.is_restored and judge.detector.seen_until_ns > 0  # else it has missed nothing
-        place = await self._reached(judge, waiting, turn) if has_heard else 0
-        await _drain(judge, waiting, place)
+        judged = await self._reached(judge, waiting, turn) if has_heard else set()
+        await _drain(judge, waiting, judged)
         self._passed_over += self._behind.pop(judge).dropped
 
-    async def _reached(self, judge: StationDetector, waiting: Waiting, turn: asyncio.Semaphore) -> int:
-        """Judge what lies before the samples that wait; place in their first message from which on to judge."""
-        last = judge.detector.last_heard
-        place = waiting.cut(last)
-        if place is not None:
-            return place
+    async def _reached(self, judge: StationDetector, waiting: Waiting, turn: asyncio.Semaphore) -> set[Stamp]:
+        """Judge what lies before the samples that wait; which ones of those are judged already."""
+        last = judge.last_heard
+        judged = waiting.cut(last)
+        if judged is not None:
+            return judged
         await asyncio.sleep(KEPT_S)
         for _ in range(round(STILL_COMING_S / LOOK_AGAIN_S)):
             if not waiting.messages or not waiting.is_before(last):
                 break
             await asyncio.sleep(LOOK_AGAIN_S)  # publishers send what they keep, the oldest first
         async with turn:
+            judged = waiting.cut(last)
             first = next(waiting.samples(), None)
+            if judged is not None or (first is not None and _follows(first, last)):
+                return judged or set()
+            pages: deque[set[Stamp]] = deque(maxlen=PAGES_KEPT)
             until_ns = LONGEST_NS if first is None else min(first.time, LONGEST_NS)
-            if waiting.cut(last) is None and (first is None or not _follows(first, last)):
-                async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
-                    if waiting.cut(last) is not None:
-                        break
-                    await judge.judge_in_turns(samples)
-                    last = samples[-1].time, samples[-1].seq
-            return waiting.cut(last) or 0
+            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
+                waits = {stamp_of(one) for one in waiting.samples()}
+                missed = [one for one in samples if stamp_of(one) not in waits]
+                await judge.judge_in_turns(missed)
+                pages.append({stamp_of(one) for one in missed})
+            return set().union(*pages)
 
 
-async def _drain(judge: StationDetector, waiting: Waiting, place: int) -> None:
-    """Judge what waits from a place on, and what comes meanwhile, until nothing waits."""
-    if place:
-        message = judge.decoded(*waiting.pop())
-        judge.judge([] if message is None else samples_of(message)[place:])
+async def _drain(judge: StationDetector, waiting: Waiting, known: set[Stamp]) -> None:
+    """Judge what waits, but what is known, and what comes meanwhile, until nothing waits."""
     judged = 0
     while waiting.messages:
         payload, kind = waiting.pop()
-        judged += judge.handle_payloads((payload,), kind)
+        if known:
+            message = judge.decoded(payload, kind)
+            samples = [] if message is None else samples_of(message)
+            judge.judge(one for one in samples if stamp_of(one) not in known)
+            known -= {stamp_of(one) for one in samples}
+            judged += len(samples)
+        else:
+            judged += judge.handle_payloads((payload,), kind)
         if judged >= SAMPLES_AT_ONCE and waiting.messages:
             judged = 0
             await asyncio.sleep(0)
 
 
-def _follows(first: Sample, last: tuple[int, int]) -> bool:
+def _follows(first: Sample, last: Stamp) -> bool:
     """Whether nothing lies between the last sample that was heard and the first that waits."""
     return first.time > last[0] and first.seq == last[1] + 1

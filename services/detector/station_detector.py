@@ -74,6 +74,7 @@ class StationDetector:
         self._audit = audit or Audit(None)
         told = None if checkpoint is None else checkpoint.restore(self.detector)
         self.is_restored = told is not None
+        self._heard = None if told is None else told.heard
         self._publishers = [
             bus.publisher(verdict_key(station.name, pump), history=VERDICT_HISTORY)
             for pump in range(1, len(station.pump) + 1)
@@ -132,8 +133,13 @@ class StationDetector:
         if self._checkpoint is not None:
             await asyncio.to_thread(self._checkpoint.write, *self._checkpoint.encode(self.detector, self._told()))
 
+    @property
+    def last_heard(self) -> tuple[int, int]:
+        """Time and number of the last sample that came; of a state of an earlier version what the detector knows."""
+        return self._heard or self.detector.last_heard
+
     def _told(self) -> Told:
-        return Told(self._answers, list(self._last.values()), list(self._maintenance.records.values()))
+        return Told(self._answers, list(self._last.values()), list(self._maintenance.records.values()), self._heard)
 
     def figures(self) -> dict[str, float]:
         """Health figures."""
@@ -153,6 +159,7 @@ class StationDetector:
         return message
 
     def _judge_block(self, message: SampleBlock) -> None:
+        self._heard = message.time[-1], message.seq[-1]
         block = Block(
             time_ns=np.array(message.time, dtype=np.int64),
             seq=np.array(message.seq, dtype=np.int64),
@@ -175,6 +182,7 @@ class StationDetector:
             self._judge(sample)
 
     def _judge(self, sample: Sample) -> None:
+        self._heard = sample.time, sample.seq
         try:
             verdicts = self.detector.update(sample)
         except Exception:  # one odd run must not take the station off

@@ -304,8 +304,10 @@ def test_a_disk_that_refuses_is_told_and_the_alarm_is_shown_all_the_same(tmp_pat
     assert site.service.figures()["disk_errors"] == 1.0
     assert "alarms go on without" in caplog.text
     (tmp_path / "state").mkdir()
-    site.verdict("normal", 2)
+    site.look()
     assert site.service.figures()["disk_errors"] == 0.0
+    site.start()
+    assert [alarm.id for alarm in site.service.registry.alarms()] == ["pump2.pump_fault"]
 
 
 def test_chattering_and_stale_alarms_are_on_their_lists():

@@ -17,7 +17,7 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.detector.checkpoint import checkpoint_in
-from wetwell.services.detector.follower import Room, Waiting
+from wetwell.services.detector.follower import Room, Waiting, stamp_of
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
@@ -167,6 +167,43 @@ def test_a_historian_that_comes_back_later_than_the_detector_is_waited_for(
             return list({payload: Verdict.decode(payload) for payload in await verdicts.receive()}.values())
 
     assert sorted(asyncio.run(live()), key=key) == sorted(undisturbed, key=key)
+
+
+@pytest.mark.parametrize("known", [0, 1])
+def test_of_a_gateway_that_starts_anew_all_is_judged_once_and_in_its_order(
+    alpha, samples, tmp_path, monkeypatch, known
+):
+    """Its clock is an hour ahead, and set back after its first sample; of the one before the historian has some."""
+    cut, ahead_ns = 1_000, 3_600 * NS_PER_S
+    lost = samples[cut : cut + 100]
+    kept = [one.model_copy(update={"seq": number}) for number, one in enumerate(samples[cut + 100 : cut + 200])]
+    kept[0] = kept[0].model_copy(update={"time": kept[0].time + ahead_ns})
+    given: list[tuple[int, int]] = []
+
+    async def live() -> None:
+        with MemoryBus() as bus:
+            store = FolderStore(tmp_path / "history", keep_live_days=1)
+            historian = Historian(store)
+            asyncio.create_task(answer(bus.answer(history_key("*")), historian))  # noqa: RUF006 - ends with the loop
+            for sample in samples[:cut] + lost:
+                historian.handle("samples", sample.encode())
+            send = source(bus, historian, kept, 1)
+            for number in range(len(kept)):
+                send(number)
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
+            judge.judge([*samples[:cut], *(lost if known else []), *kept[:known]])
+            judge.keep()
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
+            monkeypatch.setattr(judge, "_judge", lambda sample: given.append(stamp_of(sample)))
+            intake = Intake(bus, [judge])
+            running = asyncio.create_task(intake.run())
+            while intake.is_behind(judge):  # noqa: ASYNC110 - it ends its work
+                await asyncio.sleep(0.001)
+            running.cancel()
+            store.close()
+
+    asyncio.run(live())
+    assert given == [stamp_of(one) for one in (kept[1:] if known else lost + kept)]
 
 
 def test_messages_that_wait_share_one_bound_in_bytes():
