@@ -62,8 +62,8 @@ PAST_DEFECTS = (
         "a database found damaged while it is used stays in use",
         "41fcdb9",
         f"{STORE}/live/file.py",
-        '        if getattr(error, "sqlite_errorcode", None) in _DAMAGE:\n            self.is_damaged = True',
-        "        return",
+        "        if isinstance(error, UnicodeDecodeError):\n",
+        "        return\n        if isinstance(error, UnicodeDecodeError):\n",
     ),
     PastDefect(
         "nothing is saved of a damaged database",

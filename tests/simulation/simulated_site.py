@@ -55,6 +55,8 @@ RESTART_S = 10.0
 """After so long a daemon that has ended with an error is started again."""
 QUIET_S = 1_800.0
 """Virtual time after the last sample in which everything may settle."""
+LOOK_S = 60.0
+"""Between the looks of the alarms at what is silent: often against samples of a light site."""
 LATE_S = 60.0
 """So long somebody listens then who comes new."""
 
@@ -413,7 +415,7 @@ class Site:
                 ("wetwell.services.runtime.clock.time", SimpleNamespace(time_ns=time_ns)),
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
-                ("wetwell.services.alarms.daemon.LOOK_S", 1.0 * self.period_s),
+                ("wetwell.services.alarms.daemon.LOOK_S", LOOK_S),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.runtime.state_file.atomic_file", file),
                 ("wetwell.services.detector.quarantine.atomic_file", file),
