@@ -46,6 +46,9 @@ def gap_trial(
     kinds: Annotated[
         str, typer.Option(metavar="NAMES", help="Of single, pair, none, open, leave_one_out, triple; with commas.")
     ] = "single,pair,none,open,leave_one_out,triple",
+    effects: Annotated[
+        str, typer.Option(metavar="NAMES", help="One of these acts in each case that the library holds; with commas.")
+    ] = "",
     days: Annotated[
         float | None,
         typer.Option(
@@ -86,7 +89,15 @@ def gap_trial(
 
     check_scheduler(scheduler)
     from wetwell.services.trial.looked_at import check_seed
-    from wetwell.services.trial.plan import DIAGNOSE, REPLAY, TrialPlan, parse_kinds, parse_rates, parse_values
+    from wetwell.services.trial.plan import (
+        DIAGNOSE,
+        REPLAY,
+        TrialPlan,
+        parse_effects,
+        parse_kinds,
+        parse_rates,
+        parse_values,
+    )
     from wetwell.services.trial.result import brief
     from wetwell.services.trial.run import run_trial
     from wetwell.sim2real.trial.cases import StoragePlan
@@ -96,11 +107,13 @@ def gap_trial(
     rates_s = parse_rates(every)
     if days is None:
         days = 1.0 if max(rates_s) <= 60 else 14.0
+    plants = PLANTS if plant == "all" else ("fine", "swmm") if plant == "both" else (plant,)
     plan = TrialPlan(
         seed=seed,
         count=cases,
         kinds=parse_kinds(kinds),
-        plants=PLANTS if plant == "all" else ("fine", "swmm") if plant == "both" else (plant,),
+        plants=plants,
+        effects=parse_effects(effects, plants),
         seconds=round(positive(days, "--days") * 86_400.0),
         storage=StoragePlan(
             rates_s=rates_s,

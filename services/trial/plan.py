@@ -20,7 +20,7 @@ from wetwell.sim2real.trial.cases import (
     TrialCase,
     trial_case,
 )
-from wetwell.sim2real.trial.families import PlantName
+from wetwell.sim2real.trial.families import FAMILIES, PlantName
 
 TRIAL_SCHEMA = "wetwell.trial/4"
 DIAGNOSE = (sys.executable, "-m", "wetwell.services", "gap", "diagnose")
@@ -42,6 +42,8 @@ class TrialPlan:
         Length of each recording. [s]
     storage : StoragePlan
         How recordings are stored.
+    effects : tuple of str
+        One of them acts in each truth that the library holds; empty: any.
     command : tuple of str
         The diagnosis; it gets `--station FILE --recording FILE --out DIR`, and `--without NAME` or `--only NAME`.
     timeout_s : float
@@ -59,6 +61,7 @@ class TrialPlan:
     plants: tuple[PlantName, ...] = ("fine",)
     seconds: int = 86_400
     storage: StoragePlan = DEFAULT_STORAGE
+    effects: tuple[str, ...] = ()
     command: tuple[str, ...] = DIAGNOSE
     replay: tuple[str, ...] = ()
     timeout_s: float = 1800.0
@@ -79,6 +82,7 @@ class TrialPlan:
             "values": list(self.storage.values),
             "absent": list(self.storage.absent),
             "metered_share": self.storage.metered_share,
+            "effects": list(self.effects) or None,
             "diagnoser": "wetwell gap diagnose" if self.command == DIAGNOSE else shlex.join(self.command),
         }
 
@@ -91,6 +95,7 @@ class TrialPlan:
             plants=self.plants,
             seconds=self.seconds,
             storage=self.storage,
+            effects=self.effects,
         )
 
 
@@ -111,6 +116,29 @@ def parse_kinds(text: str) -> tuple[CaseKind, ...]:
     if unknown := sorted(named - set(KINDS)):
         raise ConfigError(f"--kinds: got '{unknown[0]}', must be of {', '.join(KINDS)}")
     return tuple(kind for kind in KINDS if kind in named)
+
+
+def parse_effects(text: str, plants: tuple[PlantName, ...]) -> tuple[str, ...]:
+    """Effects in a list with commas, of which each plant can show one or more.
+
+    Raises
+    ------
+    ConfigError
+        If no plant knows one of them, or a plant knows none.
+
+    Examples
+    --------
+    >>> parse_effects("pump_wear, friction_bias", ("fine", "swmm"))
+    ('pump_wear', 'friction_bias')
+    """
+    names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    known = {name for plant in plants for name in FAMILIES[plant].library}
+    if unknown := [name for name in names if name not in known]:
+        raise ConfigError(f"--effects: got '{unknown[0]}', must be of {', '.join(sorted(known))}")
+    for plant in plants:
+        if not FAMILIES[plant].held_of(names):
+            raise ConfigError(f"--effects: got '{text}', of which plant '{plant}' can show none")
+    return names
 
 
 def parse_rates(text: str) -> tuple[int, ...]:

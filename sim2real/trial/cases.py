@@ -156,6 +156,7 @@ def trial_case(
     plants: tuple[PlantName, ...],
     seconds: int,
     storage: StoragePlan = DEFAULT_STORAGE,
+    effects: tuple[str, ...] = (),
 ) -> TrialCase:
     """Case `number` of the trial of a seed, in its first attempt.
 
@@ -168,6 +169,8 @@ def trial_case(
     seconds : int
         Length of its recording. [s]
     storage : StoragePlan
+    effects : tuple of str
+        Of the library, one of which acts in each truth that the library holds; empty: any.
 
     Examples
     --------
@@ -188,7 +191,7 @@ def trial_case(
         number=number,
         kind=kind,
         plant=plant,
-        names=_names(seed, number, kind, plant, turn),
+        names=_names(seed, number, kind, plant, turn, effects),
         seconds=seconds,
         every_s=every_s,
         value=value,
@@ -196,11 +199,13 @@ def trial_case(
     )
 
 
-def _names(seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int) -> tuple[str, ...]:
+def _names(
+    seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int, effects: tuple[str, ...]
+) -> tuple[str, ...]:
     if kind == "none":
         return ()
     family = FAMILIES[plant]
-    held = family.open if kind == "open" else family.library
+    held = family.open if kind == "open" else family.held_of(effects)
     order = _stream(seed, KINDS.index(kind), len(held), 0)
     first = held[int(order.permutation(len(held))[turn % len(held)])]
     return _others((first,), _BESIDE.get(kind, 0), family, _stream(seed, number))

@@ -66,6 +66,10 @@ class Family:
     case_of: DrawsCases
     inherent: tuple[str, ...] = ()
 
+    def held_of(self, effects: tuple[str, ...]) -> tuple[str, ...]:
+        """Those of some effects that its plant can show, in its own order; without any all of its library."""
+        return tuple(name for name in self.library if name in effects) if effects else self.library
+
 
 _swmm_case_of: Callable[..., TruthCase] = partial(sampling.case_of, ramps_s=SWMM_RAMPS_S)
 FAMILIES: dict[PlantName, Family] = {

@@ -289,6 +289,24 @@ def test_command_line(run_wetwell, folder, monkeypatch, capsys):
     assert "trial.html" in capsys.readouterr().out
     assert run_wetwell("gap", "trial", *options, "--kinds", "sngle") == 2
     assert "--kinds: got 'sngle'" in capsys.readouterr().err
+    assert run_wetwell("gap", "trial", *options, "--effects", "pump_wear,gremlins") == 2
+    assert "--effects: got 'gremlins', must be of air_pocket, " in capsys.readouterr().err
+    assert run_wetwell("gap", "trial", *options, "--plant", "swmm", "--effects", "water_inertia") == 2
+    assert "--effects: got 'water_inertia', must be of " in capsys.readouterr().err
+    assert run_wetwell("gap", "trial", *options, "--plant", "both", "--effects", "water_inertia") == 2
+    assert "of which plant 'swmm' can show none" in capsys.readouterr().err
+
+
+def test_effects_that_are_chosen_act_in_each_case_that_the_library_holds():
+    chosen = ("pump_wear", "friction_bias")
+    for number in range(12):
+        case = trial_case(5, number, kinds=KINDS, plants=("fine", "swmm"), seconds=600, effects=chosen)
+        assert case.kind in ("none", "open") or case.names[0] in chosen
+    drawn = [
+        trial_case(5, number, kinds=("single",), plants=("fine",), seconds=600, effects=chosen).names
+        for number in range(4)
+    ]
+    assert sorted(drawn) == [("friction_bias",), ("friction_bias",), ("pump_wear",), ("pump_wear",)]
 
 
 def test_swmm_without_pyswmm_says_what_to_install(alpha, monkeypatch):
