@@ -47,9 +47,9 @@ def modules(packages: tuple[str, ...]) -> Iterator[str]:
 
 
 def find(package: str, *names: str) -> Any:
-    """What a package defines under one of some names, wherever it lies."""
-    for module in map(importlib.import_module, modules((package,))):
-        for name in names:
+    """What a package defines under one of some names, wherever it lies: the first of them that there is."""
+    for name in names:
+        for module in map(importlib.import_module, modules((package,))):
             found = vars(module).get(name)
             if found is not None and getattr(found, "__module__", None) == module.__name__:
                 return found
@@ -119,7 +119,7 @@ def rows_of(source: str) -> Iterator[Any]:
 def checkpoint(station: str, source: str, rows: int) -> None:
     """The state file of the detector's service: written, and that of the old checkout read."""
     name = find("services", "find_station")(station).name
-    kept, told = find("services", "Checkpoint"), find("services", "Told")
+    kept, told = find("services", "checkpoint_in", "Checkpoint"), find("services", "Told")
     detector, samples = detector_of(station), rows_of(source)
     verdicts = [verdict for _ in range(rows) for verdict in detector.update(next(samples))]
     Path("state").mkdir(exist_ok=True)
@@ -134,7 +134,7 @@ def alarm_state(state: dict[str, Any]) -> None:
     """The state file of the alarms: read, and written again where it was not refused."""
     Path("state").mkdir(exist_ok=True)
     Path("state/alarms.json").write_text(json.dumps(state))
-    file = find("services", "StateFile")(Path("state"))
+    file = find("services", "site_in", "StateFile")(Path("state"))
     if (kept := file.load()) is not None:
         file.save(kept)
 
