@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from wetwell.protocols.recordings.importers.draft.look import Look, Seen, look
-from wetwell.protocols.recordings.importers.draft.tag_names import TagGuess, number_pumps, recognise
+from wetwell.protocols.recordings.importers.draft.stored_value import looks_like_means
+from wetwell.protocols.recordings.importers.draft.tag_names import TagGuess, number_pumps, of_loops, recognise
 from wetwell.protocols.recordings.importers.draft.unit_names import UnitGuess, unit_in, unit_of
 from wetwell.protocols.recordings.importers.signals.scaling import RUNNING_WORDS, STANDING_WORDS
 from wetwell.protocols.recordings.importers.tables.opening import open_export
@@ -21,7 +22,10 @@ _GOOD = ("good", "192", "ok", "valid", "gut", "hyvä", "bon", "bonne", "bueno", 
 
 _PRESSURES = frozenset({"kPa", "Pa", "bar", "mbar", "psi"})
 _STEADY = 0.6
-"""A tag of which fewer steps are the usual one is stored on change."""
+"""A tag is stored on change if fewer of its steps are the usual one, or if these cover so much less of its time than
+those of another tag. [1]"""
+_OF_RUNS = ("frequency_hz", "flow_m3h", "power_kw")
+_MEAN_WHY = "the first row of a run mostly holds a part of the next one; of the interval that ends at the stamp"
 _ORDER = ("level_m", "inflow_m3h", "frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
 
 
@@ -57,9 +61,9 @@ def draft_of(paths: Sequence[Path]) -> Draft:
         f"# Drafted from {paths[0].name}. What was assumed stands behind each line: check it, above all the units."
     ]
     lines += [f"station = {_quoted(_station_name(paths[0]))}  # assumed: the name of the file"]
-    lines += [f'layout = "{looked.layout}"', *_time_lines(looked, assumed), *_value_lines(looked, assumed)]
-    lines += ["", "[columns]", *_column_lines(looked, assumed)]
     signals, unmapped = _signals(looked)
+    lines += [f'layout = "{looked.layout}"', *_time_lines(looked, assumed), *_value_lines(looked, signals, assumed)]
+    lines += ["", "[columns]", *_column_lines(looked, assumed)]
     pumps = number_pumps({signal.guess.pump for signal in signals if signal.guess.pump})
     taken: dict[str, _Signal] = {}
     for signal in signals:
@@ -81,13 +85,14 @@ def draft_of(paths: Sequence[Path]) -> Draft:
 def _signals(looked: Look) -> tuple[list[_Signal], dict[str, str]]:
     """Tags that seem to be signals, and why the others are not."""
     signals, unmapped = [], {}
+    units = {tag: unit_of(seen.unit_text) or unit_in(tag) for tag, seen in looked.tags.items()}
+    loops = of_loops(looked.tags)
     for tag, seen in looked.tags.items():
-        unit = unit_of(seen.unit_text) or unit_in(tag)
-        guess = recognise(tag, unit)
+        guess = recognise(tag, units[tag]) or loops.get(tag)
         if guess is None:
             unmapped[tag] = f"unit {seen.unit_text}" if seen.unit_text else ""
         else:
-            signals.append(_Signal(tag=tag, seen=seen, guess=guess, unit=unit))
+            signals.append(_Signal(tag=tag, seen=seen, guess=guess, unit=units[tag]))
     return signals, unmapped
 
 
@@ -103,15 +108,20 @@ def _time_lines(looked: Look, assumed: dict[str, str]) -> list[str]:
     return [*lines, '# time_zone = "Europe/Helsinki"  # MUST BE SAID: the stamps have no offset']
 
 
-def _value_lines(looked: Look, assumed: dict[str, str]) -> list[str]:
+def _value_lines(looked: Look, signals: Sequence[_Signal], assumed: dict[str, str]) -> list[str]:
     steps_s = [np.concatenate(parts) for parts in looked.steps_s.values()]
     steps_s = [steps for steps in (part[part > 0.0] for part in steps_s) if steps.size > 1]
     usual_s = [float(np.median(part)) for part in steps_s]
     steady = [
         float(np.mean(np.abs(part - step_s) <= 0.1 * step_s)) for part, step_s in zip(steps_s, usual_s, strict=True)
     ]
+    covered = [part.size * step_s / float(part.sum()) for part, step_s in zip(steps_s, usual_s, strict=True)]
     rate = [f"# a tag is stored every {np.median(usual_s):g} s, in the median"] if usual_s else []
-    if not steady or float(np.median(steady)) >= _STEADY:
+    if not steady or (float(np.median(steady)) >= _STEADY and min(covered) >= _STEADY * max(covered)):
+        series = (np.concatenate(one.seen.numbers) for one in signals if one.guess.quantity in _OF_RUNS)
+        if usual_s and looks_like_means(series, float(np.median(usual_s))):
+            assumed["value"] = f"mean: {_MEAN_WHY}"
+            return [*rate, f'value = "mean"  # assumed: {_MEAN_WHY}']
         assumed["value"] = "instant"
         return [
             *rate,
@@ -121,7 +131,7 @@ def _value_lines(looked: Look, assumed: dict[str, str]) -> list[str]:
     assumed["value"] = "held, as values are stored on change"
     return [
         *rate,
-        'value = "held"  # assumed: the stamps of a tag come at uneven steps, as when values are stored on change',
+        'value = "held"  # assumed: tags are silent for a while, as when values are stored on change',
         f"max_age_s = {math.ceil(longest_s):.1f}  # assumed: the longest silence of a tag; older values are none",
     ]
 

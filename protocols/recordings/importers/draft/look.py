@@ -30,6 +30,7 @@ _UNIT_HEADERS = ("unit", "units", "einheit", "unité", "yksikkö", "eu", "enguni
 _MOST_BLOCKS = 8
 """Blocks of each file that are looked at."""
 _LIKELY = 0.8
+_TIME_HEADER = re.compile(r"time|zeit|date|aika|heure|epoch|stamp")
 _TIME_OF_DAY = re.compile(r"\d{1,2}[:.]\d{2}([:.]\d{2})?([.,]\d+)?(\s*[AaPp]\.?[Mm]\.?)?")
 
 
@@ -161,7 +162,8 @@ def _time_headers(file: ExportFile, blocks: Sequence[Block]) -> tuple[str, str]:
     if stamped:
         return stamped[0], ""
     for name, some in texts.items():
-        if some and re.search(r"time|zeit|date|aika|heure|epoch|stamp", name.lower()) and find_formats(some):
+        forms = find_formats(some)
+        if forms and (_TIME_HEADER.search(name.lower()) or forms[0].startswith("epoch")):
             return name, ""
     raise RecordingError(f"{file.path}: no column with times was found among {', '.join(map(repr, file.names[:8]))}")
 

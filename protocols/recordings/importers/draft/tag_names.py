@@ -1,6 +1,7 @@
 """Which signal a tag is, by its name: words of some languages and the letters of instrument tags."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from wetwell.protocols.recordings.importers.draft.unit_names import UnitGuess
@@ -74,7 +75,7 @@ _QUANTITY_LETTERS = {
     "level_m": "lt lit lic li niv lvl",
     "flow_m3h": "ft fit fic fi q",
     "head_m": "pt pit pic",
-    "frequency_hz": "hz st sit sic spd vfd fu vsd",
+    "frequency_hz": "hz st sit sc sic spd vfd fu vsd",
     "power_kw": "kw jt jit jic",
     "running": "on ein xs ys run sts zs",
 }
@@ -84,6 +85,10 @@ _QUANTITY_OF_HOUSE = {"m³/h": "flow_m3h", "Hz": "frequency_hz", "kW": "power_kw
 _PUMP_WORD = r"(?:pumpe|pumppu|pump|pompe|pompa|bomba|pmp|pu|agg|p)"
 _PUMP_NUMBER = re.compile(rf"(?:^|[^a-z0-9]){_PUMP_WORD}[\s_.#:-]*(?:no|nr|n°)?[\s_.#:-]*0*(\d+(?:\.\d+)?)(?![0-9])")
 _PUMP_LATER_NUMBER = re.compile(r"(?:pump|pompe|pompa|bomba)\D*?(?<![a-z])(\d+(?:\.\d+)?)\D*$")
+
+
+_LOOP = re.compile(r"(?:^|[^a-z0-9])([a-z]{2,3})[\s_.#:-]*0*(\d+)(?![0-9])")
+"""Letters and number of a measuring loop, as in FT-101."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,6 +148,31 @@ def _quantity(text: str, tokens: set[str]) -> tuple[str, str]:
         if met:
             return quantity, f"'{met[0].upper()}'"
     return "", ""
+
+
+def of_loops(tags: Iterable[str]) -> dict[str, TagGuess]:
+    """Tags of pumps that have no number but that of their measuring loop.
+
+    A loop is a pump's if its letters come with two numbers or more: one flow meter alone is that of the station.
+
+    Examples
+    --------
+    >>> {tag: guess.pump for tag, guess in of_loops(["FT-101", "FT-201", "PT-100", "LT-101", "LT-102"]).items()}
+    {'FT-101': '101', 'FT-201': '201'}
+    """
+    found: dict[str, dict[str, TagGuess]] = {}
+    for tag in tags:
+        match = _LOOP.search(tag.lower())
+        quantity, why = _quantity("", {match[1]}) if match else ("", "")
+        if match and quantity and quantity != "level_m":
+            guess = TagGuess(quantity=quantity, pump=match[2], why=f"{why} and the number of its loop")
+            found.setdefault(match[1], {})[tag] = guess
+    return {
+        tag: guess
+        for of_letters in found.values()
+        if len({guess.pump for guess in of_letters.values()}) > 1
+        for tag, guess in of_letters.items()
+    }
 
 
 def number_pumps(labels: set[str]) -> dict[str, int]:

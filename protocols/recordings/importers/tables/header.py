@@ -11,6 +11,8 @@ from wetwell.protocols.recordings.importers.times.time_format import looks_like_
 MOST_LOOKED = 400
 """Rows of the beginning that tell how a file is written."""
 
+_FULL = 0.8
+"""Share of the cells of the fullest line above the data that a header has: that of the times may have no name. [1]"""
 _NUMBER = re.compile(r"[+-]?\d[\d.,]*([eE][+-]?\d+)?")
 
 
@@ -44,7 +46,8 @@ def find_header(rows: Sequence[Sequence[str]], needed: str | None = None) -> Hea
     rows : sequence of rows
         The first ones, as texts.
     needed : str, optional
-        A name that the header must hold; without it the header is the first full line above the data.
+        A name that the header must hold; without it the header is the first line above the data that is about as
+        full as the fullest of them: a title may hold a delimiter, too.
 
     Raises
     ------
@@ -61,8 +64,9 @@ def find_header(rows: Sequence[Sequence[str]], needed: str | None = None) -> Hea
         data = _first_data(rows, 0, None)
         if data >= len(rows):
             raise ValueError("no line with a date and values was found at the top")
-        full = [place for place in range(data) if _filled(rows[place]) >= max(2, len(rows[data]) / 2)]
-        return _header(rows, full[0] if full else None, data)
+        filled = [_filled(row) for row in rows[:data]]
+        least = max(2, len(rows[data]) / 2, _FULL * max(filled, default=0))
+        return _header(rows, next((place for place in range(data) if filled[place] >= least), None), data)
     found = [(place, row.index(needed)) for place, row in enumerate(map(_trimmed, rows)) if needed in row]
     if found:
         place, column = found[0]

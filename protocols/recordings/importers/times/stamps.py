@@ -15,7 +15,15 @@ _EXCEL_EPOCH_D = 25_569
 """1970-01-01 in days of Excel."""
 _NS_PER_MS = 1_000_000
 _DAY_S = 86_400
-_NS_OF_UNIT = {"epoch_s": NS_PER_S, "epoch_ms": _NS_PER_MS, "excel": _DAY_S * NS_PER_S}
+_NS_OF_UNIT = {
+    "epoch_s": NS_PER_S,
+    "epoch_ms": _NS_PER_MS,
+    "epoch_us": 1_000,
+    "epoch_ns": 1,
+    "excel": _DAY_S * NS_PER_S,
+}
+_MOST_S = 9_000_000_000
+"""Seconds since 1970 that stamps may have: until 2255."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,14 +90,16 @@ def _of_numbers(column: pa.Array, name: str) -> Stamps:
         texts = pc.replace_substring(pc.utf8_trim_whitespace(column), ",", ".")
         is_number = pc.match_substring_regex(texts, r"^\d+(\.\d*)?$")
         column = pc.if_else(is_number, texts, None).cast(pa.float64())
-    numbers = column.cast(pa.float64()).fill_null(np.nan).to_numpy(zero_copy_only=False)
-    is_read = np.abs(numbers) < {"epoch_s": 9e9, "epoch_ms": 9e12, "excel": 1e5}[name]
+    numbers = column.cast(pa.float64(), safe=False).fill_null(np.nan).to_numpy(zero_copy_only=False)
+    is_read = np.abs(numbers) < (1e5 if name == "excel" else _MOST_S * NS_PER_S / _NS_OF_UNIT[name])
     numbers = np.where(is_read, numbers, 0.0)
     if name == "excel":
         time_ns = np.rint((numbers - _EXCEL_EPOCH_D * is_read) * _DAY_S * 1000.0).astype(np.int64) * _NS_PER_MS
         return Stamps(time_ns=time_ns, is_utc=np.zeros(len(numbers), dtype=bool), is_read=is_read)
-    whole = np.floor(numbers)
     unit_ns = _NS_OF_UNIT[name]
+    if unit_ns == 1:
+        numbers = np.rint(numbers / 1000.0) * 1000.0  # a float holds them to a microsecond
+    whole = np.floor(numbers)
     below_ns = np.rint((numbers - whole) * unit_ns / 1000.0).astype(np.int64) * 1000
     return Stamps(
         time_ns=whole.astype(np.int64) * unit_ns + below_ns, is_utc=np.ones(len(numbers), dtype=bool), is_read=is_read

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-NUMERIC = ("epoch_s", "epoch_ms", "excel")
+NUMERIC = ("epoch_s", "epoch_ms", "epoch_us", "epoch_ns", "excel")
 """Forms that are one number: seconds or milliseconds since 1970 in UTC, days since 30 December 1899 in local time."""
 
 _MONTHS = (
@@ -175,10 +175,16 @@ def _forms(text: str) -> Iterator[tuple[str, int]]:
 
 def _numeric_format(texts: Sequence[str]) -> str | None:
     numbers = sorted(
-        float(text.replace(",", ".")) for text in texts if re.fullmatch(r"\s*\d{5,13}(?:[.,]\d*)?\s*", text)
+        float(text.replace(",", ".")) for text in texts if re.fullmatch(r"\s*\d{5,19}(?:[.,]\d*)?\s*", text)
     )
     if len(numbers) < max(_LIKELY * len(texts), 1):
         return None
-    limits = {"epoch_ms": (1e11, 1e13), "epoch_s": (1e8, 1e10), "excel": (2e4, 8e4)}
+    limits = {
+        "epoch_ns": (1e17, 1e19),
+        "epoch_us": (1e14, 1e16),
+        "epoch_ms": (1e11, 1e13),
+        "epoch_s": (1e8, 1e10),
+        "excel": (2e4, 8e4),
+    }
     middle = numbers[len(numbers) // 2]
     return next((name for name, (low, high) in limits.items() if low <= middle < high), None)

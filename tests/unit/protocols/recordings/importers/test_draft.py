@@ -139,6 +139,41 @@ def test_uneven_stamps_are_values_stored_on_change(tmp_path):
     assert "max_age_s = 255.0  # assumed: the longest silence of a tag" in draft.text
 
 
+def test_a_tag_that_is_silent_while_others_are_not_is_stored_on_change(tmp_path):
+    text = "Time;Tag;Value\n" + "".join(
+        f"2024-11-15 12:{second // 60:02}:{second % 60:02};{tag};{second}\n"
+        for second in range(0, 900, 10)
+        for tag in ("LT1", "P1_FT")
+        if tag == "LT1" or second % 300 < 100 or second == 890
+    )
+    draft, _ = drafted(tmp_path, text, 'time_zone = "UTC"')
+    assert 'value = "held"  # assumed' in draft.text
+
+
+def test_a_title_may_hold_the_delimiter(tmp_path):
+    draft, done = drafted(tmp_path, "Trend report; PS07;;\n" + LONG)
+    assert done.recording.columns["level_m"].size == 10
+    assert draft.assumed["lines"] == "header 2, first row 3"
+
+
+@pytest.mark.parametrize(("form", "per_s"), [("s", 1), ("ms", 10**3), ("us", 10**6), ("ns", 10**9)])
+def test_seconds_since_1970_are_recognised_under_any_name(tmp_path, form, per_s):
+    begin_s = 1_729_965_600
+    rows = "".join(f"{(begin_s + 10 * row) * per_s},{row / 10},{row}\n" for row in range(20))
+    draft, done = drafted(tmp_path, f"ts,level,P1 flow\n{rows}")
+    assert draft.assumed["time_format"] == f"'epoch_{form}'"
+    assert "time_zone: not needed" in draft.text
+    assert (done.recording.time_ns // 10**9).tolist() == [begin_s + 10 * row for row in range(20)]
+
+
+@pytest.mark.parametrize(("of_start", "value"), [(40.0, "mean"), (100.0, "instant")])
+def test_rows_of_starts_tell_means_from_instants(tmp_path, of_start, value):
+    flows = [0.0, 0.0, of_start, 100.0, 100.0] * 12
+    rows = "".join(f"2024-11-15 {12 + row // 60}:{row % 60:02};1.5;{flow}\n" for row, flow in enumerate(flows))
+    draft, _ = drafted(tmp_path, f"Time;Level;P1 flow\n{rows}", 'time_zone = "UTC"')
+    assert f'value = "{value}"  # assumed' in draft.text
+
+
 def test_day_and_month_that_cannot_be_told_apart_are_said(tmp_path):
     draft, _ = drafted(
         tmp_path, "Time;Level;P1 flow\n01/02/2024 12:00;1;2\n01/02/2024 12:10;1;2\n", 'time_zone = "UTC"'

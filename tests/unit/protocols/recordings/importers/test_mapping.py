@@ -99,7 +99,7 @@ def test_the_mapping_of_the_specification(tmp_path):
         (
             'value = "instant"',
             'time_format = "%H:%M"',
-            "time_format: got '%H:%M', must be epoch_s, epoch_ms, excel, or day",
+            "time_format: got '%H:%M', must be epoch_s, epoch_ms, epoch_us, epoch_ns, excel, or day",
         ),
         (
             'value = "instant"',
