@@ -16,6 +16,7 @@ from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.api.result import Picture, Result
 from wetwell.services.api.sources import RecordingSource, StationSource, rows_of, station_of
+from wetwell.services.batch.units import refuse_other_units
 from wetwell.services.reports.charts import table
 from wetwell.services.reports.episode_table import episode_chart, episode_rows
 
@@ -104,10 +105,11 @@ def detect(
     Raises
     ------
     RecordingError
-        If the recording cannot be read or is not of the station.
+        If the recording cannot be read, is not of the station, or is in other units.
     """
     plant = station_of(station)
     rows = rows_of(recording, plant, Reading.said(time_zone, as_station=as_station))
+    refuse_other_units(rows, plant, "recording")
     detector = Detector.of(plant)
     verdicts = [verdict for block in blocks(rows, len(plant.pump)) for verdict in detector.update_block(block)]
     verdicts += detector.finish()

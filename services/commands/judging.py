@@ -48,7 +48,9 @@ def detect(
     plant = find_station(station)
     rows = reading_of(time_zone, as_station=as_station).read_of(recording, plant)
     from wetwell.services.batch.recordings import detect as judge  # after what can be wrong: it takes a second
+    from wetwell.services.batch.units import refuse_other_units
 
+    refuse_other_units(rows, plant, recording)
     for name in rows.ignored:
         typer.echo(f"{recording}: column '{name}' is not known and is ignored", err=True)
     from wetwell.services.reports.episode_table import episode_rows

@@ -11,27 +11,24 @@ from wetwell.sim2real.recording.regimes import IDLE, STEADY, Regimes
 from wetwell.sim2real.recording.seconds import filled
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.replay.units import (
+    LIKELY,
+    NEAR,
+    check_frequency,
+    check_level_unit,
+    said_of,
+    unit_near,
+    where_pumps_switch,
+)
 
-UNITS: dict[str, dict[str, float]] = {
-    "flow_m3h": {"L/s": 1 / 3.6, "m³/s": 1 / 3600.0, "L/min": 1000.0 / 60.0, "m³/d": 24.0, "US gal/min": 4.4029},
-    "head_m": {"bar": 1 / 10.197, "kPa": 9.8067, "cm or mbar": 100.0, "mm": 1000.0},
-    "power_kw": {"W": 1000.0, "MW": 0.001},
-    "level_m": {"cm": 100.0, "mm": 1000.0},
-}
-"""Readings in other units over those in ours."""
-NEAR = 0.25
-"""Deviation from such a factor, in its logarithm, that effects may bring about."""
 POSSIBLE = (0.3, 3.0)
 """Ratios of recorded and expected values that an effect can still bring about."""
-LIKELY = 0.35
-"""Logarithm of a ratio that hardly any effect brings about alone."""
 LEVEL_SHARE = 0.3
 """Shift of a start level that hardly any effect brings about alone, as a share of the height to the stop."""
 MANY = 3
 """Independent parts that are far off from which the file is taken for that of another station."""
 MIN_IDLE_S = 600
 SHORTEST_RUN_S = 5.0
-PERCENT = 0.04
 
 
 def check_plausible(traces: Traces, station: Station, regimes: Regimes, plain: Prediction) -> None:
@@ -51,14 +48,14 @@ def check_plausible(traces: Traces, station: Station, regimes: Regimes, plain: P
         If values seem to be in other units, rows in no order of time, or the file that of another station; one line.
     """
     _check_order(traces)
-    _check_frequency(traces, station)
+    check_frequency(traces, station)
     ratios = {
         name: _ratio(recorded, plain.signals[name], regimes.of_pumps) for name, recorded in traces.signals.items()
     }
     for name, ratio in ratios.items():
-        _check_unit(name, ratio, UNITS[name], "what this station gives")
+        _check_unit(name, name, ratio, "what this station gives")
     inflow_ratio = _inflow_ratio(traces, station, plain)
-    _check_unit("inflow_m3h", inflow_ratio, UNITS["flow_m3h"], "what the pumps carry away")
+    _check_unit("inflow_m3h", "flow_m3h", inflow_ratio, "what the pumps carry away")
     _check_level(traces, station)
     off = _far_off(traces, station, regimes, ratios, inflow_ratio)
     if len(off) >= MANY:
@@ -73,50 +70,29 @@ def _check_order(traces: Traces) -> None:
         raise ValueError(f"pumps run for {run_s:.1f} s at a time: the rows are in no order of time")
 
 
-def _check_frequency(traces: Traces, station: Station) -> None:
-    nominal_hz = max(pump.nominal_frequency_hz for pump in station.pump)
-    running = traces.frequency_hz[traces.frequency_hz > 0.0]
-    usual_hz = float(np.quantile(running, 0.9)) if running.size else nominal_hz
-    for full, unit, factor in ((100.0, "% of nominal", nominal_hz / 100.0), (1.0, "a share of nominal", nominal_hz)):
-        if abs(usual_hz / full - 1.0) < PERCENT and abs(np.log(usual_hz / nominal_hz)) > LIKELY:
-            raise ValueError(
-                f"frequency_hz reads {usual_hz:.4g} where nominal is {nominal_hz:g} Hz, as if in {unit}: "
-                f"prepare the recording with a scale of {factor:.4g}"
-            )
-
-
-def _check_unit(name: str, ratio: float, units: dict[str, float], than: str) -> None:
+def _check_unit(name: str, quantity: str, ratio: float, than: str) -> None:
+    """Refuse a ratio of what was recorded to what is expected that a unit brings about, or nothing."""
     if not np.isfinite(ratio) or POSSIBLE[0] * np.exp(NEAR) < ratio < POSSIBLE[1]:
         return
     if ratio <= 0.0:
         raise ValueError(f"{name} reads {ratio:.3g} times {than}: a meter without a signal, or no water")
-    for unit, factor in units.items():
-        if abs(np.log(ratio / factor)) < NEAR:
-            raise ValueError(
-                f"{name} reads {ratio:.3g} times {than}, as if in {unit}: "
-                f"prepare the recording with a scale of {1.0 / factor:.4g}"
-            )
+    unit = unit_near(quantity, ratio)
+    if unit is not None:
+        raise ValueError(f"{name} reads {ratio:.3g} times {than}, {said_of(quantity, unit)}")
     if not POSSIBLE[0] < ratio < POSSIBLE[1]:
         raise ValueError(f"{name} reads {ratio:.3g} times {than}: a wrong unit, or the file of another station")
 
 
 def _check_level(traces: Traces, station: Station) -> None:
-    control = station.control
+    check_level_unit(traces, station)
     level_m = traces.level_m[np.isfinite(traces.level_m)]
-    if level_m.size == 0 or control.is_external:
+    if level_m.size == 0 or station.control.is_external:
         return
-    ratio = float(np.median(level_m)) / station.middle_level_m
-    for unit, factor in UNITS["level_m"].items():
-        if ratio > 0.0 and abs(np.log(ratio / factor)) < 2.0 * NEAR:
-            raise ValueError(
-                f"level_m reads {np.median(level_m):.4g} where the pumps switch at {control.stop_levels_m[0]:g} to "
-                f"{control.start_levels_m[0]:g} m, as if in {unit}: prepare the recording with a scale of "
-                f"{1.0 / factor:.4g}"
-            )
-    if not 1.0 / 6.0 < ratio < 6.0:
+    usual_m = float(np.median(level_m))
+    if not 1.0 / 6.0 < usual_m / station.middle_level_m < 6.0:
         raise ValueError(
-            f"level_m reads {np.median(level_m):.4g} where the pumps switch at {control.stop_levels_m[0]:g} to "
-            f"{control.start_levels_m[0]:g} m: another unit, such as % of a span, or the file of another station"
+            f"level_m reads {usual_m:.4g} {where_pumps_switch(station)}: "
+            "another unit, such as % of a span, or the file of another station"
         )
 
 
