@@ -152,6 +152,15 @@ def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
         assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
 
 
+@pytest.mark.parametrize("data", [b"", b"odd"])
+def test_where_a_history_ends_is_told_though_its_last_row_is_damaged(content, tmp_path, data):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        last_ns = store.newest_ns("alpha")
+        store.file._writer.execute("UPDATE sample SET data = ? WHERE time_ns = ?", (data, last_ns))
+        assert store.newest_ns("alpha") == last_ns - 10 * NS_PER_S
+
+
 def test_a_message_whose_place_was_changed_is_not_told_twice_when_it_comes_again(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
