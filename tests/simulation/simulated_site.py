@@ -19,6 +19,7 @@ from unittest import mock
 from accidents import SLOW_S, Plan, happen
 from judged import Judged
 from network import Network, SimulatedBus
+from readable import Readable, readable_in
 from simulated_plc import SimulatedPlc
 from virtual_loop import LIFE, Life
 
@@ -32,6 +33,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.alarms import daemon as alarms_daemon
 from wetwell.services.detector.daemon import judge_alone
+from wetwell.services.detector.station_detector import VERDICT_HISTORY
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.service import Historian
@@ -49,8 +51,15 @@ from wetwell.services.runtime.settings import (
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-START_NS = (1_735_689_600 + 43_200) * NS_PER_S
-"""At noon: a life of two days has a day that becomes a file."""
+FIRST_DAY_NS = 1_735_689_600 * NS_PER_S
+HOURS = 24
+"""A life begins at one of these of the day: the earlier, the later there is a day that becomes a file."""
+MAINTAIN_S = (1_800, 7_200)
+COMMIT_PERIODS = (0.5, 2.0)
+CHECKPOINT_PERIODS = (6.0, 60.0)
+"""How often things are done at a site, of which a seed has rolled one; in periods of the poll."""
+KEPT_SAMPLES = (40, 600)
+"""So many a gateway keeps for those who come late: 600 are ten minutes of life, but two days of a light site."""
 RESTART_S = 10.0
 """After so long a daemon that has ended with an error is started again."""
 QUIET_S = 1_800.0
@@ -223,6 +232,10 @@ class Site:
         Errors of the program itself that have ended a daemon, and pairs that worked on one folder.
     told_late : set of (str, str)
         Alarms that one hears of who comes at the end, by station and id.
+    verdicts_late : set of bytes
+        Verdicts that one hears of who comes at the end.
+    readable : dict
+        Samples of the history that could be read when its files were harmed last, by station.
     log : list of Told
         What the operator was told by the logs.
     judged : Judged
@@ -245,6 +258,8 @@ class Site:
     crashes: list[str] = field(default_factory=list)
     log: list[Told] = field(default_factory=list)
     told_late: set[tuple[str, str]] = field(default_factory=set)
+    verdicts_late: set[bytes] = field(default_factory=set)
+    readable: Readable = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.dice = random.Random(self.seed)
@@ -252,14 +267,20 @@ class Site:
         self.judged = Judged()
         self.full = self.slow = 0
         self.clock_s = 0.0
+        self.kept_samples = self.dice.choice(KEPT_SAMPLES)
+        self.start_ns = FIRST_DAY_NS + self.dice.randrange(HOURS) * 3_600 * NS_PER_S
         self.settings = Settings(
             health=HealthSettings(period_s=60.0 * self.period_s),
-            detector=DetectorSettings(state_dir=self.folder / "detector", checkpoint_s=60.0 * self.period_s),
+            detector=DetectorSettings(
+                state_dir=self.folder / "detector", checkpoint_s=self.dice.choice(CHECKPOINT_PERIODS) * self.period_s
+            ),
             alarms=AlarmSettings(
                 state_dir=self.folder / "alarms", stale_after_s=5.0 * self.period_s, silent_after_s=600.0
             ),
             historian=HistorianSettings(
-                folder=self.folder / "history", commit_s=2.0 * self.period_s, maintain_s=3600
+                folder=self.folder / "history",
+                commit_s=self.dice.choice(COMMIT_PERIODS) * self.period_s,
+                maintain_s=self.dice.choice(MAINTAIN_S),
             ),
         )
         self.plcs = {
@@ -330,6 +351,8 @@ class Site:
     def harm(self, kind: str, name: str) -> None:
         """Note what was done to the files of a daemon."""
         self.harms.append(Harm(kind, name, _now_s()))
+        if name == "historian":
+            self.readable = readable_in(self.folder_of(name))
 
     def _feed(self, number: int, station: Station) -> Recording:
         recording = Simulation(station, self.scenario, self.seed * 1000 + number).advance(self.seconds, truth=False)
@@ -367,7 +390,11 @@ class Site:
             group.create_task(_each(alarms, self._note_alarm))
 
     async def _come_late(self, bus: SimulatedBus) -> None:
-        await _each(bus.subscribe(alarm_key("*"), history=1, capacity=1_000_000), self._note_late)
+        alarms = bus.subscribe(alarm_key("*"), history=1, capacity=1_000_000)
+        verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=1_000_000)
+        async with asyncio.TaskGroup() as group:
+            group.create_task(_each(alarms, self._note_late))
+            group.create_task(_each(verdicts, self.verdicts_late.add))
 
     def _note_late(self, payload: bytes) -> None:
         alarm = Alarm.decode(payload)
@@ -392,7 +419,7 @@ class Site:
         real = atomic_file.atomic_file
 
         def time_ns() -> int:
-            return START_NS + round((loop.time() + self.clock_s) * NS_PER_S)
+            return self.start_ns + round((loop.time() + self.clock_s) * NS_PER_S)
 
         def is_lost() -> bool:
             life = LIFE.get()
@@ -415,6 +442,7 @@ class Site:
                 ("wetwell.services.runtime.clock.time", SimpleNamespace(time_ns=time_ns)),
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
+                ("wetwell.services.runtime.sample_sender.LEAST_KEPT", self.kept_samples),
                 ("wetwell.services.alarms.daemon.LOOK_S", LOOK_S),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.runtime.state_file.atomic_file", file),
