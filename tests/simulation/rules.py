@@ -11,7 +11,7 @@ from itertools import pairwise
 from accidents import CLOCK_STEP_S, KEEPERS
 from judged import once
 from network import Sent
-from simulated_site import Site
+from simulated_site import EARLIER_AT_S, Site
 from windows import MARGIN_S, Way, blocked, until_s
 
 from wetwell.detector.curves.datasheet import datasheet_of
@@ -252,7 +252,7 @@ def _lost_samples(
     if lost:
         yield f"{station}: {len(lost)} samples that could be kept were not, the first from {lost[0]:.0f} s"
     if not is_told and not is_told_since(site, first_s):
-        gone = [at_s for at_s, end_s in missing if offers.was_open(at_s, end_s)]
+        gone = [at_s for at_s, end_s in missing if at_s == EARLIER_AT_S or offers.was_open(at_s, end_s)]
         if gone:
             yield f"{station}: the sample of {gone[0]:.0f} s was kept and is lost, and nobody was told"
 
@@ -335,11 +335,14 @@ def key_of(sample: Sample) -> Key:
 def _alarms(site: Site) -> Iterator[str]:
     """An alarm is raised once each time that its condition comes; every pump fault that is told raises one.
 
-    Files of the alarms that were harmed may have it raised again.
+    Files of the alarms that were harmed may have it raised again; a detector that learns anew, or a clock that was
+    set, may have it raised for what has returned.
     """
     step_ns = round(len(site.accidents) * CLOCK_STEP_S * NS_PER_S) if is_stepped(site) else 0
     is_harmed = any(harm.name == "alarms" for harm in site.harms)
-    is_full = any(span.what == "full" for span in site.spans)
+    odd_s = [harm.at_s for harm in site.harms if harm.name in {"alarms", "detector"}]
+    odd_s += [accident.at_s for accident in site.plan if accident.kind.startswith("clock")]
+    full = blocked(site.spans, ["machine"], ["full"])
     for (station, name), changes in site.alarms.items():
         raised = [change.raised for change in changes if change.raised is not None]
         if any(later < earlier - step_ns for earlier, later in pairwise(raised)) and not is_harmed:
@@ -347,7 +350,11 @@ def _alarms(site: Site) -> Iterator[str]:
         for before, after in pairwise(changes):
             if before.is_active and after.is_active and after.raised != before.raised and not is_harmed:
                 yield f"{station}: alarm {name} is raised twice"
-            if is_raised_anew(before, after) and not is_harmed and not is_stepped(site) and not is_full:
+            if not is_raised_anew(before, after):
+                continue
+            before_s, after_s = _said_s(site, before), _said_s(site, after)
+            is_kept = all(end_s < before_s or begin_s > after_s for begin_s, end_s in full)
+            if is_kept and after_s < min(odd_s, default=site.seconds):
                 yield f"{station}: alarm {name} is raised anew for what has returned"
     way = Way(site, "detector", "alarms", MARGIN_S)
     for station in site.stations:
@@ -360,6 +367,12 @@ def _alarms(site: Site) -> Iterator[str]:
         alarmed = {pump for pump in faulty if (station.name, f"pump{pump}.pump_fault") in site.alarms}
         if faulty - alarmed:
             yield f"{station.name}: pump faults {sorted(faulty - alarmed)} raised no alarm"
+
+
+def _said_s(site: Site, alarm: Alarm) -> float:
+    """When an alarm was told like that first. [s]"""
+    sent = site.network.sent[alarm_key(alarm.station, alarm.id)]
+    return min(one.at_s for one in sent if one.payload == alarm.encode())
 
 
 def is_raised_anew(before: Alarm, after: Alarm) -> bool:
@@ -375,10 +388,7 @@ def _told_late(site: Site) -> Iterator[str]:
         return
     in_the_way = blocked(site.spans, ["alarms", "machine"], ["mute", "stalled", "full", "slow"])
     for (station, name), changes in site.alarms.items():
-        said_s = min(
-            one.at_s for one in site.network.sent[alarm_key(station, name)] if one.payload == changes[-1].encode()
-        )
-        is_free = all(end_s < said_s - MARGIN_S for _, end_s in in_the_way)
+        is_free = all(end_s < _said_s(site, changes[-1]) - MARGIN_S for _, end_s in in_the_way)
         if changes[-1].is_active and is_free and (station, name) not in site.told_late:
             yield f"{station}: alarm {name} stands, and who comes late does not hear of it"
 

@@ -16,15 +16,16 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest import mock
 
+import numpy as np
 from accidents import SLOW_S, Plan, happen
 from judged import Judged
-from network import Network, SimulatedBus
+from network import Network, Sent, SimulatedBus
 from readable import Readable, readable_in
 from simulated_plc import SimulatedPlc
 from virtual_loop import LIFE, Life
 
 from wetwell.protocols import atomic_file
-from wetwell.protocols.bus.keys import alarm_key, verdict_key
+from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.protocols.errors import RecordingError, WetwellError
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.verdict import Verdict
@@ -36,6 +37,7 @@ from wetwell.services.detector.daemon import judge_alone
 from wetwell.services.detector.station_detector import VERDICT_HISTORY
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
+from wetwell.services.historian.rows import pack
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import Batch, StoreError
@@ -54,6 +56,8 @@ from wetwell.simulator.simulation import Simulation
 FIRST_DAY_NS = 1_735_689_600 * NS_PER_S
 HOURS = 24
 """A life begins at one of these of the day: the earlier, the later there is a day that becomes a file."""
+EARLIER_DAYS, EARLIER_S = 2, 1_800
+"""The history of a site has samples of so many days before its life, one in so many seconds."""
 MAINTAIN_S = (1_800, 7_200)
 COMMIT_PERIODS = (0.5, 2.0)
 CHECKPOINT_PERIODS = (6.0, 60.0)
@@ -64,6 +68,8 @@ RESTART_S = 10.0
 """After so long a daemon that has ended with an error is started again."""
 QUIET_S = 1_800.0
 """Virtual time after the last sample in which everything may settle."""
+EARLIER_AT_S = -1.0
+"""When what was before the life was sent."""
 LOOK_S = 60.0
 """Between the looks of the alarms at what is silent: often against samples of a light site."""
 LATE_S = 60.0
@@ -299,6 +305,7 @@ class Site:
     async def live(self) -> None:
         """Let the site live from the first to the last sample, with its accidents, and become quiet."""
         with self._simulated_world():
+            self._keep_earlier()
             observer = Process(self, "observer", self._observe)
             observer.start_again()
             for process in self.processes.values():
@@ -360,6 +367,21 @@ class Site:
             time_ns=recording.time_ns[:: self.period_s],
             columns={name: column[:: self.period_s] for name, column in recording.columns.items()},
         )
+
+    def _keep_earlier(self) -> None:
+        """Let the history begin before the life: by one who is gone."""
+        gone = SimulatedBus(self.network, "earlier")
+        gone.is_alive, gone.died_s = False, 0.0
+        count = EARLIER_DAYS * 86_400 // EARLIER_S
+        time_ns = FIRST_DAY_NS - np.arange(count, 0, -1) * EARLIER_S * NS_PER_S
+        with open_store(self.settings.historian) as store:
+            for name, plc in self.plcs.items():
+                columns = {column: values[:count] for column, values in plc.recording.columns.items()}
+                samples = list(Recording(time_ns=time_ns, columns=columns).samples(name))
+                store.write(Batch([pack(name, sample) for sample in samples]))
+                self.network.sent[sample_key(name)] = [
+                    Sent(sample.encode(), EARLIER_AT_S, gone) for sample in samples
+                ]
 
     async def _poll(self, bus: SimulatedBus) -> None:
         plcs = [simulated.plc for simulated in self.plcs.values()]
