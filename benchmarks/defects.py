@@ -1,21 +1,25 @@
 """Puts defects of the project's past back, one at a time, and lets simulated sites look for them: JSON on stdout.
 
-python benchmarks/defects.py --first-seed 70000 --budget-s 180 --list
+python benchmarks/defects.py --first-seed 70000 --workers 2
 python benchmarks/defects.py --first-seed 70000 --budget-s 180 --only "second detector"
+python benchmarks/defects.py --list
 """
 
 import argparse
 import contextlib
 import json
+import math
 import os
 import re
-import select
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from past_defects import PAST_DEFECTS, PastDefect
@@ -23,7 +27,9 @@ from past_defects import PAST_DEFECTS, PastDefect
 ROOT = Path(__file__).parents[1]
 MOST_SITES = 10_000
 MOST_S = 120.0
-"""For one site without a defect: it takes a few."""
+"""Of a core for one site without a defect: it takes a few."""
+HOUR_S = 3_600.0
+"""Of each core, in which all defects are looked for."""
 PARTS = ("benchmarks", "detector", "protocols", "services", "sim2real", "simulator", "src", "tests")
 
 
@@ -45,21 +51,51 @@ def put_back(folder: Path, defect: PastDefect) -> None:
 
 
 def looked_for(folder: Path, first_seed: int, budget_s: float) -> dict[str, object]:
-    """What a copy of the project breaks within some seconds: seed and rule; None where nothing was found.
+    """What a copy of the project breaks within some seconds of a core: seed and rule; None where nothing was found.
 
-    A seed that breaks a rule without the defect, too, has not found it.
+    A seed that breaks a rule without the defect, too, has not found it. The seconds are those that the processes had
+    of a core, so that other work on the machine does not count.
     """
-    end_s = time.monotonic() + budget_s
-    while (left_s := end_s - time.monotonic()) > 0.0 and (broken := first_broken(folder, first_seed, left_s)):
+    spent_s, begin_seed = 0.0, first_seed
+    while spent_s < budget_s:
+        broken, seconds = first_broken(folder, begin_seed, budget_s - spent_s)
+        spent_s += seconds
+        if broken is None:
+            break
         seed, rule = broken
-        if first_broken(ROOT, seed, MOST_S, sites=1) is None:
-            return {"seed": seed, "rule": rule, "s": round(budget_s - end_s + time.monotonic(), 1)}
-        first_seed = seed + 1
-    return {"seed": None, "rule": None, "s": budget_s}
+        broken_without, seconds = first_broken(ROOT, seed, MOST_S, sites=1)
+        spent_s += seconds
+        if broken_without is None:
+            return {"seed": seed, "rule": rule, "sites": seed - first_seed + 1, "s": round(spent_s, 1)}
+        begin_seed = seed + 1
+    return {"seed": None, "rule": None, "s": round(spent_s, 1)}
 
 
-def first_broken(folder: Path, first_seed: int, most_s: float, sites: int = MOST_SITES) -> tuple[int, str] | None:
-    """The first seed of which a copy of the project breaks a rule within some seconds, and the rule."""
+def looked_for_in_copy(defect: PastDefect, first_seed: int, budget_s: float) -> dict[str, object]:
+    """The same for a defect, put back into a copy of its own."""
+    with copied() as folder:
+        put_back(folder, defect)
+        found = looked_for(folder, first_seed, budget_s)
+    print(f"{defect.name}: {found}", file=sys.stderr)
+    return found
+
+
+@contextlib.contextmanager
+def copied() -> Iterator[Path]:
+    """Copy the project with what is compiled, which a change of services does not touch."""
+    with tempfile.TemporaryDirectory() as place:
+        for part in PARTS:
+            shutil.copytree(ROOT / part, Path(place) / part, symlinks=True)
+        yield Path(place)
+
+
+def first_broken(
+    folder: Path, first_seed: int, most_s: float, sites: int = MOST_SITES
+) -> tuple[tuple[int, str] | None, float]:
+    """The first seed of which a copy of the project breaks a rule, and the rule; seconds of a core that it took.
+
+    None if that takes more seconds of a core than are given.
+    """
     script = folder / "benchmarks" / "simulation.py"
     command = [sys.executable, str(script), "--stations", "2", "--sites", str(sites)]
     run = subprocess.Popen(  # noqa: S603 - our own script
@@ -68,25 +104,29 @@ def first_broken(folder: Path, first_seed: int, most_s: float, sites: int = MOST
         stderr=subprocess.PIPE,
         env=os.environ | {"PYTHONPATH": str(folder / "src")},
         cwd=folder,
-        start_new_session=True,
     )
-    try:
-        is_told, _, _ = select.select([run.stderr], [], [], most_s)
-        told = run.stderr.readline().decode() if is_told else ""
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(run.pid, signal.SIGKILL)  # it and its worker
-        run.wait()
+    limit_s = math.ceil(most_s)
+    resource.prlimit(run.pid, resource.RLIMIT_CPU, (limit_s, limit_s))
+    with run.stderr or contextlib.nullcontext() as stderr:
+        told = "" if stderr is None else stderr.readline().decode()
+        os.kill(run.pid, signal.SIGKILL)  # `kill` would wait for it, and nobody would know its seconds
+        _, _, usage = os.wait4(run.pid, 0)
+    run.returncode = 0  # it was waited for
     broken = re.match(r"seed (\d+): (.*)", told)
     if told and broken is None:
         raise SystemExit(f"{script}: {told}")
-    return None if broken is None else (int(broken[1]), broken[2][:200])
+    return None if broken is None else (int(broken[1]), broken[2][:200]), usage.ru_utime + usage.ru_stime
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first-seed", type=int, default=70_000)
-    parser.add_argument("--budget-s", type=float, default=180.0, help="for each defect")
+    parser.add_argument("--workers", type=int, default=1, help="defects that are looked for side by side")
+    parser.add_argument(
+        "--budget-s",
+        type=float,
+        help="of a core for each defect; without it all together have an hour of each worker",
+    )
     parser.add_argument("--only", default="", help="those whose name has this text")
     parser.add_argument("--list", action="store_true", help="print the defects, and look for none")
     given = parser.parse_args()
@@ -94,20 +134,16 @@ def main() -> None:
     if given.list:
         print("\n".join(f"{defect.mended_in}  {defect.name}" for defect in chosen))
         return
-    found: dict[str, dict[str, object]] = {}
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        for part in PARTS:  # with what is compiled, which a change of services does not touch
-            shutil.copytree(ROOT / part, folder / part, symlinks=True)
-        for defect in chosen:
-            before = (folder / defect.path).read_text(encoding="utf-8")
-            put_back(folder, defect)
-            found[defect.name] = looked_for(folder, given.first_seed, given.budget_s)
-            print(f"{defect.name}: {found[defect.name]}", file=sys.stderr)
-            (folder / defect.path).write_text(before, encoding="utf-8")
+    budget_s, begin_s = given.budget_s or HOUR_S * given.workers / len(PAST_DEFECTS), time.monotonic()
+    with ThreadPoolExecutor(given.workers) as pool:
+        results = pool.map(lambda defect: looked_for_in_copy(defect, given.first_seed, budget_s), chosen)
+        found = {defect.name: result for defect, result in zip(chosen, results, strict=True)}
     result = {
         "first_seed": given.first_seed,
-        "budget_s": given.budget_s,
+        "workers": given.workers,
+        "budget_s": budget_s,
+        "wall_s": round(time.monotonic() - begin_s, 1),
+        "load": os.getloadavg(),
         "defects": len(chosen),
         "found": sum(one["seed"] is not None for one in found.values()),
         "of_each": found,

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -23,17 +24,29 @@ from rules import broken_rules
 from shrinking import as_test, shrunk
 from site_kinds import KINDS
 
+Task = tuple[str, int, int, float, int]
+"""Kind of a site, its seed, stations and days, and the period of the poll."""
+Lived = tuple[int, list[str], Counter[str], float]
 MEMORY = Path("/dev/shm")  # noqa: S108 -- each site has a folder of its own there
 
 
-def lived(task: tuple[str, int, int, float, int]) -> tuple[int, list[str], Counter[str], float]:
+def lived(task: Task) -> Lived:
     """Seed, broken rules, accidents and seconds of one core of a site."""
     begin_s = time.process_time()
     rules, accidents = life_of(task)
     return task[1], rules, Counter(accidents), time.process_time() - begin_s
 
 
-def life_of(task: tuple[str, int, int, float, int], plan: Plan | None = None) -> tuple[list[str], list[str]]:
+def all_lived(tasks: list[Task], workers: int) -> Iterator[Lived]:
+    """The same of many sites, in their order; one worker is this process."""
+    if workers == 1:
+        yield from map(lived, tasks)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        yield from pool.map(lived, tasks)
+
+
+def life_of(task: Task, plan: Plan | None = None) -> tuple[list[str], list[str]]:
     """Broken rules and accidents of a site; without a plan with that of its seed."""
     kind, seed, stations, days, period_s = task
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
@@ -48,7 +61,7 @@ def life_of(task: tuple[str, int, int, float, int], plan: Plan | None = None) ->
     return life
 
 
-def shortest_test(task: tuple[str, int, int, float, int], rule: str) -> str:
+def shortest_test(task: Task, rule: str) -> str:
     """The shortest test of a seed that still breaks the rule."""
     kind, seed, stations, days, period_s = task
     plan = shrunk(lambda plan: life_of(task, plan)[0], plan_of(seed, days * 86_400.0), rule)
@@ -74,13 +87,12 @@ def main() -> None:
     accidents: Counter[str] = Counter()
     broken: dict[int, list[str]] = {}
     cpu_s = 0.0
-    with ProcessPoolExecutor(given.workers) as pool:
-        for seed, rules, happened, seconds in pool.map(lived, tasks):
-            accidents.update(happened)
-            cpu_s += seconds
-            if rules:
-                broken[seed] = rules
-                print(f"seed {seed}: {rules[0]}", file=sys.stderr)
+    for seed, rules, happened, seconds in all_lived(tasks, given.workers):
+        accidents.update(happened)
+        cpu_s += seconds
+        if rules:
+            broken[seed] = rules
+            print(f"seed {seed}: {rules[0]}", file=sys.stderr, flush=True)
     for task in tasks if given.shrink else ():
         if task[1] in broken:
             print(shortest_test(task, broken[task[1]][0]), file=sys.stderr)

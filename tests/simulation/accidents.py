@@ -8,13 +8,13 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from disks import LyingDisk, backup_of, bring_back, flip_bit, misdirect
+from disks import LyingDisk, backup_of, bring_back, flip_bits, misdirect
 
 if TYPE_CHECKING:
     from simulated_site import Process, Site
 
-RARE_S, CONSTANT_S = 172_800.0, 14_400.0
-"""Mean time between two accidents of a kind, of which a seed has rolled one or the other."""
+BETWEEN_S = (172_800.0, 43_200.0, 14_400.0)
+"""Mean time between two accidents of a kind, of which a seed has rolled one: rare to constant."""
 IS_OFF = 0.5
 """Share of kinds that a seed has none of: what hides another is away at times."""
 SHORTEST_S, LONGEST_S = 1.0, 7_200.0
@@ -69,10 +69,11 @@ def plan_of(seed: int, seconds: float) -> Plan:
     """Accidents of a site that lives so long, in the order of their beginnings. The same seed has the same."""
     dice = random.Random(f"accidents {seed}")
     plan = []
-    for kind, targets in KINDS.items():
+    for kind, all_targets in KINDS.items():
         if dice.random() < IS_OFF:
             continue
-        between_s, at_s = dice.choice((RARE_S, CONSTANT_S)), 0.0
+        between_s, at_s = dice.choice(BETWEEN_S), 0.0
+        targets = dice.sample(all_targets, dice.randint(1, len(all_targets)))  # some are spared for all of a life
         while (at_s := at_s + dice.expovariate(1.0 / between_s)) < seconds - AFTER_S:
             lasts_s = math.exp(dice.uniform(math.log(SHORTEST_S), math.log(LONGEST_S)))
             lasts_s = min(lasts_s, seconds - AFTER_S - at_s)
@@ -168,7 +169,7 @@ async def _backup(site: "Site", accident: Accident, _dice: random.Random) -> Asy
 
 @contextlib.asynccontextmanager
 async def _damage(site: "Site", accident: Accident, dice: random.Random) -> AsyncIterator[None]:
-    act = flip_bit if accident.kind == "rot" else misdirect
+    act = flip_bits if accident.kind == "rot" else misdirect
     process = site.processes[accident.target]
     is_away = dice.random() < 0.5  # what is read at a start only must be found then
     if is_away:

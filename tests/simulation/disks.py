@@ -7,6 +7,8 @@ from pathlib import Path
 
 PAGE = 4096
 """What a disk writes at once, and a page of SQLite. [byte]"""
+FLIPPED = (1, 1, 4, 32)
+"""Bits that flip at once."""
 _NOT_DATA = ("-shm", ".at", ".part", ".lock")
 
 
@@ -16,18 +18,25 @@ def files_of(folder: Path) -> list[Path]:
     return [file for file in files if not file.name.endswith(_NOT_DATA) and "refused" not in file.name]
 
 
-def flip_bit(folder: Path, dice: random.Random) -> Path | None:
-    """Flip one bit of one file; None if there is none."""
+def flip_bits(folder: Path, dice: random.Random) -> Path | None:
+    """Flip bits of one file, anywhere or in its first or last page; None if there is no file.
+
+    Half of the time each file is as likely as another one, else each byte.
+    """
     files = files_of(folder)
     if not files:
         return None
-    path = dice.choice(files)
+    sizes = [file.stat().st_size for file in files]
+    path = dice.choice(files) if dice.random() < 0.5 else dice.choices(files, sizes)[0]
+    size = path.stat().st_size
+    begin, end = dice.choice(((0, size), (0, min(PAGE, size)), (max(0, size - PAGE), size)))
     with path.open("r+b") as file:
-        place = dice.randrange(path.stat().st_size)
-        file.seek(place)
-        (byte,) = file.read(1)
-        file.seek(place)
-        file.write(bytes([byte ^ (1 << dice.randrange(8))]))
+        for _ in range(dice.choice(FLIPPED)):
+            place = dice.randrange(begin, end)
+            file.seek(place)
+            (byte,) = file.read(1)
+            file.seek(place)
+            file.write(bytes([byte ^ (1 << dice.randrange(8))]))
     return path
 
 

@@ -143,7 +143,10 @@ class SimulatedBus:
         recover: bool = True,  # noqa: ARG002 -- as a `Bus`
         pace_s: float = PACE_S,  # noqa: ARG002 - what comes is there at once
     ) -> Mailbox[bytes]:
-        """Messages of a key expression, beginning with the last ones that living publishers keep."""
+        """Messages of a key expression, beginning with the last ones that living publishers keep.
+
+        No publisher waits for room, as those over Zenoh do: where too many come at once the oldest are lost.
+        """
         mailbox: Mailbox[bytes] = Mailbox(capacity)
         self._begin(Subscription(key, mailbox, self), history)
         return mailbox
@@ -268,7 +271,7 @@ class Subscription:
         stream = self._streams.setdefault((sender, key), Stream(sender, key))
         due_s = _now_s() + delay_s
         if stream.on_the_way:
-            due_s = max(due_s, stream.on_the_way[-1][0] + 1e-6)  # timers of one moment have no order
+            due_s = max(due_s, stream.on_the_way[-1][0])
         stream.on_the_way.append((due_s, number, payload, is_kept))
         if len(stream.on_the_way) == 1:
             self._wait_for_next(stream)
@@ -277,15 +280,20 @@ class Subscription:
         _call_at(max(stream.on_the_way[0][0], _now_s()), self._deliver, stream)
 
     def _deliver(self, stream: Stream) -> None:
-        if not self._owner.is_alive:
-            return
+        """Deliver all that is due: what a cache keeps comes in one go, as the answer to one question."""
         sender, owner = stream.sender, self._owner
-        _, number, payload, is_kept = stream.on_the_way[0]
-        if is_kept and sender.is_alive and not can_pass(sender, owner):
-            healed_s = max(sender.mute_s, owner.deaf_s)
-            _call_at(min(healed_s, _now_s() + ASK_AGAIN_S) + LONG_S, self._deliver, stream)
-            return
-        stream.on_the_way.popleft()
+        while owner.is_alive and stream.on_the_way and stream.on_the_way[0][0] <= _now_s():
+            if stream.on_the_way[0][-1] and sender.is_alive and not can_pass(sender, owner):
+                healed_s = max(sender.mute_s, owner.deaf_s)
+                _call_at(min(healed_s, _now_s() + ASK_AGAIN_S) + LONG_S, self._deliver, stream)
+                return
+            self._take(stream)
+        if owner.is_alive and stream.on_the_way:
+            self._wait_for_next(stream)
+
+    def _take(self, stream: Stream) -> None:
+        sender, owner = stream.sender, self._owner
+        _, number, payload, is_kept = stream.on_the_way.popleft()
         cache = sender.caches[stream.key]
         if is_kept and (not sender.is_alive or number < cache.end - len(cache.kept)):
             self.mailbox.missed += stream.is_begun
@@ -295,8 +303,6 @@ class Subscription:
             self.mailbox.put(message)
             if owner._network.dice.random() < owner._network.doubles:
                 self.mailbox.put(message)
-        if stream.on_the_way:
-            self._wait_for_next(stream)
 
 
 class SimulatedRequest:

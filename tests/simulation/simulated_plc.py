@@ -20,7 +20,7 @@ class SimulatedPlc:
 
     def __init__(self, station: str, recording: Recording, period_s: float, dice: random.Random) -> None:
         self.trouble = ""
-        self._recording = recording
+        self.recording = recording
         self._period_s = period_s
         self._dice = dice
         self._table = [row for row in register_table(recording.pumps, 1) if row.table == "input"]
@@ -37,11 +37,11 @@ class SimulatedPlc:
     @property
     def is_over(self) -> bool:
         """Whether the recording has ended."""
-        return _now_s() >= len(self._recording) * self._period_s
+        return _now_s() >= len(self.recording) * self._period_s
 
     def read(self, address: int, count: int) -> list[int]:
         """Words of the row that is due."""
-        row = min(int(_now_s() / self._period_s), len(self._recording) - 1)
+        row = min(int(_now_s() / self._period_s), len(self.recording) - 1)
         if row != self._row:
             self._row = row
             for register in self._table:
@@ -50,7 +50,7 @@ class SimulatedPlc:
         return [self._words.get(word, 0) for word in range(address, address + count)]
 
     def _value(self, name: str, row: int) -> float | None:
-        return float(self._recording.columns[name][row]) if name in self._recording.columns else None
+        return float(self.recording.columns[name][row]) if name in self.recording.columns else None
 
     def connection(self) -> "SimulatedConnection":
         """Connection of a gateway, not yet opened."""

@@ -16,14 +16,16 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest import mock
 
+import numpy as np
 from accidents import SLOW_S, Plan, happen
 from judged import Judged
-from network import Network, SimulatedBus
+from network import Network, Sent, SimulatedBus
+from readable import Readable, readable_in
 from simulated_plc import SimulatedPlc
 from virtual_loop import LIFE, Life
 
 from wetwell.protocols import atomic_file
-from wetwell.protocols.bus.keys import alarm_key, verdict_key
+from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.protocols.errors import RecordingError, WetwellError
 from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.verdict import Verdict
@@ -32,8 +34,10 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.alarms import daemon as alarms_daemon
 from wetwell.services.detector.daemon import judge_alone
+from wetwell.services.detector.station_detector import VERDICT_HISTORY
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
+from wetwell.services.historian.rows import pack
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import Batch, StoreError
@@ -49,12 +53,23 @@ from wetwell.services.runtime.settings import (
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-START_NS = (1_735_689_600 + 43_200) * NS_PER_S
-"""At noon: a life of two days has a day that becomes a file."""
+FIRST_DAY_NS = 1_735_689_600 * NS_PER_S
+HOURS = 24
+"""A life begins at one of these of the day: the earlier, the later there is a day that becomes a file."""
+EARLIER_DAYS, EARLIER_S = 2, 1_800
+"""The history of a site has samples of so many days before its life, one in so many seconds."""
+MAINTAIN_S = (1_800, 7_200)
+COMMIT_PERIODS = (0.5, 2.0)
+CHECKPOINT_PERIODS = (6.0, 60.0)
+"""How often things are done at a site, of which a seed has rolled one; in periods of the poll."""
+KEPT_SAMPLES = (40, 600)
+"""So many a gateway keeps for those who come late: 600 are ten minutes of life, but two days of a light site."""
 RESTART_S = 10.0
 """After so long a daemon that has ended with an error is started again."""
 QUIET_S = 1_800.0
 """Virtual time after the last sample in which everything may settle."""
+EARLIER_AT_S = -1.0
+"""When what was before the life was sent."""
 LOOK_S = 60.0
 """Between the looks of the alarms at what is silent: often against samples of a light site."""
 LATE_S = 60.0
@@ -223,6 +238,10 @@ class Site:
         Errors of the program itself that have ended a daemon, and pairs that worked on one folder.
     told_late : set of (str, str)
         Alarms that one hears of who comes at the end, by station and id.
+    verdicts_late : set of bytes
+        Verdicts that one hears of who comes at the end.
+    readable : dict
+        Samples of the history that could be read when its files were harmed last, by station.
     log : list of Told
         What the operator was told by the logs.
     judged : Judged
@@ -245,6 +264,8 @@ class Site:
     crashes: list[str] = field(default_factory=list)
     log: list[Told] = field(default_factory=list)
     told_late: set[tuple[str, str]] = field(default_factory=set)
+    verdicts_late: set[bytes] = field(default_factory=set)
+    readable: Readable = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.dice = random.Random(self.seed)
@@ -252,14 +273,20 @@ class Site:
         self.judged = Judged()
         self.full = self.slow = 0
         self.clock_s = 0.0
+        self.kept_samples = self.dice.choice(KEPT_SAMPLES)
+        self.start_ns = FIRST_DAY_NS + self.dice.randrange(HOURS) * 3_600 * NS_PER_S
         self.settings = Settings(
             health=HealthSettings(period_s=60.0 * self.period_s),
-            detector=DetectorSettings(state_dir=self.folder / "detector", checkpoint_s=60.0 * self.period_s),
+            detector=DetectorSettings(
+                state_dir=self.folder / "detector", checkpoint_s=self.dice.choice(CHECKPOINT_PERIODS) * self.period_s
+            ),
             alarms=AlarmSettings(
                 state_dir=self.folder / "alarms", stale_after_s=5.0 * self.period_s, silent_after_s=600.0
             ),
             historian=HistorianSettings(
-                folder=self.folder / "history", commit_s=2.0 * self.period_s, maintain_s=3600
+                folder=self.folder / "history",
+                commit_s=self.dice.choice(COMMIT_PERIODS) * self.period_s,
+                maintain_s=self.dice.choice(MAINTAIN_S),
             ),
         )
         self.plcs = {
@@ -278,6 +305,7 @@ class Site:
     async def live(self) -> None:
         """Let the site live from the first to the last sample, with its accidents, and become quiet."""
         with self._simulated_world():
+            self._keep_earlier()
             observer = Process(self, "observer", self._observe)
             observer.start_again()
             for process in self.processes.values():
@@ -330,6 +358,8 @@ class Site:
     def harm(self, kind: str, name: str) -> None:
         """Note what was done to the files of a daemon."""
         self.harms.append(Harm(kind, name, _now_s()))
+        if name == "historian":
+            self.readable = readable_in(self.folder_of(name))
 
     def _feed(self, number: int, station: Station) -> Recording:
         recording = Simulation(station, self.scenario, self.seed * 1000 + number).advance(self.seconds, truth=False)
@@ -337,6 +367,21 @@ class Site:
             time_ns=recording.time_ns[:: self.period_s],
             columns={name: column[:: self.period_s] for name, column in recording.columns.items()},
         )
+
+    def _keep_earlier(self) -> None:
+        """Let the history begin before the life: by one who is gone."""
+        gone = SimulatedBus(self.network, "earlier")
+        gone.is_alive, gone.died_s = False, 0.0
+        count = EARLIER_DAYS * 86_400 // EARLIER_S
+        time_ns = FIRST_DAY_NS - np.arange(count, 0, -1) * EARLIER_S * NS_PER_S
+        with open_store(self.settings.historian) as store:
+            for name, plc in self.plcs.items():
+                columns = {column: values[:count] for column, values in plc.recording.columns.items()}
+                samples = list(Recording(time_ns=time_ns, columns=columns).samples(name))
+                store.write(Batch([pack(name, sample) for sample in samples]))
+                self.network.sent[sample_key(name)] = [
+                    Sent(sample.encode(), EARLIER_AT_S, gone) for sample in samples
+                ]
 
     async def _poll(self, bus: SimulatedBus) -> None:
         plcs = [simulated.plc for simulated in self.plcs.values()]
@@ -367,7 +412,11 @@ class Site:
             group.create_task(_each(alarms, self._note_alarm))
 
     async def _come_late(self, bus: SimulatedBus) -> None:
-        await _each(bus.subscribe(alarm_key("*"), history=1, capacity=1_000_000), self._note_late)
+        alarms = bus.subscribe(alarm_key("*"), history=1, capacity=1_000_000)
+        verdicts = bus.subscribe(verdict_key("*"), history=VERDICT_HISTORY, capacity=1_000_000)
+        async with asyncio.TaskGroup() as group:
+            group.create_task(_each(alarms, self._note_late))
+            group.create_task(_each(verdicts, self.verdicts_late.add))
 
     def _note_late(self, payload: bytes) -> None:
         alarm = Alarm.decode(payload)
@@ -392,7 +441,7 @@ class Site:
         real = atomic_file.atomic_file
 
         def time_ns() -> int:
-            return START_NS + round((loop.time() + self.clock_s) * NS_PER_S)
+            return self.start_ns + round((loop.time() + self.clock_s) * NS_PER_S)
 
         def is_lost() -> bool:
             life = LIFE.get()
@@ -415,6 +464,7 @@ class Site:
                 ("wetwell.services.runtime.clock.time", SimpleNamespace(time_ns=time_ns)),
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
+                ("wetwell.services.runtime.sample_sender.LEAST_KEPT", self.kept_samples),
                 ("wetwell.services.alarms.daemon.LOOK_S", LOOK_S),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.runtime.state_file.atomic_file", file),

@@ -1,5 +1,6 @@
 """Sites to simulate, and their lives."""
 
+import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,9 +10,16 @@ from virtual_loop import run_virtual
 
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.stations import find_scenario, find_station
+from wetwell.simulator.scenario import Scenario
 
 GRAIN_S = 0.25
 """Of the clock of a light site."""
+MOST_COMINGS = 3
+"""So often each fault of the scenario comes at most."""
+LEARNT, LAST = 0.2, 0.9
+"""Share of a life after which faults come, and until which."""
+SHORTEST_S, LONGEST_S = 3_600.0, 21_600.0
+"""Of a fault."""
 
 
 def alpha_site(seed: int, stations: int, days: float, period_s: int, folder: Path, plan: Plan | None = None) -> Site:
@@ -34,6 +42,19 @@ def light_site(seed: int, stations: int, days: float, period_s: int, folder: Pat
 KINDS: dict[str, Callable[..., Site]] = {"alpha": alpha_site, "light": light_site}
 
 
+def scenario_of(seed: int, seconds: float) -> Scenario:
+    """The paper's faults, each as often and when the seed says, and over after a while."""
+    dice = random.Random(f"faults {seed}")
+    paper = find_scenario("paper")
+    faults = []
+    for fault in paper.fault:
+        for _ in range(dice.randrange(MOST_COMINGS + 1)):
+            start_s = dice.uniform(LEARNT, LAST) * seconds
+            end_s = start_s + dice.uniform(SHORTEST_S, LONGEST_S)
+            faults.append(fault.model_copy(update={"start_s": start_s, "end_s": end_s}))
+    return paper.model_copy(update={"fault": tuple(faults)})
+
+
 def _lived(
     seed: int,
     station: Station,
@@ -49,7 +70,7 @@ def _lived(
     site = Site(
         seed=seed,
         stations=[station.model_copy(update={"name": f"station-{number}"}) for number in range(stations)],
-        scenario=find_scenario("paper"),
+        scenario=scenario_of(seed, seconds),
         seconds=seconds,
         period_s=period_s,
         folder=folder,

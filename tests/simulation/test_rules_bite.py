@@ -3,6 +3,7 @@
 import contextlib
 import random
 import sqlite3
+from collections.abc import AsyncIterator
 from pathlib import Path
 from unittest import mock
 
@@ -11,6 +12,10 @@ from accidents import Accident
 from rules import broken_rules
 from site_kinds import light_site
 
+from wetwell.protocols.messages.sample import Sample
+from wetwell.protocols.messages.verdict import Verdict
+from wetwell.services.alarms.service import AlarmService
+from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.spool import Spool
 
@@ -26,6 +31,17 @@ def no_lock(*_: object) -> contextlib.AbstractContextManager[None]:
 
 def always(*_: object) -> bool:
     return True
+
+
+async def nothing_missed(*_: object) -> AsyncIterator[list[Sample]]:
+    for never in ():
+        yield never
+
+
+def publish_news(station: StationDetector, verdict: Verdict, publish=StationDetector._publish) -> None:
+    """Publish what is judged, but not what was told before."""
+    if station._counts or not station.is_restored:
+        publish(station, verdict)
 
 
 def flip_bit_of_row(folder: Path, dice: random.Random) -> Path:
@@ -59,6 +75,25 @@ DEFECTS = {
         [mock.patch.object(historian_daemon, "ALL_KEPT", 0)],
         [Accident("kill", "historian", at_s, 2_000.0) for at_s in EVERY_H],
     ),
+    "the historian is not asked for what was missed": (
+        [mock.patch("wetwell.services.detector.intake.missed_samples", nothing_missed)],
+        [
+            accident
+            for at_s in EVERY_H
+            for accident in (
+                Accident("kill", "detector", at_s, 3_000.0),
+                Accident("kill", "gateway", at_s + 2_700.0, 1.0),
+            )
+        ],
+    ),
+    "a detector that goes on does not tell its last verdicts": (
+        [mock.patch.object(StationDetector, "_publish", publish_news)],
+        [Accident("stop", "detector", 86_400.0 - 600.0, 1.0)],
+    ),
+    "alarms that start do not tell what stands": (
+        [mock.patch.object(AlarmService, "publish_all")],
+        [Accident("kill", "gateway", 86_400.0 - 8_000.0, 7_900.0), Accident("kill", "alarms", 86_400.0 - 600.0, 1.0)],
+    ),
 }
 
 
@@ -67,7 +102,7 @@ def test_a_defect_breaks_a_rule_that_holds_without_it(folder, name):
     patches, accidents = DEFECTS[name]
     plan = tuple(sorted(accidents, key=lambda accident: accident.at_s))
     with contextlib.ExitStack() as defect:
-        defect.enter_context(mock.patch("accidents.flip_bit", flip_bit_of_row))
+        defect.enter_context(mock.patch("accidents.flip_bits", flip_bit_of_row))
         assert broken_rules(light_site(3, 1, 1.0, 300, folder / "without", plan)) == []
         for patch in patches:
             defect.enter_context(patch)

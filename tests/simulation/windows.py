@@ -6,8 +6,6 @@ from collections.abc import Iterable, Sequence
 from network import Sent
 from simulated_site import Site, Span
 
-KEPT = 600
-"""Samples that a gateway keeps for those who come late."""
 MARGIN_S = 60.0
 """For delays, what comes from a cache, and a clock with a grain."""
 
@@ -45,19 +43,23 @@ class Way:
 
     def is_open(self, begin_s: float, end_s: float) -> bool:
         """Whether there was a stretch that was long enough."""
+        return self.free_s(begin_s, end_s) is not None
+
+    def free_s(self, begin_s: float, end_s: float) -> float | None:
+        """When the first stretch began that was long enough; None if there was none. [s]"""
         free_s = begin_s
         for begin, end in self._spans[max(0, bisect_left(self._begins, begin_s) - 1) :]:
             if min(begin, end_s) - free_s >= self._least_s:
-                return True
+                return free_s
             if begin >= end_s:
-                return False
+                return None
             free_s = max(free_s, end)
-        return end_s - free_s >= self._least_s
+        return free_s if end_s - free_s >= self._least_s else None
 
 
-def until_s(sent: Sequence[Sent], place: int) -> float:
+def until_s(site: Site, sent: Sequence[Sent], place: int) -> float:
     """Until when a sample can be had from its sender: it dies, or keeps newer ones in its place."""
     one = sent[place]
-    newer = sent[place + KEPT] if place + KEPT < len(sent) else None
+    newer = sent[place + site.kept_samples] if place + site.kept_samples < len(sent) else None
     expires_s = newer.at_s if newer is not None and newer.bus is one.bus else float("inf")
     return min(one.bus.died_s, expires_s)

@@ -157,7 +157,7 @@ class LiveDatabase:
                 f"SELECT {_PACKED} {_OF_STATION} ORDER BY time_ns DESC LIMIT :most",
                 {"station": station, "most": most},
             ).fetchall()
-        times_ns: list[int] = Samples.of_rows(rows).time_ns[::-1].tolist()
+        times_ns: list[int] = Samples.of_rows(self._intact(rows)).time_ns[::-1].tolist()
         return times_ns
 
     def days_ns(self, station: str, start_ns: int, end_ns: int) -> list[int]:

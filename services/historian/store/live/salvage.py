@@ -2,7 +2,7 @@
 
 import contextlib
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,14 +64,14 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
     sqlite3.Error
         If the new database cannot be written.
     """
-    saved = lost = 0
+    saved, lost = 0, set[Row]()
     target.execute("BEGIN IMMEDIATE")
     try:
         with _reading(damaged) as database:
             for insert, rows, is_intact in _tables(database):
                 for row in rows:
                     if not is_intact(row):
-                        lost += 1
+                        lost.add((insert, *row[:3]))
                         continue
                     with contextlib.suppress(sqlite3.IntegrityError, sqlite3.InterfaceError):
                         saved += target.execute(insert, row).rowcount
@@ -79,7 +79,7 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
         target.execute("ROLLBACK")
         return 0, 0
     target.execute("COMMIT")
-    return saved, lost
+    return saved, len(lost)
 
 
 def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], Callable[[Row], bool]]]:
@@ -87,7 +87,7 @@ def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], 
     stations = station_rows(database)
     yield "INSERT OR IGNORE INTO station VALUES (?, ?, ?, ?)", iter(stations), lambda _: True
     numbers = {row[0] for row in stations}
-    samples = (row for number in numbers for row in _samples(database, number))
+    samples = _all_samples(database, numbers)
     yield "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", samples, _is_sample
     yield (
         "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload, crc) VALUES (?, ?, ?, ?, ?, ?)",
@@ -96,6 +96,19 @@ def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], 
     )
     hours = _readable(database, "SELECT station, hour_ns, data, crc FROM hour")
     yield "INSERT OR IGNORE INTO hour VALUES (?, ?, ?, ?)", iter(hours), _is_hour
+
+
+def _all_samples(database: sqlite3.Connection, stations: Iterable[int]) -> Iterator[Row]:
+    """Rows of each station; then all, where there are others: one whose station was changed ends those of its own."""
+    count = 0
+    for station in stations:
+        for row in _samples(database, station):
+            count += 1
+            yield row
+    if _readable(database, "SELECT count(*) FROM sample") != [(count,)]:
+        for order in ("", "DESC"):
+            query = f"SELECT {_SAMPLE} FROM sample ORDER BY station {order}, time_ns {order}, seq {order}"  # noqa: S608
+            yield from _as_far_as_can_be(database, query)
 
 
 def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
@@ -137,8 +150,26 @@ def _read(database: sqlite3.Connection, query: str, values: Row) -> tuple[list[R
     try:
         rows.extend(database.execute(query, values))
     except UNREADABLE:
-        return rows, False
+        return [*rows, *_next_row(database, query, values, len(rows))], False
     return rows, True
+
+
+def _as_far_as_can_be(database: sqlite3.Connection, query: str) -> Iterator[Row]:
+    """Rows until one cannot be read, one after the other: they may be many."""
+    count = 0
+    try:
+        for row in database.execute(query):
+            count += 1
+            yield row
+    except UNREADABLE:
+        yield from _next_row(database, query, (), count)
+
+
+def _next_row(database: sqlite3.Connection, query: str, values: Row, count: int) -> list[Row]:
+    """The row behind so many: Python looks a row ahead, and gives none before one that cannot be read."""
+    with contextlib.suppress(*UNREADABLE):
+        return database.execute(f"{query} LIMIT 1 OFFSET {count}", values).fetchall()
+    return []
 
 
 def _is_sample(row: Row) -> bool:

@@ -152,6 +152,29 @@ def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
         assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
 
 
+def test_a_row_whose_station_was_changed_costs_no_row_behind_it(content, tmp_path):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        rows = store.file._writer.execute("SELECT station, time_ns, size FROM sample WHERE size > 1").fetchall()
+    number, time_ns, size = rows[len(rows) // 2]
+    key = number.to_bytes(1, "big") + time_ns.to_bytes(6, "big")
+    assert content.count(key) == 1
+    (tmp_path / "live.sqlite").write_bytes(content.replace(key, b"\x70" + key[1:]))
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.file.is_damaged = True
+        store.write(batch("alpha", TIMES, TIMES + 1))
+        assert len(store.samples("beta", 0, 2**62)) == TIMES - size
+
+
+@pytest.mark.parametrize("data", [b"", b"odd"])
+def test_where_a_history_ends_is_told_though_its_last_row_is_damaged(content, tmp_path, data):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        last_ns = store.newest_ns("alpha")
+        store.file._writer.execute("UPDATE sample SET data = ? WHERE time_ns = ?", (data, last_ns))
+        assert store.newest_ns("alpha") == last_ns - 10 * NS_PER_S
+
+
 def test_a_message_whose_place_was_changed_is_not_told_twice_when_it_comes_again(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
