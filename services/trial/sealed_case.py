@@ -10,7 +10,7 @@ import tomli_w
 from wetwell.protocols.atomic_file import atomic_file
 from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.recordings.recording import write_recording
-from wetwell.services.trial.acting_case import acting_case
+from wetwell.services.trial.material_case import material_case
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.scores import Label
 from wetwell.sim2real.trial.seal import digest, labels_text, opened
@@ -38,9 +38,9 @@ def publish(case: TrialCase, folder: Path) -> None:
     Raises
     ------
     WetwellError
-        If one of its deviations never acts (`acting_case`), or its plant is not installed.
+        If one of its deviations never matters (`material_case`), or its plant is not installed.
     """
-    case, truth, recording = acting_case(case)
+    case, truth, recording = material_case(case)
     published, sealed = published_in(folder, case.name), _sealed_in(folder, case.name)
     published.mkdir(parents=True, exist_ok=True)
     sealed.parent.mkdir(parents=True, exist_ok=True)

@@ -18,8 +18,9 @@ GRID_S = 20.0
 FULL = 0.98
 REFERENCES = (0.0, 1.0, 3.0, 8.0)
 """Levels at which a lift may be right, in middles between the first start and stop."""
-CUTOFFS = (0.98, 0.85, 0.7, 0.5, 0.35)
-"""Limits that are tried, in least flows that are not 0: a ramp may pass what is between within a second."""
+CUTOFFS = (1.04, 0.98, 0.85, 0.7, 0.5, 0.35)
+"""Limits that are tried, in least flows that are not 0: a meter may show a flow again only a little over its limit,
+and a ramp may pass what is between within a second."""
 BENCH = 8.0
 """Exponent of a sump's area with a bench."""
 EDGES = (0.25, 0.5, 0.75)

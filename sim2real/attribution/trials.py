@@ -1,7 +1,10 @@
 """The effects of the library, tried one by one: alone, and beside others."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
@@ -87,7 +90,22 @@ class Trials:
             lambda candidate: fitter.first(candidate, self._start_grids(candidate), current, reach), likely
         )
         firsts = [fit for fit, _ in sorted(tried, key=lambda start: start[1]) if fit is not None]
-        return list(self._each(fitter.refine, firsts[:MOST_REFINED]))
+        return list(self._each(partial(self._refined, current), firsts[:MOST_REFINED]))
+
+    def _refined(self, current: Fit, fit: Fit) -> Fit:
+        """A fit with one more effect, refined: where it ends worse than without that, from another start.
+
+        The first start counts on what the others can reach, as if all were linear: a limit may promise much where a
+        header would have to take back all that it explains. The other one is the best with the others as they stand.
+        """
+        fitter = self._fitter
+        refined = fitter.refine(fit)
+        if fitter.cost(refined) <= fitter.cost(current):
+            return refined
+        last, nothing = fit.candidates[-1], np.zeros((int(fitter.rows.sum()), 0))
+        again, _ = fitter.first(last, self._start_grids(last), current, nothing)
+        found = [refined] if again is None else [refined, fitter.refine(again)]
+        return min(found, key=fitter.cost)
 
     def _start_grids(self, candidate: Candidate, strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
         """Points to begin at, each grid once: guesses that leave the strength open have the same ones."""

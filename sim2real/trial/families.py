@@ -40,10 +40,6 @@ class Deviates(Protocol):
     def component(self) -> str:
         """Where it lies."""
 
-    @property
-    def may_never_act(self) -> bool:
-        """Whether there are stations in which it changes no recorded value."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:

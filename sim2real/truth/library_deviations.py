@@ -246,7 +246,6 @@ LIBRARY_KINDS: dict[str, Kind] = {
         lambda d: {"shared_fraction": d.between(0.6, 1.0)},
         _common_header,
         needs_two_pumps=True,
-        may_never_act=True,
     ),
     "water_inertia": Kind(
         "rising_main",
@@ -331,7 +330,6 @@ LIBRARY_KINDS: dict[str, Kind] = {
         ("flow_m3h",),
         lambda d: {"cutoff_m3h": rounded(d.flow_m3h * d.between(0.2, 0.6))},
         _flow_low_cutoff,
-        may_never_act=True,
     ),
     "head_sensor_offset": Kind(
         "head_sensor",

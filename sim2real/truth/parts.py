@@ -104,8 +104,6 @@ class Kind:
     draw, act : callable
     needs_two_pumps : bool
         Whether it shows only when two pumps run.
-    may_never_act : bool
-        Whether there are stations and weathers in which it changes no recorded value.
     """
 
     component: str
@@ -113,7 +111,6 @@ class Kind:
     draw: Callable[[Draw], Parameters]
     act: Callable[[Truth, Mapping[str, Any]], None]
     needs_two_pumps: bool = False
-    may_never_act: bool = False
 
 
 def rounded(value: float) -> float:

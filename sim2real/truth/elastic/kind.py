@@ -97,17 +97,13 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class ElasticKind:
-    """A way to deviate: where it lies, where it must show itself, how it is drawn and what it does.
-
-    `may_never_act`: there are stations and weathers in which it changes no recorded value.
-    """
+    """A way to deviate: where it lies, where it must show itself, how it is drawn and what it does."""
 
     component: str
     signals: tuple[AnalogueQuantity, ...]
     draw: Callable[[Sizes], Parameters]
     act: Callable[[ElasticTruth, Mapping[str, Any]], None]
     needs_two_pumps: bool = False
-    may_never_act: bool = False
 
 
 def digits(value: float) -> float:

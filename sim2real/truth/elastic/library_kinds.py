@@ -232,7 +232,6 @@ LIBRARY_FORMS: dict[str, ElasticKind] = {
         lambda d: {"shared_fraction": d.even(0.4, 1.0)},
         _common_header,
         needs_two_pumps=True,
-        may_never_act=True,
     ),
     "water_inertia": ElasticKind(
         "rising_main",
@@ -336,7 +335,6 @@ LIBRARY_FORMS: dict[str, ElasticKind] = {
         ("flow_m3h",),
         lambda d: {"cutoff_m3h": digits(d.flow_m3h * d.even(0.2, 0.6))},
         _flow_low_cutoff,
-        may_never_act=True,
     ),
     "head_sensor_offset": ElasticKind(
         "head_sensor",

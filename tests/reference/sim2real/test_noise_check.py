@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.services.trial.acting_case import acting_case
+from wetwell.services.trial.material_case import material_case
 from wetwell.sim2real.likelihood.cells import cells_of
 from wetwell.sim2real.likelihood.covariance import expected_squares
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES, STEADY, regimes_of
@@ -30,7 +30,7 @@ MOST_OF_LEVEL = 1.6
 def test_the_true_model_leaves_what_is_expected(plant, every_s, metered_share):
     storage = StoragePlan(rates_s=(every_s,), metered_share=metered_share)
     case = trial_case(SEED, 0, kinds=("none",), plants=(plant,), seconds=SECONDS, storage=storage)
-    _, truth, recording = acting_case(case)
+    _, truth, recording = material_case(case)
     traces = traces_of(recording, truth.station)
     regimes, replay = regimes_of(traces, truth.station), Replay(traces, truth.station)
     prediction = replay.run()

@@ -25,12 +25,14 @@ from wetwell.sim2real.truth.case import Deviation, TruthCase
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
 COUNT = 12
+SECONDS = 14_400
+"""In which pumps run together more than once: a common header has to matter."""
 
 
 def run_fake(mode, folder, monkeypatch, **changes):
     monkeypatch.setenv("FAKE_MODE", mode)
     monkeypatch.setenv("FAKE_FOLDER", str(folder))
-    plan = TrialPlan(**{"seed": 3, "count": COUNT, "seconds": 3600, "command": FAKE} | changes)
+    plan = TrialPlan(**{"seed": 3, "count": COUNT, "seconds": SECONDS, "command": FAKE} | changes)
     return plan, run_trial(plan, folder, workers=1)
 
 
@@ -38,7 +40,7 @@ def run_fake(mode, folder, monkeypatch, **changes):
 def cases(tmp_path_factory):
     """Folder of published cases."""
     folder = tmp_path_factory.mktemp("trial")
-    plan = TrialPlan(seed=3, count=COUNT, seconds=3600)
+    plan = TrialPlan(seed=3, count=COUNT, seconds=SECONDS)
     for number in range(COUNT):
         publish(plan.case(number), folder)
     return folder
@@ -144,7 +146,7 @@ def test_what_was_changed_after_sealing_is_refused(changed, folder, monkeypatch)
 
 
 def test_salts_differ_and_cases_do_not_depend_on_their_number(folder, tmp_path):
-    plan = TrialPlan(seed=3, count=2, seconds=3600)
+    plan = TrialPlan(seed=3, count=2, seconds=SECONDS)
     publish(plan.case(1), tmp_path / "again")
     one, other = (json.loads((path / "sealed/case-0001.json").read_text()) for path in (folder, tmp_path / "again"))
     assert one["salt"] != other["salt"]
@@ -272,7 +274,7 @@ def test_stations_of_swmm_have_soft_starters():
 def test_command_line(run_wetwell, folder, monkeypatch, capsys):
     monkeypatch.setenv("FAKE_MODE", "none")
     monkeypatch.setenv("FAKE_FOLDER", str(folder))
-    days = str(3600 / 86_400)
+    days = str(SECONDS / 86_400)
     options = [
         "--seed",
         "3",

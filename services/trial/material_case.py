@@ -1,0 +1,70 @@
+"""A case whose deviations all matter: drawn anew where one of them moves nothing by more than is material."""
+
+from dataclasses import replace
+
+from wetwell.protocols.errors import WetwellError
+from wetwell.protocols.recordings.recording import Recording
+from wetwell.services.trial.plants import Passes, passage_of
+from wetwell.sim2real.trial.cases import TrialCase
+from wetwell.sim2real.trial.families import PlantName
+from wetwell.sim2real.trial.materiality import moved
+from wetwell.sim2real.trial.readings import Readings, readings_of
+from wetwell.sim2real.truth.case import TruthCase
+from wetwell.sim2real.truth.storage import EVERY_SECOND, stored
+
+ATTEMPTS = 8
+"""Draws after which a case is given up: a short recording may have no room for its effect."""
+
+
+def material_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
+    """The case in its first attempt in which every deviation matters, with truth and recording.
+
+    A twin without the deviation tells that, second by second and without the noise of the sensors; what the historian
+    keeps of the seconds does not count, but for signals that it does not keep at all.
+
+    Raises
+    ------
+    WetwellError
+        If there is none among `ATTEMPTS`, or its plant is not installed.
+    """
+    small = ""
+    for attempt in range(ATTEMPTS):
+        case = replace(case, attempt=attempt)
+        truth = case.truth()
+        passage = _passage_of(truth, case.plant)
+        small = immaterial_name(truth, case.plant, passage)
+        if not small:
+            return case, truth, stored(passage.recording(truth=False), truth.storage)
+    raise WetwellError(
+        f"{case.name}: '{small}' moves nothing that plant '{case.plant}' records by more than is material in any of "
+        f"{ATTEMPTS} draws: a longer recording may show it"
+    )
+
+
+def immaterial_name(truth: TruthCase, plant: PlantName, passage: Passes | None = None) -> str:
+    """First deviation without which the plant reads the same but for what nobody acts on; empty if all matter.
+
+    Parameters
+    ----------
+    truth : TruthCase
+    plant : PlantName
+    passage : Passes, optional
+        Of the truth with a row a second, where it is at hand.
+    """
+    if not truth.deviations:
+        return ""
+    readings = _readings(truth, passage or _passage_of(truth, plant))
+    for deviation in truth.deviations:
+        others = tuple(other for other in truth.deviations if other is not deviation)
+        twin = replace(truth, deviations=others)
+        if moved(readings, _readings(twin, _passage_of(twin, plant))) <= 1.0:
+            return deviation.name
+    return ""
+
+
+def _passage_of(truth: TruthCase, plant: PlantName) -> Passes:
+    return passage_of(replace(truth, storage=EVERY_SECOND), plant)
+
+
+def _readings(truth: TruthCase, passage: Passes) -> Readings:
+    return readings_of(passage.oracle(), truth.station, truth.storage.absent)
