@@ -34,7 +34,8 @@ browser: $(VENV)/.dev  ## What of `make check` looks at the page, one test after
 	$(BIN)/pytest -q --durations=10 -m "check and not long and not soak" tests/browser
 
 others: $(VENV)/.dev  ## What of `make check` looks at no page; it gives way to the browser
-	nice -n 5 $(PYTEST) -m "check and not long and not soak" tests --ignore=tests/browser
+	nice -n 5 $(PYTEST) -m "check and not long and not soak" \
+	  $$(grep -rlE 'mark\.check' tests --include='test_*.py' --exclude-dir=browser)
 
 long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each other Python
 	$(PYTEST) -m "long and not soak"

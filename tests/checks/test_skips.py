@@ -19,3 +19,9 @@ def test_without_a_browser_only_its_own_tests_are_skipped(tmp_path):
     ]
     conftest.pytest_collection_modifyitems(items)
     assert marked == [TESTS / "browser" / "test_page.py"]
+
+
+def test_what_waits_for_make_check_says_so_in_its_own_file():
+    """`make others` collects only files that do: from elsewhere nobody would run it."""
+    elsewhere = [path for path in TESTS.rglob("*.py") if not path.name.startswith("test_")]
+    assert [path.name for path in elsewhere if "mark." + "check" in path.read_text(encoding="utf-8")] == []
