@@ -64,6 +64,7 @@ def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
     assert report.effects[1].parameters["cutoff_m3h"].value == pytest.approx(60.0, rel=0.15)
 
 
+@pytest.mark.check
 def test_a_cutoff_of_a_second_or_two_a_ramp_is_told_beside_a_rougher_main(alpha):
     """What the rougher main explains in all is many times more, but not in these seconds."""
     main, cutoff = {"name": "friction_bias", "factor": 2.5}, {"name": "flow_low_cutoff", "cutoff_m3h": 60.0}

@@ -12,6 +12,8 @@ from wetwell.sim2real.watch.agreement import ToldFault
 from wetwell.sim2real.watch.state import WatchState
 from wetwell.sim2real.watch.watching import watched
 
+pytestmark = pytest.mark.check
+
 ALPHA = find_station("alpha")
 CHANGE_S = 36_000
 LATE_S = 76_000

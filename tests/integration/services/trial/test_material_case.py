@@ -34,6 +34,7 @@ def deviating(truth, *deviations):
     return replace(truth, deviations=tuple(Deviation(name=name, parameters=p) for name, p in deviations))
 
 
+@pytest.mark.check
 def test_the_first_attempt_is_what_it_was_before_there_were_others():
     drawn = [trial_case(3, k, kinds=KINDS, plants=("fine", "swmm"), seconds=600) for k in range(5)]
     assert [(case.kind, case.plant, case.names) for case in drawn] == [
