@@ -313,6 +313,7 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
             shaft_kw = shaft_power_kw(
                 now.shaft_ratio, flow_m3h, pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share
             )
+            turned = 1.0 - pump.slip * now.load
             now.load = shaft_kw / (pump.rated_shaft_kw * now.shaft_ratio)
             if now.frequency_hz > 0.0:
                 by_load = station.load_share
@@ -327,6 +328,8 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
                         shaft_kw, pump.rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
                     )
                 power_kw *= voltage_factor * (1.0 + state.correction[POWER_TERM, i])
+                if pump.slip_power_exponent > 0.0:
+                    power_kw *= turned**pump.slip_power_exponent
         truth.flow_m3h[i, second] = flow_m3h
         truth.head_m[i, second] = head_m
         truth.power_kw[i, second] = power_kw

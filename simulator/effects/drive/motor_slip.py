@@ -10,17 +10,20 @@ from wetwell.simulator.parameters import PlantParameters
 class MotorSlip(Effect):
     r"""An asynchronous motor turns slower than its frequency asks for, in proportion to its torque.
 
-    $$N = N_c \left(1 - s\, \frac{M}{M_n}\right)$$
+    $$N = N_c \left(1 - s\, \frac{M}{M_n}\right), \qquad P = P_c \left(\frac{N}{N_c}\right)^{e}$$
 
     The torque is that of the second before: shaft power over speed, where the shaft power is a straight line in the
     flow from the station's `shutoff_power_share` of the rated one at no flow. The smaller that share, the less a
-    throttled pump slips; with a share of 1 the slip at nominal speed is s at every flow. Electrical power follows the
-    command.
+    throttled pump slips; with a share of 1 the slip at nominal speed is s at every flow.
 
     Parameters
     ----------
     slip : float
         s, share of the speed that is lost at the rated torque M_n; 0 is no effect. [1]
+    power_exponent : float
+        e, power of the speed with which the electrical power P falls under that of the command: 0 where it follows the
+        command, 2 where the torque follows the affinity laws and the field turns as commanded, 3 as power of the
+        shaft, and more where a high lift lets the flow fall faster than the speed. [1]
 
     References
     ----------
@@ -32,7 +35,10 @@ class MotorSlip(Effect):
 
     name: Literal["motor_slip"] = "motor_slip"
     slip: Annotated[float, limits(0.0, 0.15, "1")]
+    power_exponent: Annotated[float, limits(0.0, 5.0, "1")] = 0.0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let the motors slip."""
-        return parameters.with_pumps(lambda pump: replace(pump, slip=pump.slip + self.slip))
+        return parameters.with_pumps(
+            lambda pump: replace(pump, slip=pump.slip + self.slip, slip_power_exponent=self.power_exponent)
+        )

@@ -270,6 +270,17 @@ def test_motor_slip_follows_the_torque(quiet_alpha, slip):
     np.testing.assert_array_equal(rows["pump1_power_kw"][:120], plain["pump1_power_kw"])
 
 
+@pytest.mark.parametrize("exponent", [2.0, 3.0])
+def test_power_of_a_motor_that_slips_falls_with_a_power_of_its_speed(quiet_alpha, exponent):
+    slips = {"name": "motor_slip", "slip": 0.1, "power_exponent": exponent}
+    rows, plain = run(quiet_alpha, slips, seconds=120), run(quiet_alpha, seconds=120)
+    settled = slice(60, 120)
+    expected = plain["pump1_power_kw"][settled] * speeds_of(rows)[settled] ** exponent
+    np.testing.assert_allclose(rows["pump1_power_kw"][settled], expected, rtol=1e-6)
+    for name in ("pump1_flow_m3h", "pump1_head_m"):
+        np.testing.assert_array_equal(rows[name], run(quiet_alpha, slips | {"power_exponent": 0.0}, seconds=120)[name])
+
+
 def test_ramp_shape_of_a_power(quiet_alpha):
     rows = run(quiet_alpha, {"name": "ramp_shape", "power": 2.0}, seconds=400)
     commanded = rows["pump1_frequency_hz"] / NOMINAL_HZ
