@@ -106,8 +106,10 @@ def attribute(
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
-    condition = conditions_of(residuals.bins, replay.traces, replay.station)
-    cells = cells_of(residuals.bins, condition, has_inflow=replay.traces.inflow_m3h is not None)
+    traces = replay.traces
+    condition = conditions_of(residuals.bins, traces, replay.station)
+    has_inflow = traces.inflow_m3h is not None
+    cells = cells_of(residuals.bins, condition, has_inflow=has_inflow, is_each_second=traces.is_each_second)
     hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))

@@ -73,7 +73,7 @@ def ranking(found: Attribution, bins: Bins, rng: np.random.Generator) -> tuple[R
 
 def noise_check(found: Attribution, bins: Bins, condition: Integers) -> tuple[NoiseCheck, ...]:
     """Whether what is left under the answer is as large as noise and a right model make it, by signal and regime."""
-    cells = cells_of(bins, condition, has_inflow=True)
+    cells = cells_of(bins, condition, has_inflow=True, is_each_second=True)
     left = cells.means(residuals_of(found.after))
     checks = []
     for block in cells.blocks:

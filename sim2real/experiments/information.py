@@ -43,7 +43,8 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
     if residuals.bins.size == 0:
         raise ValueError("what is recorded shows nothing")
     condition = conditions_of(residuals.bins, traces, station)
-    cells = cells_of(residuals.bins, condition, has_inflow=traces.inflow_m3h is not None)
+    has_inflow = traces.inflow_m3h is not None
+    cells = cells_of(residuals.bins, condition, has_inflow=has_inflow, is_each_second=traces.is_each_second)
 
     def means(effects: Sequence[object]) -> Floats:
         return cells.means(residuals.of(replay.run(effects)))  # type: ignore[arg-type]

@@ -13,7 +13,8 @@ SPANS = 32
 """More than there are spans since a regime began."""
 SURGES = (0.0, 1.0, 3.0, 7.0)
 """Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
-of it: rain comes faster than that. Each as likely. [1]"""
+of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what the
+station file makes of it. Each as likely. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +33,8 @@ class Block:
         As of `Cells`.
     surges : tuple of float
         Variance that surges of the inflow may add, over `variance`; each as likely.
+    may_rain : bool
+        Whether the inflow may also move much faster in some cycles: nobody measures it.
     in_storm : (cycles,) array
         Whether several pumps run in a cycle: more comes in than one carries.
     span : (groups,) array
@@ -48,6 +51,7 @@ class Block:
     variance: Floats
     allowed: Floats
     surges: tuple[float, ...]
+    may_rain: bool
     in_storm: Flags
     span: Integers
     surge: float | Floats = 0.0
@@ -111,7 +115,7 @@ class Cells:
         return squares
 
 
-def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
+def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_second: bool) -> Cells:
     r"""Cells of the bins of a recording.
 
     $$\sigma^2 = \overline{f} / n, \qquad a^2 = m^2 + 1 - \overline{f}$$
@@ -126,6 +130,8 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
         As `conditions_of` makes it: what is in another condition is in another group.
     has_inflow : bool
         Whether the inflow is measured; else nobody knows the noise of the level well.
+    is_each_second : bool
+        Whether there is a row a second; else rows hide some of what comes in and goes out even so.
     """
     span_of_bin = condition * SPANS + phase(bins)
     key = group_of(bins) * (int(span_of_bin.max(initial=0)) + 1) + span_of_bin
@@ -147,6 +153,7 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
     for key in np.unique(block_of):
         rows = np.flatnonzero(block_of == key)
         its_cycles, its_cycle = np.unique(cycle[rows], return_inverse=True)
+        is_level = int(key) // len(REGIMES) == LEVEL
         blocks.append(
             Block(
                 signal=int(key) // len(REGIMES),
@@ -158,7 +165,8 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool) -> Cells:
                 allowed=allowed[rows],
                 in_storm=in_storm[its_cycles],
                 span=np.unique(span[np.unique(group[rows])], return_inverse=True)[1],
-                surges=(0.0,) if has_inflow or key // len(REGIMES) != LEVEL else SURGES,
+                surges=SURGES if is_level and not (has_inflow and is_each_second) else SURGES[:1],
+                may_rain=is_level and not has_inflow,
             )
         )
     return Cells(of_bin=of_bin, counts=counts, group=group, variance=variance, allowed=allowed, blocks=tuple(blocks))

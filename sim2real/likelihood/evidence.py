@@ -235,8 +235,8 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
 
 
 def _rained_on(block: Block, residuals: Floats) -> Stirred:
-    """A block with its likeliest rain, if its inflow has no meter."""
-    if len(block.surges) == 1:
+    """A block with its likeliest rain, if it may have any."""
+    if not block.may_rain:
         return Stirred(block=block)
     is_rainy, log_rain = rainy_cells(block, residuals)
     if not is_rainy.any():

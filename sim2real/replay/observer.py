@@ -129,8 +129,8 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
     + \begin{pmatrix} \sum_i (Q_i \tau_i / A)^2 / 12 & 0 \\ 0 & 0 \end{pmatrix}$$
 
     with τ the time within which a pump was switched at a moment that the rows do not show: the volume that it may
-    hide is taken from the next row and held against nobody. A measured inflow leaves no b; its error between rows
-    goes to L.
+    hide is taken from the next row and held against nobody. Q is the flow that the recording shows, or the rated one.
+    A measured inflow leaves no b; its error between rows goes to L.
 
     Parameters
     ----------
@@ -148,7 +148,9 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
     plant = plant_parameters(station)
     area_m2 = station.sump.mean_area_m2
     speed_m_s = plant.rated_flow_m3h / 3600.0 / area_m2
-    open_m2 = np.sum((speed_m_s[:, None] * traces.drives.open_s) ** 2, axis=0) / 12.0
+    hidden_m_s = np.array([_carried_m3h(traces, i, rated) for i, rated in enumerate(plant.rated_flow_m3h)])
+    hidden_m_s *= 1.0 / 3600.0 / area_m2
+    open_m2 = np.sum((hidden_m_s[:, None] * traces.drives.open_s) ** 2, axis=0) / 12.0
     noise_m = level_noise_m(traces, station)
     is_free = traces.inflow_m3h is None
     level_gain, inflow_gain = np.zeros(traces.seconds), np.zeros(traces.seconds)
@@ -172,6 +174,14 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
         inflow_gain=inflow_gain,
         deviation_m=np.sqrt(variance_m2),
     )
+
+
+def _carried_m3h(traces: Traces, pump: int, rated_m3h: float) -> float:
+    """Flow of a pump that runs, in the median, as the recording shows it; the rated one where it shows none. [m³/h]."""
+    running = traces.is_row & (traces.frequency_hz[pump] > 0.0)
+    flow_m3h = traces.signals["flow_m3h"][pump, running] if "flow_m3h" in traces.signals else np.zeros(0)
+    flow_m3h = flow_m3h[flow_m3h > 0.0]  # NaN is no flow either
+    return float(np.median(flow_m3h)) if flow_m3h.size else rated_m3h
 
 
 @compiled

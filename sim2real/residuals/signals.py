@@ -263,10 +263,11 @@ def level_residuals(
     noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
     if doubt.level_m is not None:
         noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
-        balance_m = np.hypot(balance_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces)[seconds.second]))
+        balance_m = np.hypot(balance_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces, regime)[seconds.second]))
     carried_m = rated_m3h / 3600.0 / station.sump.mean_area_m2 * LEVEL_TIME_S
     materiality = station.materiality
-    late_m = materiality.time_s * seconds.means(np.abs(np.gradient(plain.level_m)))
+    moved_m_s = np.abs(np.diff(plain.level_m, prepend=plain.level_m[:1]))  # before a value corrects it, not after
+    late_m = materiality.time_s * seconds.means(moved_m_s)
     material_m = np.sqrt(materiality.level_m**2 + (materiality.flow_share * carried_m) ** 2 + late_m**2)
     deviation_m = np.sqrt(noise_m2 + balance_m**2)
     return SignalResiduals(
@@ -298,9 +299,16 @@ def _after_gaps(is_row: Flags) -> Flags:
     return np.asarray(since_s < FORGOTTEN_S)
 
 
-def moved_m(traces: Traces) -> Floats:
-    """(n,) how far the level moved since the value before; 0 between rows. [m]."""
+def moved_m(traces: Traces, regime: Integers) -> Floats:
+    """(n,) how far the level moves from value to value; 0 between rows. [m].
+
+    In starts and stops it is the mean of all: how far it moved in one says when the pump was switched, and so does its
+    error.
+    """
     moved = np.zeros(traces.seconds)
     known = np.flatnonzero(np.isfinite(traces.level_m))
     moved[known[1:]] = np.abs(np.diff(traces.level_m[known]))
+    for ramp in (START_RAMP, STOP_RAMP):
+        rows = known[regime[known] == ramp]
+        moved[rows] = moved[rows].mean() if rows.size else 0.0
     return moved

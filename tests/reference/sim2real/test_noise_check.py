@@ -23,11 +23,8 @@ MOST_OF_LEVEL = 1.6
 """Mean square of the level in rows of up to ten seconds: rain fills slower ones faster (docs/likelihood.md)."""
 
 
-@pytest.mark.parametrize("metered_share", [0.0, 1.0], ids=["without inflow", "metered"])
-@pytest.mark.parametrize(
-    ("plant", "every_s"), [("fine", 1), ("fine", 10), ("fine", 60), ("elastic", 10), ("elastic", 60)]
-)
-def test_the_true_model_leaves_what_is_expected(plant, every_s, metered_share):
+def left_and_cells(plant, every_s, metered_share):
+    """Means of what the true model leaves, and their cells."""
     storage = StoragePlan(rates_s=(every_s,), metered_share=metered_share)
     case = trial_case(SEED, 0, kinds=("none",), plants=(plant,), seconds=SECONDS, storage=storage)
     _, truth, recording = material_case(case)
@@ -35,8 +32,16 @@ def test_the_true_model_leaves_what_is_expected(plant, every_s, metered_share):
     regimes, replay = regimes_of(traces, truth.station), Replay(traces, truth.station)
     prediction = replay.run()
     residuals = StationResiduals(traces, truth.station, regimes, prediction, replay.doubt())
-    cells = cells_of(residuals.bins, np.zeros(residuals.bins.size, dtype=int), has_inflow=True)
-    left = cells.means(residuals.of(prediction))
+    cells = cells_of(residuals.bins, np.zeros(residuals.bins.size, dtype=int), has_inflow=True, is_each_second=True)
+    return cells.means(residuals.of(prediction)), cells
+
+
+@pytest.mark.parametrize("metered_share", [0.0, 1.0], ids=["without inflow", "metered"])
+@pytest.mark.parametrize(
+    ("plant", "every_s"), [("fine", 1), ("fine", 10), ("fine", 60), ("elastic", 10), ("elastic", 60)]
+)
+def test_the_true_model_leaves_what_is_expected(plant, every_s, metered_share):
+    left, cells = left_and_cells(plant, every_s, metered_share)
     limits = {STEADY: STEADILY, MULTI_PUMP: SEVERAL}
     steady = 0
     for block in cells.blocks:
@@ -49,3 +54,15 @@ def test_the_true_model_leaves_what_is_expected(plant, every_s, metered_share):
         elif block.signal == LEVEL and every_s <= 10:
             assert square < MOST_OF_LEVEL, name
     assert steady == 6
+
+
+@pytest.mark.parametrize("metered_share", [0.0, 1.0], ids=["without inflow", "metered"])
+@pytest.mark.parametrize("plant", ["fine", "elastic"])
+def test_what_is_allowed_of_a_level_says_nothing_of_its_error(plant, metered_share):
+    """Rows of a minute hide inflow and switches. What the filter corrects by them is their error, not what moves."""
+    left, cells = left_and_cells(plant, 60, metered_share)
+    looked_at = 0
+    for rows in (one.rows for one in cells.blocks if one.signal == LEVEL and one.rows.size > 20):
+        assert abs(float(np.corrcoef(np.abs(left[rows]), cells.allowed[rows])[0, 1])) < 0.6
+        looked_at += 1
+    assert looked_at >= 4

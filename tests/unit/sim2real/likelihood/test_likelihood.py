@@ -37,7 +37,7 @@ def cells():
     return made(has_inflow=True)
 
 
-def made(*, has_inflow):
+def made(*, has_inflow, is_each_second=True):
     """A flow that runs and a level at rest: two spans of time in a cycle, the first of one bin, the next of two."""
     half = CYCLES * EACH
     signal = np.repeat([FLOW, LEVEL], half)
@@ -54,7 +54,7 @@ def made(*, has_inflow):
         tolerance=0.1 * ones,
         material=np.where(signal == FLOW, 1.5, 0.7),
     )
-    return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=has_inflow)
+    return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=has_inflow, is_each_second=is_each_second)
 
 
 def dense(block, form, allowance):
@@ -269,6 +269,15 @@ def test_surges_of_an_inflow_without_a_meter_are_no_surprise_in_the_level_and_on
             flexible_factor(evidence_of_none(each, residuals), no_form(each)) for each in (with_meter, without)
         ]
         assert (factors[1] < factors[0] - 0.1) == gains
+
+
+def test_slow_rows_with_a_meter_may_hide_more_than_the_station_file_says_but_no_rain():
+    slow = made(has_inflow=True, is_each_second=False)
+    noise = 2.0 * np.random.default_rng(13).normal(size=slow.group.size) * np.sqrt(slow.variance)
+    each_second, unmetered = made(has_inflow=True), made(has_inflow=False, is_each_second=False)
+    logs = [evidence_of_none(cells, noise).log for cells in (slow, unmetered, each_second)]
+    assert logs[0] > logs[2] + 1.0
+    assert [[block.may_rain for block in cells.blocks] for cells in (slow, unmetered)] == [[False] * 2, [False, True]]
 
 
 def test_what_no_surge_makes_is_no_likelier_unknown_where_there_may_be_one():

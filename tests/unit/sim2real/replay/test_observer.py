@@ -53,6 +53,18 @@ def test_after_a_start_whose_moment_is_open_the_level_is_taken_from_the_row_and_
     assert observer.level_gain[3600] > 0.99 > observer.level_gain[3540]
 
 
+def test_what_a_start_may_hide_goes_by_the_flow_that_is_recorded(alpha, traces):
+    pumps = len(alpha.pump)
+    frequency_hz = np.where(np.arange(SECONDS) >= 3600, 50.0, 0.0) * np.eye(pumps)[0][:, None]
+    running = replace(traces, drives=replace(traces.drives, frequency_hz=frequency_hz))
+    rated, half = (
+        row_observer(one, alpha, 0.0, traces.level_m).deviation_m[3600]
+        for one in (running, replace(running, signals={"flow_m3h": np.where(frequency_hz > 0.0, 50.0, np.nan)}))
+    )
+    assert half == pytest.approx(50.0 / 3600.0 * 50.0 / alpha.sump.area_m2 / np.sqrt(12.0), rel=0.05)
+    assert half < 0.5 * rated
+
+
 def test_an_inflow_that_is_not_measured_is_followed_but_for_what_a_start_may_hide(alpha, traces):
     observer = row_observer(replace(traces, inflow_m3h=None), alpha, 1e-12, traces.level_m)
     assert observer.inflow_gain[3540] > 0.0
