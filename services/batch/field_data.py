@@ -15,13 +15,13 @@ from wetwell.protocols.recordings.reading import PLAIN, Reading
 from wetwell.protocols.recordings.recording import Recording, write_recording
 from wetwell.protocols.station.station_file import Station, load_toml
 from wetwell.protocols.timestamps import to_iso
-from wetwell.services.batch.units import refuse_other_units
 from wetwell.services.reports.validation_page import validation_page
 from wetwell.sim2real.calibration.calibration import calibrate
 from wetwell.sim2real.calibration.comparison import Errors, compare
 from wetwell.sim2real.calibration.fitted_station import with_estimates
 from wetwell.sim2real.calibration.validation import validate
 from wetwell.sim2real.recording.preparation import Preparation, PreparationReport, prepare
+from wetwell.sim2real.replay.units import check_units
 
 
 def prepared(
@@ -75,8 +75,8 @@ def calibrate_file(
         If the recording cannot be used or the station file cannot be written.
     """
     rows, _ = prepared(recording, preparation, station, reading)
-    refuse_other_units(rows, station, recording)
     try:
+        check_units(rows, station)
         estimates = calibrate(rows, station)
         fitted = with_estimates(station, estimates)
     except ValueError as error:
@@ -124,8 +124,8 @@ def validate_file(
     if station.control.is_external and (out is not None or html is not None):
         raise ConfigError(f"station '{station.name}': control.mode 'external': there is no simulated recording")
     rows, _ = prepared(recording, preparation, station, reading)
-    refuse_other_units(rows, station, recording)
     try:
+        check_units(rows, station)
         table = [_error_row(error) for error in _errors(rows, station)]
         for row, error in zip(table, _errors(rows, before) if before is not None else (), strict=False):
             row |= {f"before_{key}": value for key, value in _error_row(error).items() if key.startswith("steady_m")}

@@ -1,10 +1,10 @@
-"""What an act is expected to tell: how far it reduces the entropy of the posterior, by the diagnosis' likelihood."""
+"""What an act is expected to tell of the truth, by the diagnosis' likelihood."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import solve
-from scipy.special import entr, logsumexp
+from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
@@ -89,7 +89,12 @@ def told(probability: Floats, logs: Floats) -> Floats:
 
 
 def information_bits(probability: Floats, after: Floats) -> float:
-    """Expected reduction of the entropy of the posterior. [bit].
+    r"""What an act is expected to tell of the truth; under 0 where it misleads. [bit].
+
+    $$I = \sum_T P(T) \log_2 \frac{P'(T \mid T)}{P(T)}$$
+
+    That is the fall of the entropy where what is simulated is as likely as the likelihood says. Where it is not, a
+    posterior that is sure of a wrong set tells nothing, however small its entropy.
 
     Parameters
     ----------
@@ -97,10 +102,17 @@ def information_bits(probability: Floats, after: Floats) -> float:
     after : (truths, sets) array
         As `told` makes it.
 
+    References
+    ----------
+    .. [1] J. M. Bernardo, Expected information as expected utility, Annals of Statistics 7, 1979.
+
     Examples
     --------
     >>> even = np.array([0.5, 0.5])
     >>> information_bits(even, np.eye(2)), information_bits(even, np.full((2, 2), 0.5))
     (1.0, 0.0)
+    >>> round(information_bits(even, np.array([[0.99, 0.01], [0.99, 0.01]])), 2)
+    -2.33
     """
-    return float((entr(probability).sum() - probability @ entr(after).sum(axis=1)) / np.log(2.0))
+    right = np.maximum(np.diag(after), np.finfo(np.float64).tiny)
+    return float(probability @ (np.log2(right) - np.log2(np.maximum(probability, np.finfo(np.float64).tiny))))

@@ -32,7 +32,7 @@ class Proposal:
     ----------
     act : Act
     information_bits : float
-        Expected reduction of the entropy of the posterior. [bit]
+        What it is expected to tell of the truth. [bit]
     truth_probability : float
         Expected probability of the true set afterwards.
     resolves : bool

@@ -68,7 +68,7 @@ class ProposedAct(_Part):
     separates : list of list of str
         Sets of effects that it tells from another one, 19 to 1 whichever is the truth.
     information_bits : float
-        Expected fall of the entropy of the posterior. [bit]
+        How much more probable the truth is expected to be, in powers of two. [bit]
     truth_probability : float
         Expected probability of the true set afterwards. [1]
     costs_m3 : float

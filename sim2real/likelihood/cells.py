@@ -13,8 +13,8 @@ SPANS = 32
 """More than there are spans since a regime began."""
 SURGES = (0.0, 1.0, 3.0, 7.0)
 """Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
-of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what the
-station file makes of it. Each as likely. [1]"""
+of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what
+the station file makes of it. Each as likely. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -177,7 +177,7 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
 
 
 def _carried_m3h(traces: Traces, pump: int, rated_m3h: float) -> float:
-    """Flow of a pump that runs, in the median, as the recording shows it; the rated one where it shows none. [m³/h]."""
+    """Median flow of a pump that runs, as the recording shows it; the rated one where it shows none. [m³/h]."""
     running = traces.is_row & (traces.frequency_hz[pump] > 0.0)
     flow_m3h = traces.signals["flow_m3h"][pump, running] if "flow_m3h" in traces.signals else np.zeros(0)
     flow_m3h = flow_m3h[flow_m3h > 0.0]  # NaN is no flow either

@@ -18,6 +18,7 @@ from wetwell.sim2real.replay.units import (
     check_level_unit,
     said_of,
     unit_near,
+    usual_level_m,
     where_pumps_switch,
 )
 
@@ -85,11 +86,8 @@ def _check_unit(name: str, quantity: str, ratio: float, than: str) -> None:
 
 def _check_level(traces: Traces, station: Station) -> None:
     check_level_unit(traces, station)
-    level_m = traces.level_m[np.isfinite(traces.level_m)]
-    if level_m.size == 0 or station.control.is_external:
-        return
-    usual_m = float(np.median(level_m))
-    if not 1.0 / 6.0 < usual_m / station.middle_level_m < 6.0:
+    usual_m = usual_level_m(traces, station)
+    if usual_m is not None and not 1.0 / 6.0 < usual_m / station.middle_level_m < 6.0:
         raise ValueError(
             f"level_m reads {usual_m:.4g} {where_pumps_switch(station)}: "
             "another unit, such as % of a span, or the file of another station"

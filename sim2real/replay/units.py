@@ -31,6 +31,8 @@ MOSTLY = 0.8
 FAST_S = 2.0
 """Rows that are no further apart make a long recording of two days. [s]"""
 PERCENT = 0.04
+MOST_OVERSPEED = 1.15
+"""Speed over the nominal one that no motor holds: by the affinity laws it would give half as much again. [1]"""
 
 
 def check_units(recording: Recording, station: Station) -> None:
@@ -83,7 +85,7 @@ def said_of(name: str, unit: str) -> str:
 
 
 def check_frequency(traces: Traces, station: Station) -> None:
-    """Refuse frequencies in percent, or as a share of the nominal one.
+    """Refuse frequencies in percent, or as a share of the nominal one, or of pumps with a higher nominal one.
 
     Raises
     ------
@@ -99,6 +101,11 @@ def check_frequency(traces: Traces, station: Station) -> None:
                 f"frequency_hz reads {usual_hz:.4g} where nominal is {nominal_hz:g} Hz, as if in {unit}: "
                 f"prepare the recording with a scale of {factor:.4g}"
             )
+    if usual_hz > MOST_OVERSPEED * nominal_hz:
+        raise ValueError(
+            f"frequency_hz reads {usual_hz:.4g}, more than {MOST_OVERSPEED:g} times nominal_frequency_hz, which is "
+            f"{nominal_hz:g}: set the one of these pumps, with their curves at that speed"
+        )
 
 
 def check_level_unit(traces: Traces, station: Station) -> None:
@@ -109,14 +116,18 @@ def check_level_unit(traces: Traces, station: Station) -> None:
     ValueError
         One line.
     """
-    control = station.control
-    level_m = traces.level_m[np.isfinite(traces.level_m)]
-    if level_m.size == 0 or control.is_external:
+    usual_m = usual_level_m(traces, station)
+    if usual_m is None:
         return
-    usual_m = float(np.median(level_m))
     for unit, factor in UNITS["level_m"].items():
         if usual_m > 0.0 and abs(np.log(usual_m / station.middle_level_m / factor)) < 2.0 * NEAR:
             raise ValueError(f"level_m reads {usual_m:.4g} {where_pumps_switch(station)}, {said_of('level_m', unit)}")
+
+
+def usual_level_m(traces: Traces, station: Station) -> float | None:
+    """Median of the level; None where there is none, or none to compare it with: no levels drive the station. [m]."""
+    level_m = traces.level_m[np.isfinite(traces.level_m)]
+    return None if level_m.size == 0 or station.control.is_external else float(np.median(level_m))
 
 
 def where_pumps_switch(station: Station) -> str:

@@ -302,8 +302,8 @@ def _after_gaps(is_row: Flags) -> Flags:
 def moved_m(traces: Traces, regime: Integers) -> Floats:
     """(n,) how far the level moves from value to value; 0 between rows. [m].
 
-    In starts and stops it is the mean of all: how far it moved in one says when the pump was switched, and so does its
-    error.
+    In starts and stops it is the mean of all: how far it moved in one says when the pump was switched, and so does
+    its error.
     """
     moved = np.zeros(traces.seconds)
     known = np.flatnonzero(np.isfinite(traces.level_m))

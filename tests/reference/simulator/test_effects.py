@@ -278,7 +278,9 @@ def test_power_of_a_motor_that_slips_falls_with_a_power_of_its_speed(quiet_alpha
     expected = plain["pump1_power_kw"][settled] * speeds_of(rows)[settled] ** exponent
     np.testing.assert_allclose(rows["pump1_power_kw"][settled], expected, rtol=1e-6)
     for name in ("pump1_flow_m3h", "pump1_head_m"):
-        np.testing.assert_array_equal(rows[name], run(quiet_alpha, slips | {"power_exponent": 0.0}, seconds=120)[name])
+        np.testing.assert_array_equal(
+            rows[name], run(quiet_alpha, slips | {"power_exponent": 0.0}, seconds=120)[name]
+        )
 
 
 def test_ramp_shape_of_a_power(quiet_alpha):

@@ -35,6 +35,12 @@ def test_what_all_sets_share_tells_nothing(drawn):
     assert information_bits(probability, told(probability, same)) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_an_act_that_makes_sure_of_a_wrong_set_tells_nothing():
+    probability = np.array([0.8, 0.1, 0.1])
+    misled = told(probability, np.array([[0.0, 20.0, 0.0]] * 3))
+    assert information_bits(probability, misled) < -5.0 < information_bits(probability, np.eye(3))
+
+
 def test_the_likelihood_counts_by_its_power():
     after = told(np.array([0.5, 0.5]), np.array([[0.0, -10.0], [-10.0, 0.0]]))
     assert after[0, 0] / after[0, 1] == pytest.approx(np.exp(10.0))

@@ -37,6 +37,7 @@ def scaled(recording, ending, factor, begin=0):
         ("_power_kw", 1000.0, "as if in W"),
         ("level_m", 100.0, "level_m reads .* where the pumps switch at 0.5 to 1.6 m, as if in cm"),
         ("_frequency_hz", 2.0, "as if in % of nominal: prepare the recording with a scale of 0.5"),
+        ("_frequency_hz", 1.2, "frequency_hz reads 60, more than 1.15 times nominal_frequency_hz, which is 50"),
     ],
 )
 @pytest.mark.parametrize("step", [1, 10])
