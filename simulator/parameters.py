@@ -34,7 +34,8 @@ class PumpParameters:
 
     Its shaft power is a line over the flow, from `shutoff_power_share` of the rated one at no flow. Rags take speed,
     in a run ever more, towards `ragging_limit` with time constant `ragging_s`. `slip` is the loss of speed at rated
-    torque, and `slip_power_exponent` the power of that speed with which the electrical power falls. While the pump stands, `valve_leak_m3h` flows back through its check valve at 1 m of head.
+    torque, and `slip_power_exponent` the power of that speed with which the electrical power falls. While the pump
+    stands, `valve_leak_m3h` flows back through its check valve at 1 m of head.
     """
 
     c0: float

@@ -21,8 +21,8 @@ class MotorSlip(Effect):
     slip : float
         s, share of the speed that is lost at the rated torque M_n; 0 is no effect. [1]
     power_exponent : float
-        e, power of the speed with which the electrical power P falls under that of the command: 0 where it follows the
-        command, 2 where the torque follows the affinity laws and the field turns as commanded, 3 as power of the
+        e, power of the speed with which the electrical power P falls under that of the command: 0 where it follows
+        the command, 2 where the torque follows the affinity laws and the field turns as commanded, 3 as power of the
         shaft, and more where a high lift lets the flow fall faster than the speed. [1]
 
     References
