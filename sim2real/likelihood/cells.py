@@ -11,7 +11,9 @@ from wetwell.sim2real.residuals.phases import group_of, phase
 
 SPANS = 32
 """More than there are spans since a regime began."""
-SURGES = (0.0, 1.0, 3.0, 7.0)
+TIMES = (1.0, 3.0, 10.0, 30.0)
+"""How many times what is known a size may be of which nobody knows more: half a decade apart. [1]"""
+SURGES = (0.0, *TIMES[:3])
 """Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
 of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what
 the station file makes of it. Each as likely. [1]"""

@@ -16,8 +16,6 @@ POOR_FORM = 0.35
 """The same of a poor one, as in seconds of starts; an error of the model is then as large as is allowed. [1]"""
 DIFFERING = 0.5
 """Ratio of errors that differ between pumps, or from cycle to cycle, to those that are alike. [1]"""
-EVEN_FORM = 0.1
-"""Ratio of errors of form that differ so little that they hardly matter to those that are alike. [1]"""
 SWINGS = (0.1, 0.5, 1.5)
 """Error of form of effects that are known by how much they swing in time, not by their course; each as likely. [1]"""
 LATE = (1.0, 0.0, 0.1)
@@ -38,7 +36,8 @@ class Errors:
 
 GOOD = Errors(offset=OFFSET, form=GOOD_FORM)
 POOR = Errors(offset=1.0, form=POOR_FORM)
-HARDLY_DIFFERENT = Errors(offset=DIFFERING * OFFSET, form=EVEN_FORM * GOOD_FORM)
+HARDLY_DIFFERENT = Errors(offset=DIFFERING * OFFSET, form=GOOD_FORM / POOR_FORM * GOOD_FORM)
+"""Where a form repeats, what differs is as small beside a good form as that is beside a poor one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,12 +4,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.likelihood.cells import Block
+from wetwell.sim2real.likelihood.cells import TIMES, Block
 from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, projected
 from wetwell.sim2real.likelihood.evidence import Evidence, Stirred
 from wetwell.sim2real.likelihood.ways import KNOWN, Way, Ways, likeliest
 
-SCALES = (3.0, 10.0, 30.0)
+SCALES = TIMES[1:]
 """Times what is allowed that something unknown may be in a block, each as likely."""
 
 

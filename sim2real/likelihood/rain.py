@@ -3,11 +3,11 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
-from wetwell.sim2real.likelihood.cells import Block
+from wetwell.sim2real.likelihood.cells import TIMES, Block
 from wetwell.sim2real.likelihood.covariance import expected_squares
 from wetwell.sim2real.likelihood.ways import POORLY
 
-RAIN = 30.0
+RAIN = TIMES[3]
 """Variance that rain adds to the level, over what the drift of the inflow at rest makes of it. [1]"""
 
 
