@@ -123,7 +123,13 @@ def test_what_people_read_fits_a_screen(line: str, printed: str, is_wide: bool) 
 
 @pytest.mark.check
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("walk", WALKS, ids=lambda walk: walk.pages[0].removeprefix("docs/"))
+@pytest.mark.parametrize(
+    "walk",
+    [
+        pytest.param(walk, id=walk.pages[0].removeprefix("docs/"), marks=pytest.mark.long if walk.is_long else ())
+        for walk in WALKS
+    ],
+)
 def test_commands_run(walk: Walk, tmp_path: Path) -> None:
     ports = free_ports()
     environment = environment_of(tmp_path, ports)

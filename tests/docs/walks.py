@@ -41,6 +41,8 @@ class Walk:
         Exit codes of commands that do not end with 0, by their beginnings.
     shows_output : bool
         Whether the `text` blocks of the pages are what the commands print, line by line.
+    is_long : bool
+        Whether `make long` runs it, and not `make check`.
     near : float
         Share by which a figure of these lines may differ from what is printed: of what is weighed, the last digits
         change with each better likelihood. [1]
@@ -55,6 +57,7 @@ class Walk:
     left_out: Mapping[str, str] = field(default_factory=dict)
     codes: Mapping[str, int] = field(default_factory=dict)
     shows_output: bool = False
+    is_long: bool = False
     near: float = 0.0
 
 
@@ -140,6 +143,7 @@ printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
             "WETWELL_DETECTOR__STATE_DIR=state wetwell detector release": "needs a quarantined station; "
             "tests/unit/services/detector/test_quarantine.py",
         },
+        is_long=True,
     ),
     Walk(
         ("docs/routers.md",),
@@ -150,9 +154,9 @@ printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
         },
     ),
     Walk(("docs/gap.md",), shows_output=True, near=0.1),
-    Walk(("docs/correction.md",), shows_output=True, near=0.1),
+    Walk(("docs/correction.md",), shows_output=True, near=0.1, is_long=True),
     Walk(("docs/experiments.md",), shows_output=True, near=0.2),
-    Walk(("docs/gap-watch.md",), shows_output=True, near=0.1),
+    Walk(("docs/gap-watch.md",), shows_output=True, near=0.1, is_long=True),
     Walk(
         ("docs/isolability.md",),
         given="""cp "$ROOT"/simulator/stations/alpha.toml north.toml
@@ -174,6 +178,7 @@ wetwell simulate --station my-station.toml --days 0.5 --seed 4 --out b.csv.gz"""
             "--count 100": "--count 2 --days 0.5",
             "--detectors all": "--detectors wetwell,paper_f_test",
         },
+        is_long=True,
     ),
     Walk(("docs/datasets.md",), changed={"--count 10": "--count 3"}),
     Walk(("docs/security.md",), changed={"/etc/wetwell/": ""}),

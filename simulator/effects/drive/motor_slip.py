@@ -31,7 +31,7 @@ class MotorSlip(Effect):
     """
 
     component: ClassVar[Component] = "drive"
-    neutral: ClassVar[dict[str, float]] = {"slip": 0.0}
+    neutral: ClassVar[dict[str, float]] = {"slip": 0.0, "power_exponent": 0.0}
 
     name: Literal["motor_slip"] = "motor_slip"
     slip: Annotated[float, limits(0.0, 0.15, "1")]

@@ -233,7 +233,7 @@ def test_effects_lists_the_registry(run_wetwell: Callable[..., int], capsys: pyt
     assert rows["motor_slip"]["component"] == "drive"
     assert rows["motor_slip"]["parameters"] == [
         {"name": "slip", "unit": "1", "low": 0.0, "high": 0.15, "neutral": 0.0},
-        {"name": "power_exponent", "unit": "1", "low": 0.0, "high": 5.0, "default": 0.0},
+        {"name": "power_exponent", "unit": "1", "low": 0.0, "high": 5.0, "default": 0.0, "neutral": 0.0},
     ]
     assert run_wetwell("effects") == 0
     assert "motor_slip (drive)\n  An asynchronous motor" in capsys.readouterr().out
