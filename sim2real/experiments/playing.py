@@ -89,7 +89,7 @@ def play(act: Act, site: Site, station: Station, possible: PossibleSet, conditio
         moved_m3=pumped_m3 + float(held_back_m3h.sum()) / HOUR_S,
         extra_kwh=float(power_kw[is_by_hand].sum()) / HOUR_S - pumped_m3 * float(kwh_m3),
         length_h=ended_s / HOUR_S,
-        broken=_broken(recording, site, station),
+        broken=_broken(recording, site, station, conditions.inflow_m3h),
     )
 
 
@@ -132,9 +132,12 @@ def _total(recording: Recording, quantity: str) -> Floats:
     return np.asarray(np.sum(rows, axis=0), dtype=np.float64)
 
 
-def _broken(recording: Recording, site: Site, station: Station) -> str:
+def _broken(recording: Recording, site: Site, station: Station, inflow_m3h: float) -> str:
     """The first rule that an act breaks."""
     level_m, control = recording.truth["truth_level_m"], station.control
+    runs = np.any([recording.column(f"pump{i}_frequency_hz") > 0.0 for i in range(1, recording.pumps + 1)], axis=0)
+    if np.any(runs & (recording.column("by_hand") > 0.0) & (level_m >= site.high_m)):
+        return f"what runs does not carry {inflow_m3h:.4g} m³/h: wait until less comes in"
     if np.any(recording.truth["truth_overflow_m3h"] > 0.0):
         return "the wet well overflows"
     most_m = site.high_m + BRIM_SHARE * (site.high_m - site.stop_m)

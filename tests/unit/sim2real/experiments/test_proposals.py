@@ -68,6 +68,13 @@ def test_the_price_is_that_of_energy_and_work(alpha, found):
     assert at_station.crew_h == pytest.approx(2.0 * (at_station.length_h + 1.0))
 
 
+def test_a_run_that_carries_less_than_comes_in_is_refused_until_less_comes(alpha):
+    found = proposals_of(alpha, ALIKE, replace(CONDITIONS, inflow_m3h=190.0))
+    reasons = {one.act.name: one.reason for one in found.refused}
+    assert reasons["pump_1_at_70"] == "what runs does not carry 190 m³/h: wait until less comes in"
+    assert "pumps_1_and_2" not in reasons
+
+
 @pytest.mark.parametrize(
     ("part", "changes", "act", "reason"),
     [
