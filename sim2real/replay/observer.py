@@ -148,9 +148,8 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
     plant = plant_parameters(station)
     area_m2 = station.sump.mean_area_m2
     speed_m_s = plant.rated_flow_m3h / 3600.0 / area_m2
-    hidden_m_s = np.array([_carried_m3h(traces, i, rated) for i, rated in enumerate(plant.rated_flow_m3h)])
-    hidden_m_s *= 1.0 / 3600.0 / area_m2
-    open_m2 = np.sum((hidden_m_s[:, None] * traces.drives.open_s) ** 2, axis=0) / 12.0
+    carried_m3h = np.array([_carried_m3h(traces, i, rated) for i, rated in enumerate(plant.rated_flow_m3h)])
+    open_m2 = np.sum((carried_m3h[:, None] / 3600.0 / area_m2 * traces.drives.open_s) ** 2, axis=0) / 12.0
     noise_m = level_noise_m(traces, station)
     is_free = traces.inflow_m3h is None
     level_gain, inflow_gain = np.zeros(traces.seconds), np.zeros(traces.seconds)
