@@ -27,6 +27,9 @@ CALLED: dict[AnalogueQuantity, str] = {"flow_m3h": "flow", "head_m": "head", "po
 OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
 """Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
 
+BESIDE_A_METER = {"unmetered_inflow"}
+"""Effects that are what a meter of the inflow does not see: without one there is nothing that they are beside."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NotTested:
@@ -74,6 +77,8 @@ def _moves(candidate: Candidate, fitter: Fitter, least: float, replay: Replay) -
     if candidate.name in OF_TELEMETRY:
         is_level = candidate.name == "level_quantisation" and np.isfinite(replay.traces.level_m).any()
         return replay.traces.is_each_second or (bool(is_level) and replay.traces.span_s == 1)
+    if candidate.name in BESIDE_A_METER and replay.traces.inflow_m3h is None:
+        return False
     plain = fitter.plain.residuals
     for grid in _points(candidate):
         for point in grid:

@@ -122,6 +122,13 @@ def test_what_cannot_be_shown_is_listed_with_the_reason(alpha, plain):
     assert {one.name for one in report.candidates}.isdisjoint(reasons)
 
 
+@pytest.mark.parametrize(("every", "value"), [(1, "instant"), (900, "mean")])
+def test_an_inflow_beside_a_meter_is_not_tested_where_there_is_no_meter(alpha, plain, every, value):
+    report = diagnose(stored(plain, every, value, ("inflow",)), alpha).report()
+    reasons = {one.effect: one.reason for one in report.not_tested}
+    assert reasons["unmetered_inflow"] == "the inflow is not measured: the level follows it, whatever comes"
+
+
 def test_a_recording_of_each_second_shows_all_but_what_never_happens(alpha, plain):
     reasons = {one.effect: one.reason for one in diagnose(plain, alpha).report().not_tested}
     assert set(reasons) <= {"common_header"}
