@@ -134,7 +134,11 @@ def _total(recording: Recording, quantity: str) -> Floats:
 
 def _broken(recording: Recording, site: Site, station: Station, inflow_m3h: float) -> str:
     """The first rule that an act breaks."""
-    level_m, control = recording.truth["truth_level_m"], station.control
+    return _broken_by_level(recording, site, station, inflow_m3h) or _broken_by_pumps(recording, station)
+
+
+def _broken_by_level(recording: Recording, site: Site, station: Station, inflow_m3h: float) -> str:
+    level_m = recording.truth["truth_level_m"]
     runs = np.any([recording.column(f"pump{i}_frequency_hz") > 0.0 for i in range(1, recording.pumps + 1)], axis=0)
     if np.any(runs & (recording.column("by_hand") > 0.0) & (level_m >= site.high_m)):
         return f"what runs does not carry {inflow_m3h:.4g} m³/h: wait until less comes in"
@@ -146,6 +150,11 @@ def _broken(recording: Recording, site: Site, station: Station, inflow_m3h: floa
     least_m = site.low_m - BRIM_SHARE * (site.high_m - site.stop_m)
     if level_m.min() < least_m:
         return f"the level falls to {level_m.min():.2f} m, under {least_m:.2f} m"
+    return ""
+
+
+def _broken_by_pumps(recording: Recording, station: Station) -> str:
+    control = station.control
     for i in range(1, recording.pumps + 1):
         dry_s = _longest_dry_s(recording, i)
         if dry_s > LONGEST_DRY_S:
