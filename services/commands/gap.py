@@ -19,6 +19,7 @@ from wetwell.services.commands.options import (
     ZenohOption,
     all_there,
     cores,
+    names_apart,
     number,
     positive,
     print_batch,
@@ -175,10 +176,14 @@ def gap_diagnose(
         typer.Option("--station", metavar="FILE", help="Of the recordings; a table names those of its own."),
     ] = None,
     without: Annotated[
-        list[str] | None, typer.Option("--without", metavar="NAME", help="Leave this effect out; may be given again.")
+        list[str] | None,
+        typer.Option(
+            "--without", metavar="NAMES", help="Leave these effects out; with commas.", callback=names_apart
+        ),
     ] = None,
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help="Try only this effect; may be given again.")
+        list[str] | None,
+        typer.Option("--only", metavar="NAMES", help="Try only these effects; with commas.", callback=names_apart),
     ] = None,
     apart: Annotated[
         bool, typer.Option("--apart", help="Diagnose each recording for itself, in a folder of its own.")

@@ -104,6 +104,17 @@ def there(path: Path) -> Path:
     return path
 
 
+def names_apart(names: list[str] | None) -> list[str] | None:
+    """Names of an option that takes several: with commas, or by giving it again.
+
+    Examples
+    --------
+    >>> names_apart(["pump_wear, friction_bias", "motor_slip"])
+    ['pump_wear', 'friction_bias', 'motor_slip']
+    """
+    return [name.strip() for text in names for name in text.split(",") if name.strip()] if names else None
+
+
 def all_there(paths: list[Path] | None) -> list[Path] | None:
     """Refuse files of which one is not there."""
     return None if paths is None else [there(path) for path in paths]
