@@ -41,6 +41,7 @@ from wetwell.protocols.quantities import (
     pumps_of,
 )
 from wetwell.protocols.recordings.covariates import covariate_of
+from wetwell.protocols.recordings.layout import STAMP, arrow_of, parquet_table, parquet_writer
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
 from wetwell.protocols.recordings.stamp_texts import to_iso_array
 from wetwell.protocols.timestamps import from_iso, has_zone
@@ -358,59 +359,42 @@ def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
     suffix = _suffix(path)
     try:
         with atomic_file(path) as file, contextlib.ExitStack() as stack:
-            write = _block_writer(file, suffix, stack)
-            yield lambda block: write(
-                table_of(block) if suffix == ".parquet" else _table(block, to_iso_array(block.time_ns))
-            )
+            yield _block_writer(file, suffix, stack)
     except pa.ArrowException as error:
         raise RecordingError(f"{path}: cannot be written: {error}") from error
 
 
 def table_of(recording: Recording) -> pa.Table:
     """Arrow table of a recording; `time` in ns, UTC; station and value in the metadata."""
-    return _table(recording, _arrow(recording.time_ns, pa.timestamp("ns", tz="UTC")))
+    return _table(recording, arrow_of(recording.time_ns, STAMP))
 
 
 def _table(recording: Recording, time: Any) -> pa.Table:
-    origin = Origin(station=recording.station, value=recording.value)
-    columns = {name: _arrow(values) for name, values in {**recording.columns, **recording.truth}.items()}
-    return pa.table({"time": time, **columns}).replace_schema_metadata(origin.metadata)
+    columns = {name: arrow_of(values) for name, values in {**recording.columns, **recording.truth}.items()}
+    return pa.table({"time": time, **columns}).replace_schema_metadata(_origin(recording).metadata)
 
 
-def _arrow(values: npt.NDArray[Any], kind: Any = None) -> Any:
-    """Arrow array of (n,) values; numbers are not copied, and a text that stands for all is made once.
-
-    Arrow's own way makes each text by itself, and loads pandas, where it is there, to ask whether this is a series.
-    """
-    size = values.size
-    if values.dtype in (np.float64, np.int64):
-        kind = kind or (pa.float64() if values.dtype == np.float64 else pa.int64())
-        return pa.Array.from_buffers(kind, size, [None, pa.py_buffer(np.ascontiguousarray(values))])
-    if size and values.dtype.kind == "U" and values.strides == (0,):
-        text = str(values[0]).encode()
-        ends = np.arange(size + 1, dtype=np.int32) * len(text)
-        return pa.StringArray.from_buffers(size, pa.py_buffer(ends), pa.py_buffer(text * size))
-    return pa.array(values)
+def _origin(recording: Recording) -> Origin:
+    return Origin(station=recording.station, value=recording.value)
 
 
-def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitStack) -> Callable[[pa.Table], None]:
+def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitStack) -> Callable[[Recording], None]:
     if suffix == ".csv.gz":
         file = stack.enter_context(gzip.GzipFile(filename="", fileobj=file, mode="wb", compresslevel=6, mtime=0))
     parquet: Any = None
     is_begun = False
 
-    def write(table: pa.Table) -> None:
+    def write(block: Recording) -> None:
         nonlocal parquet, is_begun
         if suffix == ".parquet":
+            table = parquet_table(block.time_ns, {**block.columns, **block.truth}, _origin(block).metadata)
             if not is_begun:
-                texts = [column.name for column in table.schema if pa.types.is_string(column.type)]
-                parquet = stack.enter_context(  # a dictionary of measured numbers is as long as they are
-                    pa.parquet.ParquetWriter(file, table.schema, compression="zstd", use_dictionary=texts)
-                )
+                parquet = stack.enter_context(parquet_writer(file, table.schema))
             parquet.write_table(table)
         else:
+            table = _table(block, to_iso_array(block.time_ns))
             if not is_begun:
-                file.write(Origin.of_metadata(table.schema.metadata or {}).mark.encode())
+                file.write(_origin(block).mark.encode())
                 file.write(",".join(table.column_names).encode() + b"\n")
             pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))
         is_begun = True
