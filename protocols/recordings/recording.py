@@ -41,7 +41,7 @@ from wetwell.protocols.quantities import (
     pumps_of,
 )
 from wetwell.protocols.recordings.covariates import covariate_of
-from wetwell.protocols.recordings.layout import STAMP, arrow_of, parquet_table, parquet_writer
+from wetwell.protocols.recordings.layout import STAMP, arrow_of, parquet_table, parquet_writer, texts_of
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
 from wetwell.protocols.recordings.stamp_texts import to_iso_array
 from wetwell.protocols.timestamps import from_iso, has_zone
@@ -366,12 +366,13 @@ def recording_writer(path: Path) -> Iterator[Callable[[Recording], None]]:
 
 def table_of(recording: Recording) -> pa.Table:
     """Arrow table of a recording; `time` in ns, UTC; station and value in the metadata."""
-    return _table(recording, arrow_of(recording.time_ns, STAMP))
+    columns = {name: arrow_of(values) for name, values in _columns(recording).items()}
+    table = pa.table({"time": arrow_of(recording.time_ns, STAMP), **columns})
+    return table.replace_schema_metadata(_origin(recording).metadata)
 
 
-def _table(recording: Recording, time: Any) -> pa.Table:
-    columns = {name: arrow_of(values) for name, values in {**recording.columns, **recording.truth}.items()}
-    return pa.table({"time": time, **columns}).replace_schema_metadata(_origin(recording).metadata)
+def _columns(recording: Recording) -> dict[str, npt.NDArray[Any]]:
+    return {**recording.columns, **recording.truth}
 
 
 def _origin(recording: Recording) -> Origin:
@@ -387,12 +388,13 @@ def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitSt
     def write(block: Recording) -> None:
         nonlocal parquet, is_begun
         if suffix == ".parquet":
-            table = parquet_table(block.time_ns, {**block.columns, **block.truth}, _origin(block).metadata)
+            table = parquet_table(block.time_ns, _columns(block), _origin(block).metadata)
             if not is_begun:
                 parquet = stack.enter_context(parquet_writer(file, table.schema))
             parquet.write_table(table)
         else:
-            table = _table(block, to_iso_array(block.time_ns))
+            texts = {name: texts_of(values) for name, values in _columns(block).items()}
+            table = pa.table({"time": to_iso_array(block.time_ns), **texts})
             if not is_begun:
                 file.write(_origin(block).mark.encode())
                 file.write(",".join(table.column_names).encode() + b"\n")

@@ -1,10 +1,14 @@
 """How recordings lie in Parquet."""
 
+import io
+
 import numpy as np
 import pyarrow as pa
+import pyarrow.csv
 import pyarrow.parquet
 import pytest
 
+from wetwell.protocols.recordings.layout import texts_of
 from wetwell.protocols.recordings.recording import Recording, read_recording, recording_writer
 
 HEALTHY = np.broadcast_to(np.array("normal"), (4,))
@@ -48,3 +52,22 @@ def test_numbers_are_never_null_and_texts_are_texts(tmp_path):
         "truth_state": (pa.string(), True),
         "truth_known": (pa.bool_(), True),
     }
+
+
+@pytest.mark.parametrize("size", [0, 1, 3, 400])
+def test_numbers_in_a_row_are_the_text_that_arrow_makes_of_each(size):
+    rng = np.random.default_rng(size)
+    values = np.repeat(rng.choice([0.0, -0.0, 0.1 + 0.2, 1e-300, 50.0, np.nan, -np.inf], size), 3)
+    texts, numbers = texts_of(values), pa.table({"value": pa.array(values)})
+    assert pa.types.is_string(texts.type)
+    assert csv_of(pa.table({"value": texts})) == csv_of(numbers)
+
+
+def test_numbers_that_always_change_stay_numbers():
+    assert texts_of(np.arange(10.0)).type == pa.float64()
+
+
+def csv_of(table):
+    file = io.BytesIO()
+    pa.csv.write_csv(table, file, pa.csv.WriteOptions(include_header=False, quoting_style="none"))
+    return file.getvalue()
