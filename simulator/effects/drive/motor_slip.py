@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.parameters import PlantParameters
+from wetwell.simulator.parameters import PlantParameters, PumpParameters
 
 
 class MotorSlip(Effect):
@@ -38,7 +38,12 @@ class MotorSlip(Effect):
     power_exponent: Annotated[float, limits(0.0, 5.0, "1")] = 0.0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
-        """Let the motors slip."""
-        return parameters.with_pumps(
-            lambda pump: replace(pump, slip=pump.slip + self.slip, slip_power_exponent=self.power_exponent)
-        )
+        """Let the motors slip; of two slips the power falls as by both."""
+        return parameters.with_pumps(self._slipping)
+
+    def _slipping(self, pump: PumpParameters) -> PumpParameters:
+        if self.slip == 0.0:
+            return pump
+        slip, exponent = pump.slip + self.slip, self.power_exponent
+        exponent += pump.slip / slip * (pump.slip_power_exponent - exponent)
+        return replace(pump, slip=slip, slip_power_exponent=exponent)

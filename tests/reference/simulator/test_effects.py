@@ -283,6 +283,16 @@ def test_power_of_a_motor_that_slips_falls_with_a_power_of_its_speed(quiet_alpha
         )
 
 
+def test_a_second_slip_leaves_the_power_of_the_first(quiet_alpha):
+    """A station file has what was diagnosed; what is tried beside it must change nothing where it is neutral."""
+    slips = {"name": "motor_slip", "slip": 0.05, "power_exponent": 2.0}
+    alone = run(quiet_alpha, slips, seconds=120)
+    beside = run(quiet_alpha, slips, slips | {"slip": 0.0, "power_exponent": 0.0}, seconds=120)
+    np.testing.assert_array_equal(beside["pump1_power_kw"], alone["pump1_power_kw"])
+    halves, whole = run(quiet_alpha, slips, slips, seconds=120), run(quiet_alpha, slips | {"slip": 0.1}, seconds=120)
+    np.testing.assert_allclose(halves["pump1_power_kw"], whole["pump1_power_kw"], rtol=1e-12)
+
+
 def test_ramp_shape_of_a_power(quiet_alpha):
     rows = run(quiet_alpha, {"name": "ramp_shape", "power": 2.0}, seconds=400)
     commanded = rows["pump1_frequency_hz"] / NOMINAL_HZ
