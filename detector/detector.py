@@ -10,7 +10,7 @@ from wetwell.detector.pump_judge import Judgement, PumpJudge
 from wetwell.detector.runs.run import Run
 from wetwell.detector.runs.run_tracker import RunTracker
 from wetwell.detector.snapshot.codec import decode_snapshot, encode_snapshot
-from wetwell.detector.stream.block import Block, LiveBlock
+from wetwell.detector.stream.block import Block, LiveBlock, blocks
 from wetwell.detector.stream.gate import gate_counts
 from wetwell.detector.stream.loop import Stop
 from wetwell.detector.verdict.asset_faults import StageRules
@@ -18,6 +18,7 @@ from wetwell.detector.verdict.evidence import rolling_evidence
 from wetwell.protocols.messages.readings import Readings
 from wetwell.protocols.messages.verdict import Severity, Verdict
 from wetwell.protocols.quantities import STATION_QUANTITIES, pump_of
+from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
 
@@ -104,6 +105,12 @@ class Detector:
             yield from [self._told(pump, begin_ns, "begins") for pump in range(len(self._judges))]
         for stop in self._runs.stops(block):
             yield from self._judged(stop)
+
+    def judge(self, recording: Recording) -> list[Verdict]:
+        """Verdicts on a whole recording, and on the runs that are still open at its end."""
+        pumps = len(self._judges)
+        verdicts = [verdict for block in blocks(recording, pumps) for verdict in self.update_block(block)]
+        return [*verdicts, *self.finish()]
 
     def finish(self) -> tuple[Verdict, ...]:
         """Verdicts on the runs that are still open at the end of a recording."""

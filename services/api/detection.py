@@ -8,7 +8,6 @@ from html import escape
 import pyarrow as pa
 
 from wetwell.detector.detector import Detector
-from wetwell.detector.stream.block import blocks
 from wetwell.detector.verdict.episodes import episodes_of
 from wetwell.protocols.messages.history import Episode
 from wetwell.protocols.messages.verdict import Verdict
@@ -111,6 +110,5 @@ def detect(
     rows = rows_of(recording, plant, Reading.said(time_zone, as_station=as_station))
     refuse_other_units(rows, plant, "recording")
     detector = Detector.of(plant)
-    verdicts = [verdict for block in blocks(rows, len(plant.pump)) for verdict in detector.update_block(block)]
-    verdicts += detector.finish()
+    verdicts = detector.judge(rows)
     return Detection(station=plant, verdicts=tuple(verdicts), counts=dict(detector.counts))

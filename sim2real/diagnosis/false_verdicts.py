@@ -7,7 +7,6 @@ import numpy as np
 from wetwell.detector.curves.datasheet import Datasheet, SystemCurve, datasheet_of
 from wetwell.detector.detector import Detector
 from wetwell.detector.evaluation.scores import FAULTS, without_truth
-from wetwell.detector.stream.block import blocks
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
@@ -56,9 +55,7 @@ def false_verdicts(recording: Recording, before: Station, after: Station) -> Fal
 
 def _judged(recording: Recording, name: str, datasheet: Datasheet) -> tuple[int, int]:
     """Verdicts, and those with a fault."""
-    detector = Detector(name, datasheet)
-    verdicts = [verdict for block in blocks(recording, datasheet.pumps) for verdict in detector.update_block(block)]
-    verdicts += detector.finish()
+    verdicts = Detector(name, datasheet).judge(recording)
     return len(verdicts), sum(verdict.state in FAULTS for verdict in verdicts)
 
 
