@@ -10,12 +10,12 @@ from wetwell.protocols.recordings.reading import Reading
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.api.result import Picture, StationResult, html_table
 from wetwell.services.api.sources import RecordingSource, StationSource, rows_of, station_of
-from wetwell.services.batch.units import refuse_other_units
 from wetwell.services.reports.charts import bar_chart
 from wetwell.sim2real.calibration.calibration import calibrate as estimates_of
 from wetwell.sim2real.calibration.estimates import Estimate
 from wetwell.sim2real.calibration.fitted_station import with_estimates
 from wetwell.sim2real.recording.preparation import Preparation, prepare
+from wetwell.sim2real.replay.units import check_units
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,9 +95,10 @@ def calibrate(
     """
     plant = station_of(station)
     rows = rows_of(recording, plant, Reading.said(time_zone, as_station=as_station))
-    refuse_other_units(rows, plant, "recording")
     try:
-        estimates = estimates_of(prepare(rows, Preparation())[0], plant)
+        in_order, _ = prepare(rows, Preparation())
+        check_units(in_order, plant)
+        estimates = estimates_of(in_order, plant)
         return Calibration(station=with_estimates(plant, estimates), estimates=tuple(estimates), before=plant)
     except ValueError as error:
         raise RecordingError(f"recording: {error}") from error
