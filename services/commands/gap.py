@@ -19,6 +19,7 @@ from wetwell.services.commands.options import (
     ZenohOption,
     all_there,
     cores,
+    listed,
     names_apart,
     number,
     positive,
@@ -146,8 +147,7 @@ def gap_families(
     """Put trials of several families side by side: what each scores that was left out of the learning."""
     from wetwell.services.trial.families import families_table
 
-    named = [part.strip() for part in learnt_on.split(",") if part.strip()]
-    print_result(families_table(trials, named), as_json=as_json)
+    print_result(families_table(trials, listed(learnt_on)), as_json=as_json)
 
 
 @app.command("diagnose", cls=about("--recording"))

@@ -112,7 +112,12 @@ def names_apart(names: list[str] | None) -> list[str] | None:
     >>> names_apart(["pump_wear, friction_bias", "motor_slip"])
     ['pump_wear', 'friction_bias', 'motor_slip']
     """
-    return [name.strip() for text in names for name in text.split(",") if name.strip()] if names else None
+    return [name for text in names for name in listed(text)] if names else None
+
+
+def listed(text: str) -> list[str]:
+    """Names in a list with commas, which may be empty."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def all_there(paths: list[Path] | None) -> list[Path] | None:
@@ -303,7 +308,7 @@ def signals_named(text: str, flag: str) -> tuple["SensedQuantity", ...]:
     """
     from wetwell.protocols.quantities import SIGNALS
 
-    named = [part.strip() for part in text.split(",") if part.strip()]
+    named = listed(text)
     if unknown := [name for name in named if name not in SIGNALS]:
         raise ConfigError(f"{flag}: got '{unknown[0]}', must be of {', '.join(SIGNALS)}")
     return tuple(quantity for name, quantity in SIGNALS.items() if name in named)
