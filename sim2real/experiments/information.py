@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import solve
-from scipy.special import logsumexp
+from scipy.special import logsumexp, rel_entr
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
@@ -114,5 +114,4 @@ def information_bits(probability: Floats, after: Floats) -> float:
     >>> round(information_bits(even, np.array([[0.99, 0.01], [0.99, 0.01]])), 2)
     -2.33
     """
-    right = np.maximum(np.diag(after), np.finfo(np.float64).tiny)
-    return float(probability @ (np.log2(right) - np.log2(np.maximum(probability, np.finfo(np.float64).tiny))))
+    return float(0.0 - rel_entr(probability, np.diag(after)).sum() / np.log(2.0))
