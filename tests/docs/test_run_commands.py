@@ -171,14 +171,14 @@ def test_commands_run(walk: Walk, tmp_path: Path) -> None:
 
 
 def code_at_the_end(process: subprocess.Popen[bytes]) -> int:
-    """Exit code of a service that Ctrl-C ends; 0 of a program of the page's own, whose server may be busy ending."""
+    """Exit code of a service that Ctrl-C ends; 0 of a page's own program that does not come to an end."""
     process.send_signal(signal.SIGINT)
     try:
-        code = process.wait(60)
+        return process.wait(60)
     except subprocess.TimeoutExpired:
         process.kill()
         code = process.wait()
-    return 0 if "exec python " in str(process.args) else code
+        return 0 if "exec python " in str(process.args) else code
 
 
 def wait_for_a_word(process: subprocess.Popen[bytes], said: Path) -> None:
