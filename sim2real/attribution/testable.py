@@ -26,7 +26,6 @@ CALLED: dict[AnalogueQuantity, str] = {"flow_m3h": "flow", "head_m": "head", "po
 """Words for the readings in a reason."""
 OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
 """Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
-
 BESIDE_A_METER = {"unmetered_inflow"}
 """Effects that are what a meter of the inflow does not see: without one there is nothing that they are beside."""
 

@@ -1,4 +1,4 @@
-"""Forms in which exports write a stamp: `strptime` codes, seconds and milliseconds since 1970, days of Excel."""
+"""Forms in which exports write a stamp: `strptime` codes, seconds to nanoseconds since 1970, days of Excel."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Self
 
 NUMERIC = ("epoch_s", "epoch_ms", "epoch_us", "epoch_ns", "excel")
-"""Forms that are one number: seconds or milliseconds since 1970 in UTC, days since 30 December 1899 in local time."""
+"""Forms that are one number: seconds to nanoseconds since 1970 in UTC, days since 30 December 1899 in local time."""
 
 _MONTHS = (
     "jan tammi ene gen",
