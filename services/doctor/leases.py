@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 LEASES_S = 5.0
 """So long the database may take to answer. [s]"""
-SEEN_S = 10.0
-"""A member that was not seen for so long does not stand by. [s]"""
+ALONE = "its death is an outage: start the other member; one that is back stands by when it has heard what it missed"
 
 
 async def lease_findings(settings: LeaseSettings) -> list[Finding]:
@@ -30,22 +29,22 @@ async def lease_findings(settings: LeaseSettings) -> list[Finding]:
             found = await kept.call(standings)
         except LinkError as error:
             return [Finding("leases", "error", str(error), "nobody can own a role: bring the database back")]
-    return list(findings_of(found)) or [
+    return list(findings_of(found, settings.ttl_s)) or [
         Finding("leases", "warning", "no role was ever owned", "start a daemon with the same lease.url")
     ]
 
 
-def findings_of(found: Iterable["Standing"]) -> Iterator[Finding]:
-    """Findings of the roles."""
-    for role, lease, now_s, members in found:
-        others = [one.holder for one in members if one.age_s < SEEN_S and one.holder != lease.holder]
-        if now_s >= lease.expires_s:
+def findings_of(found: Iterable["Standing"], ttl_s: float) -> Iterator[Finding]:
+    """Findings of the roles, whose leases last for `ttl_s`."""
+    for standing in found:
+        role, lease, others = standing.role, standing.lease, standing.stand_by(ttl_s)
+        if not standing.is_owned:
             text = f"role '{role}': nobody owns it; {_listed(others)}"
             yield Finding("leases", "error", text, "look at the logs of its members")
             continue
         since = to_iso(round(lease.since_s) * NS_PER_S)
         text = f"role '{role}': {lease.holder} owns it since {since} (token {lease.token}); {_listed(others)}"
-        advice = "" if others else "its death is an outage: start the other member"
+        advice = "" if others else ALONE
         yield Finding("leases", "ok" if others else "warning", text, advice)
 
 

@@ -160,15 +160,17 @@ class Membership:
         log.info("role '%s': %s stands by", self.name, self._claim.holder)
         is_told = False
         while True:
+            stands_by = bus.is_connected and is_ready()
             try:
-                if bus.is_connected and await self._claim.take(is_ready=is_ready()):
+                if bus.is_connected and await self._claim.take(is_ready=stands_by):
                     break
                 is_told = False
             except LinkError as error:
+                stands_by = False
                 if not is_told:
                     log.warning("role '%s': %s; stands by", self.name, error)
                 is_told = True
-            self._report()
+            self._report(stands_by=stands_by)
             await asyncio.sleep(self._period_s)
         self._report()
         log.warning("role '%s': %s is the owner, token %d", self.name, self._claim.holder, self.token)
@@ -233,9 +235,9 @@ class Membership:
         except (TimeoutError, LinkError, LeaseLostError) as error:
             log.warning("role '%s': %s", self.name, error or "the database does not answer")
 
-    def _report(self) -> None:
+    def _report(self, *, stands_by: bool = False) -> None:
         is_owner = self._claim.is_owner
-        figures = {"is_owner": float(is_owner), "lease_token": float(self.token)}
+        figures = {"is_owner": float(is_owner), "stands_by": float(stands_by), "lease_token": float(self.token)}
         if is_owner:
             figures["owner_since_s"] = self._claim.lease.since_s
         BOARD.report(SITE, f"{self._service}-lease", self._period_s, figures)

@@ -30,6 +30,22 @@ class Standing(NamedTuple):
     now_s: float
     members: tuple[Member, ...]
 
+    @property
+    def is_owned(self) -> bool:
+        """Whether a member owns it now."""
+        return self.now_s < self.lease.expires_s
+
+    def stand_by(self, ttl_s: float) -> list[str]:
+        """Members that could take it over at once, as seen within the time of a lease: with one the pair is whole.
+
+        Examples
+        --------
+        >>> members = Member("a", 0.0), Member("b", 0.3), Member("c", 2.0)
+        >>> Standing("detector/site", Lease("a"), 0.0, members).stand_by(ttl_s=1.5)
+        ['b']
+        """
+        return [one.holder for one in self.members if one.age_s < ttl_s and one.holder != self.lease.holder]
+
 
 class Leases(Protocol):
     """Leases that are changed by compare-and-set."""

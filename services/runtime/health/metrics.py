@@ -51,6 +51,7 @@ METRICS: Mapping[str, str] = {
     "speed": "How many times as fast as life.",
     "stale": "Alarms that stand for more than a day.",
     "standing": "Alarms whose condition is there.",
+    "stands_by": "1 in the member of a pair that could take over at once.",
     "stations": "Stations that are watched.",
     "unacknowledged": "Alarms that wait for an acknowledgement.",
     "verdicts": "Verdicts published, or taken.",

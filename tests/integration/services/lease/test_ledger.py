@@ -14,10 +14,12 @@ from memory_bus import MemoryBus
 from wetwell.protocols.errors import ConfigError, LinkError
 from wetwell.services.lease.database import LeaseDatabase
 from wetwell.services.lease.ledger import Entry, LeaseLostError, Ledger, Numbered
-from wetwell.services.lease.membership import Claim
+from wetwell.services.lease.membership import Claim, Membership
 from wetwell.services.lease.outbox import Outbox, OutboxPlace
 from wetwell.services.lease.table import LeaseTable, standings
 from wetwell.services.lease.tenure import Tenure
+from wetwell.services.runtime.health.board import HealthBoard
+from wetwell.services.runtime.settings import LeaseSettings
 
 KEY = "wetwell/alpha/verdict/1"
 TTL_S = 1.0
@@ -78,6 +80,36 @@ def test_one_that_is_not_ready_does_not_show_that_it_stands_by_and_is_better_tha
         assert [one.holder for one in standing.members] == ["a"]
         await a.release()
         assert await b.take(is_ready=False)
+
+    asyncio.run(run())
+
+
+def test_a_member_shows_that_it_stands_by_when_it_could_go_on_at_once(site, postgres, monkeypatch):
+    board = HealthBoard()
+    monkeypatch.setattr("wetwell.services.lease.membership.BOARD", board)
+    settings = LeaseSettings(url=postgres.url, group=uuid.uuid4().hex, member="b", ttl_s=TTL_S)
+    has_heard = threading.Event()
+
+    def shown():
+        figures = {metric.name: [one.value for one in metric.samples] for metric in board.collect()}
+        return figures.get("wetwell_stands_by"), figures.get("wetwell_is_owner")
+
+    async def until_shown(*wanted):
+        async with asyncio.timeout(10.0):
+            while shown() != wanted:  # noqa: ASYNC110 - it looks by itself
+                await asyncio.sleep(0.02)
+
+    async def run():
+        with contextlib.closing(Membership(settings, "detector")) as member:
+            owner = Claim(LeaseTable(site.database, member.name), "a", 60.0)
+            assert await owner.take()
+            taking = asyncio.create_task(member.take(MemoryBus(), has_heard.is_set))
+            await until_shown([0.0], [0.0])
+            has_heard.set()
+            await until_shown([1.0], [0.0])
+            await owner.release()
+            await taking
+            assert shown() == ([0.0], [1.0])
 
     asyncio.run(run())
 

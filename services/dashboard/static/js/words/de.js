@@ -506,6 +506,7 @@ export default {
   "scrubs": "Durchsichten",
   "seconds": "Sekunden",
   "speed": "Geschwindigkeit",
+  "stands by": "zur Übernahme bereit",
   "stale": "alte Alarme",
   "stations": "Stationen",
   "stuck": "hängend",
