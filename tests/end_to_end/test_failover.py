@@ -43,7 +43,7 @@ async def until(is_so):
 
 async def accidents(site, *kinds):
     """How long after each accident the successor had the lease; the last one is not undone."""
-    return {kind: (await site.disturb(kind, is_last=kind == kinds[-1]))[1] for kind in kinds}
+    return {kind: (await site.disturb(kind, is_undone=kind != kinds[-1])).taken_after_s for kind in kinds}
 
 
 def test_of_two_detectors_one_tells_each_verdict_once_whatever_happens_to_it(postgres, tmp_path):

@@ -10,6 +10,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import psycopg
 from cut_line import CutLine
@@ -18,13 +19,13 @@ from shifted_clock import shift_file
 
 from wetwell.protocols.bus.zenoh.link import ZenohBus, open_router
 from wetwell.services.lease.table import Standing, standings
+from wetwell.services.runtime.settings import LeaseSettings
 
 PATIENCE_S = 300.0
-FRESH_S = 1.0
-"""A member that was seen within this time stands by. [s]"""
+TTL_S = LeaseSettings().ttl_s
 WATCHED_S = 2.0
 """So long is looked whether a moved clock changes anything. [s]"""
-FROZEN_ON_S = 0.5
+DOWN_S = 0.5
 """So long after the takeover the former owner stays as it is. [s]"""
 SHIFTED_CLOCK = Path(__file__).with_name("shifted_clock.py")
 
@@ -37,6 +38,20 @@ class Process:
     lines: tuple[CutLine, CutLine]
     clock: Path
     running: subprocess.Popen[bytes] | None = None
+
+
+class Accident(NamedTuple):
+    """What an accident did to a pair.
+
+    `began_s` is by the clock of this process; `is_double`: it met a pair that was not whole; `taken_after_s`: how
+    long until the successor had the lease, 0 where the owner stays; `whole_after_s`: how long after it was undone the
+    pair was whole again, where that was waited for.
+    """
+
+    began_s: float
+    is_double: bool
+    taken_after_s: float
+    whole_after_s: float | None = None
 
 
 class PairSite:
@@ -111,7 +126,7 @@ class PairSite:
         end_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < end_s:
             standing = await self.standings()
-            if standing is not None and standing.now_s < standing.lease.expires_s:
+            if standing is not None and standing.is_owned:
                 name = standing.lease.holder.partition("/")[0]
                 return next(member for member in self.members if member.name == name), standing.lease.token
             await asyncio.sleep(0.05)
@@ -126,13 +141,16 @@ class PairSite:
     async def both_there(self) -> None:
         """Wait until one member owns the role, and all others stand by."""
         async with asyncio.timeout(PATIENCE_S):
-            while True:
-                standing = await self.standings()
-                if standing is not None and standing.now_s < standing.lease.expires_s:
-                    there = {one.holder for one in standing.members if one.age_s < FRESH_S} | {standing.lease.holder}
-                    if len({holder.partition("/")[0] for holder in there}) == len(self.members):
-                        return
+            while not await self.is_whole():  # noqa: ASYNC110 - it is seen in the database
                 await asyncio.sleep(0.1)
+
+    async def is_whole(self) -> bool:
+        """Whether one member owns the role, and all others show that they stand by."""
+        standing = await self.standings()
+        if standing is None or not standing.is_owned:
+            return False
+        there = [standing.lease.holder, *standing.stand_by(TTL_S)]
+        return len({holder.partition("/")[0] for holder in there}) == len(self.members)
 
     def kill(self, member: Process) -> None:
         """Kill a member."""
@@ -145,38 +163,47 @@ class PairSite:
         assert member.running is not None
         member.running.send_signal(sig)
 
-    async def disturb(self, kind: str, shift_s: float = 3600.0, *, is_last: bool = False) -> tuple[float, float]:
+    async def disturb(
+        self,
+        kind: str,
+        shift_s: float = 3600.0,
+        *,
+        down_s: float = DOWN_S,
+        is_undone: bool = True,
+        waits: bool = True,
+    ) -> Accident:
         """Let the owner have an accident, wait for its successor and undo it, until both are there again.
-
-        The last accident is not undone.
 
         Parameters
         ----------
         kind : {"kill", "freeze", "cut", "clock"}
         shift_s : float
             By which its clock is moved then. [s]
-
-        Returns
-        -------
-        tuple of float
-            When it happened [s, clock of this process] and how long after it the successor had the lease [s]; 0 where
-            the owner stays.
+        down_s : float
+            So long after the takeover it is undone. [s]
+        is_undone, waits : bool
+            Whether it is undone at all, and whether to wait then until the pair is whole.
         """
+        is_double = not await self.is_whole()
         owner, token = await self.owner()
         began_s = time.monotonic()
         if kind == "clock":
             shift_file(owner.clock, shift_s)
             await asyncio.sleep(WATCHED_S)
             is_same = (await self.owner())[1] == token
-            return began_s, 0.0 if is_same else time.monotonic() - began_s
+            return Accident(began_s, is_double, 0.0 if is_same else time.monotonic() - began_s)
         undo = self._accident(kind, owner)
         await self.taken_over(token)
         taken_s = time.monotonic() - began_s
-        await asyncio.sleep(FROZEN_ON_S)
-        if not is_last:
+        await asyncio.sleep(down_s)
+        whole_s = None
+        if is_undone:
             undo()
-            await self.both_there()
-        return began_s, taken_s
+            undone_s = time.monotonic()
+            if waits:
+                await self.both_there()
+                whole_s = time.monotonic() - undone_s
+        return Accident(began_s, is_double, taken_s, whole_s)
 
     def _accident(self, kind: str, owner: Process) -> Callable[[], None]:
         if kind == "kill":
