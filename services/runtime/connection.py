@@ -12,12 +12,17 @@ from wetwell.services.security.exposure import check_exposure
 async def connect(settings: Settings) -> ZenohBus:
     """Bus through the router of the settings; waits until it is there.
 
+    A member of a pair looks for it as often as a lease lasts: until it is back, its partner has no second.
+
     Raises
     ------
     ConfigError
         If what shows who this is cannot be read or is not complete.
     """
-    return await connect_client(settings.zenoh.endpoint, access_of(settings.zenoh))
+    endpoint, access, lease = settings.zenoh.endpoint, access_of(settings.zenoh), settings.lease
+    if lease.url is None:
+        return await connect_client(endpoint, access)
+    return await connect_client(endpoint, access, longest_wait_s=lease.ttl_s)
 
 
 def listen(settings: Settings) -> ZenohBus:
