@@ -192,6 +192,8 @@ class ZenohWorker(threading.Thread):
                 page = head and Page.decode(reply.ok.payload.to_bytes(), head.to_bytes())
                 if page:
                     subscription.handle_page(str(reply.ok.key_expr), page, is_from_next=query.stream is not None)
+                    if query.stream is not None:  # it has one source; word that nobody else answers may be lost
+                        return False
         except zenoh.ZError:  # all that were asked have answered
             return False
         finally:

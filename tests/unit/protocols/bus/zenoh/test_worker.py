@@ -15,15 +15,18 @@ KEY = "wetwell/alpha/sample"
 
 
 class Replies:
-    """Answers to one question: some, then the end."""
+    """Answers to one question: some, then the end, if it is not lost."""
 
-    def __init__(self, answers):
+    def __init__(self, answers, *, has_end):
         self._answers = answers
+        self._has_end = has_end
 
     def try_recv(self):
-        if not self._answers:
+        if self._answers:
+            return self._answers.pop(0)
+        if self._has_end:
             raise zenoh.ZError("all have answered")
-        return self._answers.pop(0)
+        return None
 
 
 class Session:
@@ -33,6 +36,7 @@ class Session:
 
     def __init__(self):
         self.reached: list[PublisherCache] = []
+        self.loses_ends = False
 
     def declare_subscriber(self, *_):
         return SimpleNamespace(handler=SimpleNamespace(try_recv=lambda: None))
@@ -46,7 +50,7 @@ class Session:
                 answers.append(
                     SimpleNamespace(ok=SimpleNamespace(payload=Bytes(body), attachment=Bytes(head), key_expr=key))
                 )
-        return Replies(answers)
+        return Replies(answers, has_end=not self.loses_ends)
 
 
 class Bytes:
@@ -110,6 +114,15 @@ def test_what_is_kept_behind_a_link_that_is_away_for_a_while_is_not_given_up(ben
     bench.go_on(6.0)
     assert bench.got == [b"%d" % number for number in range(10)]
     assert bench.subscription.sequencer.lost == 0
+
+
+@pytest.mark.usefixtures("headers")
+def test_an_answer_ends_a_question_to_one_publisher_where_word_of_the_end_is_lost(bench):
+    bench.session.loses_ends = True
+    bench.session.reached.append(bench.publisher)
+    bench.go_on(0.1)
+    assert bench.got == [b"%d" % number for number in range(10)]
+    assert not bench.subscription._questions
 
 
 @pytest.mark.usefixtures("headers")
