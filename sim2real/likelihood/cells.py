@@ -148,7 +148,10 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     )
     counts = np.bincount(of_bin).astype(np.float64)
     noise = np.bincount(of_bin, bins.floor) / counts
-    variance, allowed = noise / counts, np.hypot(np.bincount(of_bin, bins.material) / counts, np.sqrt(1.0 - noise))
+    variance, allowed = (
+        noise / counts,
+        np.hypot(np.bincount(of_bin, bins.material) / counts, np.sqrt(np.maximum(1.0 - noise, 0.0))),
+    )
     in_storm = np.bincount(bins.cycle, bins.regime == MULTI_PUMP) > 0.0
     block_of = (signal * len(REGIMES) + regime)[group]
     blocks = []

@@ -77,6 +77,28 @@ class Observer:
         share = np.where(self.level_gain < BEGUN_ANEW, most / np.maximum(self.level_gain, most), 1.0)
         return replace(self, level_gain=self.level_gain * share, inflow_gain=self.inflow_gain * share**2)
 
+    def left_m(self, gained_m: Floats, misread_m: Floats) -> Floats:
+        r"""What an error of the balance, or of the reading, leaves of itself before each value corrects it.
+
+        $$e_k = e_{k-1} + b_{k-1} + g_k, \qquad i_k = e_k + m_k, \qquad
+        e_k \leftarrow e_k - K_k i_k, \quad b_k = b_{k-1} - K_{b,k} i_k$$
+
+        Parameters
+        ----------
+        gained_m : (n,) array
+            g, by which the level of the replay goes wrong in each second. [m]
+        misread_m : (n,) array
+            m, by which the reading is wrong. [m]
+
+        Returns
+        -------
+        (n,) array
+            i; 0 where there is no value. [m]
+        """
+        left = np.zeros(self.level_m.size)
+        _leave(np.isfinite(self.level_m), self.level_gain, self.inflow_gain, gained_m, misread_m, left)
+        return left
+
 
 def constant_observer(level_m: Floats) -> Observer:
     """Observer of a level of each second under a measured inflow, which follows it with `LEVEL_TIME_S`.
@@ -222,6 +244,20 @@ def _filter(
         both = (1.0 - gain) * (both - of_inflow * level) + gain * of_inflow * noise_m2
         level = (1.0 - gain) ** 2 * level + gain**2 * noise_m2
         last, hidden = k, 0.0
+
+
+@compiled
+def _leave(
+    is_known: Flags, level_gain: Floats, inflow_gain: Floats, gained_m: Floats, misread_m: Floats, left_m: Floats
+) -> None:
+    """Write what an error of the balance or of the reading leaves before each value."""
+    level, inflow = 0.0, 0.0
+    for k in range(is_known.size):
+        level += inflow + gained_m[k]
+        if is_known[k]:
+            left_m[k] = level + misread_m[k]
+            level -= level_gain[k] * left_m[k]
+            inflow -= inflow_gain[k] * left_m[k]
 
 
 def inflow_error_m3h(traces: Traces) -> float:

@@ -51,11 +51,13 @@ class Doubt:
     """Standard deviations of what a right model predicts, in the unit of the signal.
 
     `level_m` (n,) has all that the level may be off, its sensor's noise included, or is None where the observer does
-    not know; `signals` (pumps, n) what moments that the rows do not show leave open, empty where they show all.
+    not know; `signals` (pumps, n) what moments that the rows do not show leave open, empty where they show all;
+    `observer` follows the level.
     """
 
     level_m: Floats | None
     signals: dict[AnalogueQuantity, Floats]
+    observer: Observer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +141,7 @@ class Replay:
         """
         placements = self.traces.drives.placements
         if not placements:
-            return Doubt(level_m=self.observer.deviation_m, signals={})
+            return Doubt(level_m=self.observer.deviation_m, signals={}, observer=self.observer)
         plant = self._plant(self.own)
         early, late, long, short = (
             self._predicted(plant, *self._computed(self.own, plant, placement, self.observer))
@@ -156,7 +158,7 @@ class Replay:
         level_m = self.observer.deviation_m
         if level_m is not None and self.traces.span_s > 1:  # the observer knows of instants only
             level_m = np.hypot(level_m, spread(*(one.level_m for one in (early, late, long, short))))
-        return Doubt(level_m=level_m, signals=signals)
+        return Doubt(level_m=level_m, signals=signals, observer=self.observer)
 
     def _plant(self, acting: Sequence[Effect]) -> PlantParameters:
         plant = plant_parameters(self.station)

@@ -1,4 +1,4 @@
-"""Residuals of flow, head and power of each pump, and of the level."""
+"""Residuals of flow, head and power of each pump."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,9 +12,8 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, REGIMES, START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.seconds import repeated, since_changes, trailing_means
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.observer import LEVEL_TIME_S, level_noise_m
 from wetwell.sim2real.replay.replay import Doubt, Prediction
-from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, NO_PUMP, POWER, Bins, Seconds, binned
+from wetwell.sim2real.residuals.bins import FLOW, HEAD, NO_PUMP, POWER, Bins, Seconds, binned
 from wetwell.sim2real.residuals.noise import BLOCK_S, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import PlantParameters
@@ -22,8 +21,6 @@ from wetwell.simulator.telemetry.channels import channels_of
 
 SIGNAL_OF: dict[AnalogueQuantity, int] = {"flow_m3h": FLOW, "head_m": HEAD, "power_kw": POWER}
 STEADY_BIN_S = 20
-IDLE_LEVEL_BIN_S = 30
-RAMP_LEVEL_BIN_S = 5
 TOLERANCE = 0.0025
 """Share by which a right model may be off: the fit of a curve, the length of a step."""
 ZERO_TOLERANCE = 0.005
@@ -34,12 +31,6 @@ UNRESOLVED_STEP = 0.3
 """Change of a pump's speed from one second to the next, as a share of nominal, that a recording does not resolve."""
 UNRESOLVED = 0.5 * np.exp(-np.arange(5.0))
 """Share of a jump of a signal that is open then, and in the seconds after: it began somewhere within a second."""
-AREA_TOLERANCE = 0.015
-"""Share by which a right area of the wet well may be off at some level: nobody draws ladders and benches."""
-BALANCE_TOLERANCE = 0.004
-"""Share of the rated flow by which a right balance may not close."""
-GAP_S, FORGOTTEN_S = 10, round(2.0 * LEVEL_TIME_S)
-"""Time without rows in which pumps may have been switched unseen; time for which the level shows it then. [s]"""
 MIN_STRETCH_S = 60
 RAMP_ROWS = 4
 """Rows in a ramp from which it is looked at."""
@@ -98,7 +89,7 @@ def pump_residuals(
         What moments that the rows do not show leave open.
     """
     configured = configured_noise(station.sensors)
-    is_step = _steps(traces, plain)
+    is_step = steps(traces, plain)
     is_ramp = (regimes.of_pumps == START_RAMP) | (regimes.of_pumps == STOP_RAMP)
     is_shown = ~is_ramp | shows_ramps(traces, station)
     switched = _switched(traces, plain)
@@ -152,7 +143,7 @@ def _switched(traces: Traces, plain: Prediction) -> Floats:
     return trailing_means(moved, traces.span_s)
 
 
-def _steps(traces: Traces, plain: Prediction) -> Flags:
+def steps(traces: Traces, plain: Prediction) -> Flags:
     """(n,) whether a pump is switched faster than a recording of each second shows."""
     nominal_hz = plain.plant.nominal_frequency_hz[:, None]
     moved = np.abs(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1])) / nominal_hz
@@ -237,78 +228,3 @@ def _usual_size(recorded: Floats, expected: Floats, regime: Integers, is_ramp: F
 def _share(materiality: Materiality, name: AnalogueQuantity) -> float:
     shares = {"flow_m3h": materiality.flow_share, "head_m": materiality.head_share}
     return shares.get(name, materiality.power_share)
-
-
-def level_residuals(
-    traces: Traces,
-    station: Station,
-    regimes: Regimes,
-    plain: Prediction,
-    doubt: Doubt,
-    patterns: Mapping[AnalogueQuantity, Pattern],
-) -> SignalResiduals:
-    """Of the level."""
-    counted = np.isfinite(traces.level_m)
-    counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
-    regime = regimes.of_station
-    is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
-    seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
-    rated_m3h = float(np.max(plain.plant.rated_flow_m3h))
-    off_m = BALANCE_TOLERANCE * rated_m3h / 3600.0 / station.sump.mean_area_m2 * LEVEL_TIME_S
-    flow_m3h = plain.signals["flow_m3h"].sum(axis=0) if "flow_m3h" in plain.signals else np.zeros(regime.size)
-    jumps_m3h = np.abs(np.diff(flow_m3h, prepend=flow_m3h[:1])) * _steps(traces, plain)
-    forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * LEVEL_TIME_S) / LEVEL_TIME_S)
-    open_m = np.convolve(jumps_m3h, forgotten)[: regime.size] / 3600.0 / station.sump.mean_area_m2
-    balance_m = np.hypot(off_m, seconds.means(open_m))
-    noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
-    if doubt.level_m is not None:
-        noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
-        balance_m = np.hypot(balance_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces, regime)[seconds.second]))
-    carried_m = rated_m3h / 3600.0 / station.sump.mean_area_m2 * LEVEL_TIME_S
-    materiality = station.materiality
-    moved_m_s = np.abs(np.diff(plain.level_m, prepend=plain.level_m[:1]))  # before a value corrects it, not after
-    late_m = materiality.time_s * seconds.means(moved_m_s)
-    material_m = np.sqrt(materiality.level_m**2 + (materiality.flow_share * carried_m) ** 2 + late_m**2)
-    deviation_m = np.sqrt(noise_m2 + balance_m**2)
-    return SignalResiduals(
-        bins=seconds.bins(
-            LEVEL,
-            NO_PUMP,
-            regime,
-            regimes.cycle,
-            deviation=deviation_m,
-            floor=noise_m2 / deviation_m**2,
-            tolerance=balance_m / deviation_m,
-            material=material_m / deviation_m,
-        ),
-        name="level_m",
-        pump=NO_PUMP,
-        seconds=seconds,
-        recorded=traces.level_m[seconds.second],
-        is_repeated=repeated(traces.level_m)[seconds.second],
-        pattern=patterns.get("level_m"),
-    )
-
-
-def _after_gaps(is_row: Flags) -> Flags:
-    """(n,) whether rows were missing so lately that the observer of the level has not come back."""
-    place = np.arange(is_row.size)
-    last = np.maximum.accumulate(np.where(is_row, place, 0))
-    ends = np.r_[False, place[1:] - last[:-1] > GAP_S] & is_row
-    since_s = place - np.maximum.accumulate(np.where(ends, place, -FORGOTTEN_S))
-    return np.asarray(since_s < FORGOTTEN_S)
-
-
-def moved_m(traces: Traces, regime: Integers) -> Floats:
-    """(n,) how far the level moves from value to value; 0 between rows. [m].
-
-    In starts and stops it is the mean of all: how far it moved in one says when the pump was switched, and so does
-    its error.
-    """
-    moved = np.zeros(traces.seconds)
-    known = np.flatnonzero(np.isfinite(traces.level_m))
-    moved[known[1:]] = np.abs(np.diff(traces.level_m[known]))
-    for ramp in (START_RAMP, STOP_RAMP):
-        rows = known[regime[known] == ramp]
-        moved[rows] = moved[rows].mean() if rows.size else 0.0
-    return moved

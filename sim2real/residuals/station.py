@@ -11,7 +11,8 @@ from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import Bins, joined
 from wetwell.sim2real.residuals.events import event_residuals
-from wetwell.sim2real.residuals.signals import level_residuals, pump_residuals
+from wetwell.sim2real.residuals.level import level_residuals
+from wetwell.sim2real.residuals.signals import pump_residuals
 from wetwell.sim2real.residuals.telemetry import telemetry_residuals
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from wetwell.sim2real.recording.by_hand import left_alone
 from wetwell.sim2real.recording.drives import Drives
@@ -79,3 +80,34 @@ def test_where_the_well_is_emptied_between_rows_the_level_is_taken_from_them(alp
     observer = forced_observer(traces)
     assert observer.level_m[30] == pytest.approx(0.5 * (traces.level_m[0] + traces.level_m[60]))
     assert np.isinf(observer.deviation_m).all()
+
+
+def test_what_an_error_leaves_follows_from_the_gains():
+    """Against scipy's state space: gains of each second that do not change."""
+    rng = np.random.default_rng(3)
+    gain, of_inflow = 0.1, 0.004
+    observer = replace(
+        constant_observer(np.ones(400)), level_gain=np.full(400, gain), inflow_gain=np.full(400, of_inflow)
+    )
+    gained_m, misread_m = rng.normal(size=(2, 400))
+    matrices = (
+        np.array([[1.0 - gain, 1.0 - gain], [-of_inflow, 1.0 - of_inflow]]),
+        np.array([[1.0 - gain, -gain], [-of_inflow, -of_inflow]]),
+        np.array([[1.0, 1.0]]),
+        np.array([[1.0, 1.0]]),
+    )
+    _, expected, _ = signal.dlsim((*matrices, 1.0), np.column_stack([gained_m, misread_m]))
+    assert observer.left_m(gained_m, misread_m) == pytest.approx(expected[:, 0], abs=1e-9)
+
+
+def test_what_does_not_change_is_taken_for_inflow():
+    observer = replace(constant_observer(np.ones(4000)), inflow_gain=np.full(4000, 1e-4))
+    left_m = observer.left_m(np.full(4000, 1e-3), np.full(4000, 0.05))
+    assert np.max(np.abs(left_m)) > 0.05
+    assert np.max(np.abs(left_m[-100:])) < 1e-6
+
+
+def test_a_second_without_a_level_shows_nothing():
+    level_m = np.ones(10)
+    level_m[4] = np.nan
+    assert np.flatnonzero(constant_observer(level_m).left_m(np.ones(10), np.zeros(10)) == 0.0).tolist() == [4]
