@@ -1,5 +1,7 @@
 """Where the search for some parameters begins: what the recording shows directly."""
 
+from collections.abc import Collection, Sequence
+
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
@@ -8,6 +10,7 @@ from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import POWER, Bins
 from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.power import loaded_power_kw
 
@@ -25,6 +28,8 @@ BENCH = 8.0
 """Exponent of a sump's area with a bench."""
 EDGES = (0.25, 0.5, 0.75)
 """Heights of a bench's edge, as shares of the way from the first stop to the first start."""
+OF_PATTERNS = {"deadband", "quantum_m"}
+"""Parameters that single values show by their pattern."""
 FINER = 4
 """Frequencies between two that the length of the recording tells apart."""
 
@@ -32,15 +37,14 @@ FINER = 4
 def initial_guesses(
     candidate: Candidate, replay: Replay, residuals: StationResiduals, plain: Floats
 ) -> list[dict[str, float]]:
-    """Sets of start values by parameter: what of deadbands, quanta, limits and swings the recording shows."""
-    fixed = dict(candidate.fixed)
-    guess: dict[str, float] = {}
+    """Sets of start values by parameter: what of deadbands, quanta, limits and swings the recording shows.
+
+    There is none for a deadband or a quantum where the values have no such pattern.
+    """
     names = {free.name for free in candidate.free}
-    for pattern in residuals.telemetry.patterns:
-        if "deadband" in names and pattern.deadband > 0.0 and fixed.get("channel") == pattern.quantity:
-            guess["deadband"] = pattern.deadband
-        if "quantum_m" in names and pattern.quantum > 0.0:
-            guess["quantum_m"] = pattern.quantum
+    guess = _seen(names, dict(candidate.fixed).get("channel"), residuals.telemetry.patterns)
+    if names & OF_PATTERNS and not guess:
+        return []
     control, middle_m = replay.station.control, replay.station.middle_level_m
     guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
@@ -63,6 +67,17 @@ def initial_guesses(
         edges_m = [low_m + share * (high_m - low_m) for share in EDGES]
         return [guess, *(guess | bench | {"height_m": edge_m} for edge_m in edges_m)]
     return [guess]
+
+
+def _seen(names: Collection[str], channel: object, patterns: Sequence[Pattern]) -> dict[str, float]:
+    """Deadband or quantum of the patterns of the telemetry."""
+    guess: dict[str, float] = {}
+    for pattern in patterns:
+        if "deadband" in names and pattern.deadband > 0.0 and channel == pattern.quantity:
+            guess["deadband"] = pattern.deadband
+        if "quantum_m" in names and pattern.quantum > 0.0:
+            guess["quantum_m"] = pattern.quantum
+    return guess
 
 
 def _rated_factor(replay: Replay) -> float:
