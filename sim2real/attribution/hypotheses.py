@@ -13,10 +13,11 @@ from wetwell.sim2real.attribution.presence import (
     own_signature,
     strengths_of,
     time_constant_s,
+    unshifted,
 )
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import GOOD, POOR_FORM, Form, no_form
+from wetwell.sim2real.likelihood.covariance import GOOD, LATE, POOR_FORM, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, Member, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
@@ -44,7 +45,8 @@ class Hypothesis:
     is_there : bool
         Whether none of its effects may be neutral, and none that is told could do another's work.
     told : tuple of str
-        Its effects that matter, in order of the alphabet. The others are companions: too small to be told.
+        Its effects that are needed and matter, in order of the alphabet. The others are companions, too small to be
+        told, where each is there.
     """
 
     fit: Fit
@@ -109,7 +111,7 @@ class Hypotheses:
         hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
         found = list(self._each(self._weighed, hopeful))
         is_known = {*self._best, *(one.effects for one in found)}
-        alone = [self._fitter.only(one.fit, one.told) for one in found if one.is_there and one.told not in is_known]
+        alone = [self._fitter.only(one.fit, one.told) for one in found if one.told not in is_known]
         refined = self._each(self._fitter.refine, [fit for fit in alone if fit is not None])
         for one in [*found, *self._each(self._weighed, refined)]:
             known = self._best.get(one.effects)
@@ -159,10 +161,12 @@ class Hypotheses:
             for k, (neutral, signature) in enumerate(zip(strengths_of(fit), signatures, strict=True))
         ]
         found = evidence(cells, residuals, slopes, form, members)
+        needed = are_there(found, [len(one.neutral) for one in members])
         told = [
             member
             for member, (signature, its) in enumerate(zip(signatures, late, strict=True))
-            if not is_only_late(fit, member, self._fitter.station.materiality.time_s)
+            if needed[member]
+            and not is_only_late(fit, member, self._fitter.station.materiality.time_s)
             and self._matters(signature, form, form.late - its)
         ]
         return Hypothesis(
@@ -170,7 +174,7 @@ class Hypotheses:
             evidence=found,
             form=form,
             is_there=None not in fewer
-            and are_there(found, [len(one.neutral) for one in members])
+            and bool(needed.all())
             and self._are_apart(of_member, told, signatures, slopes),
             told=tuple(sorted(fit.names[member] for member in told)),
         )
@@ -207,6 +211,8 @@ class Hypotheses:
     def _matters(self, signature: Floats, form: Form, late: Floats) -> bool:
         """Whether an effect does more in some group than what is allowed, and than the others may have wrong there.
 
+        All of a block is late alike, but for a share: what a shift of the others does is not the effect's own.
+
         Parameters
         ----------
         signature : (cells,) array
@@ -218,5 +224,6 @@ class Hypotheses:
         """
         cells = self._cells
         others = np.maximum(form.signature**2 - signature**2, 0.0)
-        wrong = cells.allowed**2 + late**2 + 2.0 * GOOD.form**2 * others
-        return bool(np.any(cells.group_squares(signature) > cells.group_squares(np.sqrt(wrong))))
+        wrong = cells.allowed**2 + (LATE[-1] * late) ** 2 + 2.0 * GOOD.form**2 * others
+        own = unshifted(cells, signature, late)
+        return bool(np.any(cells.group_squares(own) > cells.group_squares(np.sqrt(wrong))))

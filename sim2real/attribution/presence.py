@@ -5,16 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import gammaincinv
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.fitting import Fit
+from wetwell.sim2real.likelihood.cells import Cells
+from wetwell.sim2real.likelihood.covariance import LATE
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 SURE = 0.95
 """Probability with which the recording must be likelier with an effect than without it."""
 
 
-def are_there(found: Evidence, strengths: Sequence[int]) -> bool:
-    r"""Whether the recording needs each effect of a set: whether it can be neutral is asked of the simulator.
+def are_there(found: Evidence, strengths: Sequence[int]) -> Flags:
+    r"""(effects,) whether the recording needs each effect of a set; the simulator says what is without it.
 
     $$2 \ln \frac{p(z \mid \hat x)}{p(z \mid \hat x_{-i},\ \text{without } i)} > \chi^2_{.95}$$
 
@@ -28,7 +30,7 @@ def are_there(found: Evidence, strengths: Sequence[int]) -> bool:
         How many strengths each effect has: the degrees of freedom of χ².
     """
     quantiles = 2.0 * gammaincinv(np.maximum(strengths, 1) / 2.0, SURE)  # scipy.stats would take .3 s to load
-    return bool(np.all(found.needed > quantiles))
+    return np.asarray(found.needed > quantiles)
 
 
 def strengths_of(fit: Fit) -> list[dict[int, float]]:
@@ -64,6 +66,27 @@ def own_signature(signature: Floats, others: Floats, allowed: Floats) -> Floats:
     """
     change = np.linalg.lstsq(others / allowed[:, None], signature / allowed, rcond=None)[0]
     return np.asarray(signature - others @ change, dtype=np.float64)
+
+
+def unshifted(cells: Cells, signature: Floats, late: Floats) -> Floats:
+    r"""What of an effect's signature is left once the others come early or late in its place, in each block.
+
+    $$f - \hat x t, \qquad \hat x = \arg\min_x \sum_i \left(\frac{f_i - x t_i}{a_i}\right)^2 + x^2$$
+
+    Parameters
+    ----------
+    cells : Cells
+    signature : (cells,) array
+        f, what the effect explains.
+    late : (cells,) array
+        t, change of what the others explain within the time by which they may be early or late.
+    """
+    left = signature.copy()
+    for block in cells.blocks:
+        shift = late[block.rows] / block.allowed
+        along = float(shift @ (signature[block.rows] / block.allowed)) / (LATE[0] ** -2 + float(shift @ shift))
+        left[block.rows] -= along * late[block.rows]
+    return left
 
 
 def time_constant_s(fit: Fit, member: int) -> float:

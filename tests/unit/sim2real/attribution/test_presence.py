@@ -1,10 +1,12 @@
 """Whether an effect is there: the recording needs it, and no other does the same."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import stats
 
-from wetwell.sim2real.attribution.presence import SURE, are_there, own_signature
+from wetwell.sim2real.attribution.presence import SURE, are_there, own_signature, unshifted
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 
@@ -23,14 +25,13 @@ def needed(*squares):
 @pytest.mark.parametrize("strengths", [1, 2, 3])
 def test_an_effect_is_there_where_the_recording_is_surely_likelier_with_it(strengths):
     quantile = stats.chi2.ppf(SURE, strengths)
-    assert are_there(needed(1.001 * quantile), [strengths])
-    assert not are_there(needed(0.999 * quantile), [strengths])
+    assert are_there(needed(1.001 * quantile), [strengths]).all()
+    assert not are_there(needed(0.999 * quantile), [strengths]).any()
 
 
-def test_each_effect_of_a_set_must_be_there():
-    assert are_there(needed(), [])
-    assert are_there(needed(9.0, 9.0), [1, 2])
-    assert not are_there(needed(9.0, 0.0), [1, 1])
+def test_each_effect_of_a_set_is_asked_for_itself():
+    assert are_there(needed(), []).size == 0
+    assert are_there(needed(9.0, 0.0), [1, 2]).tolist() == [True, False]
 
 
 def test_of_two_effects_that_undo_each_other_neither_has_anything_of_its_own():
@@ -42,3 +43,12 @@ def test_of_two_effects_that_undo_each_other_neither_has_anything_of_its_own():
     apart = rng.normal(size=50)
     assert np.linalg.norm(own_signature(apart, -form[:, None], allowed)) > 0.8 * np.linalg.norm(apart)
     assert np.array_equal(own_signature(apart, np.zeros((50, 0)), allowed), apart)
+
+
+def test_what_a_shift_of_the_others_does_in_a_whole_block_is_not_an_effects_own():
+    allowed, late = np.array([1.0, 1.0, 2.0, 1.0]), np.array([30.0, -20.0, 10.0, 0.0])
+    cells = SimpleNamespace(blocks=[SimpleNamespace(rows=np.arange(4), allowed=allowed)])
+    assert np.abs(unshifted(cells, 0.5 * late, late)).max() < 0.02
+    other = np.array([20.0, 30.0, 0.0, 5.0])
+    assert unshifted(cells, other, late) == pytest.approx(other)
+    assert np.abs(unshifted(cells, 50.0 * late, 1e-3 * late) - 50.0 * late).max() < 2.0, "it cannot be that late"
