@@ -13,7 +13,7 @@ from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.intervals import intervals_of
+from wetwell.sim2real.attribution.intervals import are_sized, intervals_of
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
@@ -116,16 +116,20 @@ def attribute(
     search(fitter, trials, hypotheses)
     hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     tested_names = [fit.names[0] for fit in singles]
-    posterior = posterior_of(hypotheses.weights(), len(singles), partial(priors.log_share, tested=tested_names))
-    accepted: Fit | None = None
-    own: Fit | None = None
+    log_share = partial(priors.log_share, tested=tested_names)
     equal: dict[str, tuple[str, ...]] = {}
-    if verdict_of(posterior) == "effect":
-        own = in_order(fitter, hypotheses.of(best_set(posterior)).fit)
-        accepted = informed(fitter, own, priors)
-        equal = equivalents(posterior, accepted.names)
+    while verdict_of(posterior := posterior_of(hypotheses.weights(), len(singles), log_share)) == "effect":
+        names = best_set(posterior)
+        own = in_order(fitter, hypotheses.of(names).fit)
+        own_ends = ends = intervals_of(fitter, own, residuals.bins)
+        if are_sized(own, own_ends):
+            accepted = informed(fitter, own, priors)
+            equal = equivalents(posterior, accepted.names)
+            break
+        hypotheses.rule_out(names)
+    else:
+        accepted, own, own_ends, ends = None, None, np.zeros((0, 2)), np.zeros((0, 2))
     progress(1.0)
-    own_ends = ends = np.zeros((0, 2)) if own is None else intervals_of(fitter, own, residuals.bins)
     if accepted is not None and accepted is not own:
         ends = intervals_of(fitter, accepted, residuals.bins, priors)
     return Attribution(

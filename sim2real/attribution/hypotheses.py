@@ -1,7 +1,7 @@
 """Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,6 +121,11 @@ class Hypotheses:
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
+
+    def rule_out(self, effects: Sequence[str]) -> None:
+        """Take a set for none that may be the answer."""
+        key = tuple(sorted(effects))
+        self._best[key] = replace(self._best[key], is_there=False)
 
     def weights(self) -> list[Weight]:
         """What the posterior is made of."""
