@@ -120,10 +120,10 @@ def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
         return
     last, _ = _read(database, f"{query} DESC", (station,))
     yield from last
-    if first and last:
+    begin_ns, end_ns = (next((row[1] for row in reversed(rows) if _is_sample(row)), None) for rows in (first, last))
+    if begin_ns is not None and end_ns is not None:
         between = f"SELECT {_SAMPLE} FROM sample WHERE station = ? AND time_ns >= ? AND time_ns < ?"  # noqa: S608
-        begin_ns, end_ns = first[-1][1], min(last[-1][1], first[-1][1] + MOST_SKIPPED * HOUR_NS)
-        for hour_ns in range(begin_ns, end_ns, HOUR_NS):
+        for hour_ns in range(begin_ns, min(end_ns, begin_ns + MOST_SKIPPED * HOUR_NS), HOUR_NS):
             yield from _readable(database, between, (station, hour_ns, hour_ns + HOUR_NS))
 
 

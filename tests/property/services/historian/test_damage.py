@@ -15,6 +15,7 @@ from wetwell.services.historian.store.interface import Batch, EventRow, StoreErr
 from wetwell.services.historian.store.live.salvage import damage_of
 
 PAGE = 4096
+SECTOR = 512
 STATIONS = ("alpha", "beta")
 TIMES = 3_000
 
@@ -67,6 +68,13 @@ def torn(content: bytes, dice: random.Random) -> bytes:
     return content[: dice.randrange(1, len(content))]
 
 
+def cleared(content: bytes, dice: random.Random) -> bytes:
+    changed = bytearray(content)
+    place = dice.randrange(len(content) // SECTOR) * SECTOR
+    changed[place : place + SECTOR] = bytes(SECTOR)
+    return bytes(changed)
+
+
 def persistent(act):
     """What the store says, tried again as the historian does."""
     for _ in range(3):
@@ -75,7 +83,7 @@ def persistent(act):
     raise AssertionError("the store does not get over it")
 
 
-@pytest.mark.parametrize("damage", [flipped, misdirected, torn])
+@pytest.mark.parametrize("damage", [flipped, misdirected, torn, cleared])
 @pytest.mark.parametrize("seed", range(12))
 def test_what_is_left_is_what_was_written_and_new_samples_are_kept(content, tmp_path, caplog, damage, seed):
     caplog.set_level(logging.WARNING)
@@ -123,6 +131,23 @@ def test_a_page_that_cannot_be_read_costs_its_own_rows_only(content, tmp_path):
         assert TIMES - 360 - 60 < len(kept) < TIMES
         assert store.damages == 1
         assert (tmp_path / "live.sqlite.refused-1").exists()
+
+
+def test_a_row_without_a_time_beside_a_page_that_cannot_be_read_costs_no_other_rows(content, tmp_path):
+    places = [content.index(sample("alpha", number).time.to_bytes(6, "big")) for number in range(1_000, 2_000)]
+    middle = places[500] // PAGE * PAGE
+    time = next(place for place in places[500::-1] if place // PAGE * PAGE != middle)
+    header = content.rindex(bytes([9, 9, 5]), 0, time)  # of its length, a station that is 1, and a time of six bytes
+    assert header == time - 9
+    changed = bytearray(content)
+    changed[middle : middle + PAGE] = bytes(PAGE)
+    changed[header + 2 : header + 4] = bytes([0, 6])  # no time, and a number of eight bytes
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        with pytest.raises(StoreError, match="malformed"):
+            store.samples("alpha", 0, 2**62)
+        store.write(Batch())
+        assert TIMES - 360 - 60 < len(store.samples("alpha", 0, 2**62)) < TIMES
 
 
 @pytest.mark.parametrize("place", [payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data])
