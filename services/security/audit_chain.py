@@ -116,6 +116,17 @@ def entries_of(path: Path) -> list[dict[str, object]]:
     return [entry for entry in map(entry_in, lines) if entry is not None]
 
 
+def whole_entries_of(path: Path) -> list[dict[str, object]]:
+    """What the lines of an audit say that are what was written; nothing where it cannot be read."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return []
+    broken = set(broken_among(lines))
+    entries = [entry_in(line) for number, line in enumerate(lines, start=1) if number not in broken]
+    return [entry for entry in entries if entry is not None]
+
+
 def entry_in(line: str) -> dict[str, object] | None:
     """What a line says; None if it is damaged."""
     try:

@@ -162,6 +162,16 @@ class Archive:
                 count += 1
         return count
 
+    def put_aside_damaged_ledgers(self) -> int:
+        """Put the lists of daily files aside that are not what was written, and tell it; how many."""
+        count = 0
+        for station in self._ledger.stations():
+            damage = self._ledger.put_aside_damaged(station)
+            if damage:
+                log.error("station '%s': its list of daily files is put aside: %s", station, "; ".join(damage))
+                count += 1
+        return count
+
     def look_at(self, form: Form, station: str, day_ns: int) -> int:
         """Put the file of a day aside if it cannot be read; tell it once if it is another one; how many damages."""
         if self.put_aside_damaged(form, station, day_ns):

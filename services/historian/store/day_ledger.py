@@ -4,8 +4,9 @@ The file `days/NAME-days.jsonl` gets a line with the SHA-256 of a daily file whe
 is deleted. Files of an earlier version come into it when they are looked through for the first time.
 """
 
+import contextlib
 import logging
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +14,7 @@ from wetwell.protocols.errors import RecordingError
 from wetwell.protocols.timestamps import to_iso
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.runtime.clock import now_ns
-from wetwell.services.security.audit_chain import damage_in, entries_of
+from wetwell.services.security.audit_chain import damage_in, end_of, entries_of, whole_entries_of
 from wetwell.services.security.chain_file import ChainFile
 from wetwell.services.security.file_sum import file_sum
 
@@ -49,28 +50,42 @@ class DayLedger:
         StoreError
             If it cannot be written, or the file cannot be read.
         """
-        path = self._path(station)
-        entry: dict[str, object] = {"time": to_iso(now_ns()), "act": act, "file": self._name(file)}
+        entry: dict[str, object] = {"act": act, "file": self._name(file)}
         try:
             if act in {"write", "find"}:
                 entry["sha256"] = file_sum(file)
-            path.parent.mkdir(exist_ok=True)
-            self._chains.setdefault(station, ChainFile(path)).append(entry)
-        except RecordingError as error:
-            raise StoreError(str(error)) from error
+            self._append(station, entry)
         except OSError as error:
-            raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from error
+            raise StoreError(f"{self._path(station)}: cannot be written: {error.strerror or error}") from error
 
     def expected(self, station: str) -> dict[Path, str]:
         """Files that must be there, with their SHA-256."""
-        sums: dict[Path, str] = {}
-        for entry in entries_of(self._path(station)):
-            file = self._folder / str(entry.get("file", ""))
-            if "sha256" in entry:
-                sums[file] = str(entry["sha256"])
-            else:
-                sums.pop(file, None)
-        return sums
+        return self._expected(entries_of(self._path(station)))
+
+    def put_aside_damaged(self, station: str) -> list[str]:
+        """Put the ledger of a station aside if it is not what was written; what is wrong with it.
+
+        A new one begins with what the lines say that are still what was written.
+
+        Raises
+        ------
+        StoreError
+            If it cannot be read or written.
+        """
+        path = self._path(station)
+        try:
+            damage = damage_in(path)
+            if damage:
+                expected = self._expected(whole_entries_of(path))
+                for each in (path, end_of(path)):
+                    with contextlib.suppress(FileNotFoundError):
+                        each.replace(each.with_name(f"{each.name}.refused"))
+                self._chains.pop(station, None)
+                for file, sha256 in expected.items():
+                    self._append(station, {"act": "find", "file": self._name(file), "sha256": sha256})
+        except OSError as error:
+            raise StoreError(f"{path}: cannot be put aside: {error.strerror or error}") from error
+        return damage
 
     def missing(self, station: str) -> list[Path]:
         """Files that must be there and are not."""
@@ -107,6 +122,25 @@ class DayLedger:
             except OSError as error:
                 told.append(f"{file}: cannot be read: {error.strerror or error}")
         return told
+
+    def _append(self, station: str, entry: dict[str, object]) -> None:
+        path = self._path(station)
+        path.parent.mkdir(exist_ok=True)
+        try:
+            self._chains.setdefault(station, ChainFile(path)).append({"time": to_iso(now_ns()), **entry})
+        except RecordingError as error:
+            raise StoreError(str(error)) from error
+
+    def _expected(self, entries: Iterable[dict[str, object]]) -> dict[Path, str]:
+        """Files that must be there by some lines."""
+        sums: dict[Path, str] = {}
+        for entry in entries:
+            file = self._folder / str(entry.get("file", ""))
+            if "sha256" in entry:
+                sums[file] = str(entry["sha256"])
+            else:
+                sums.pop(file, None)
+        return sums
 
     def _path(self, station: str) -> Path:
         return self._folder / "days" / f"{station}{_SUFFIX}"

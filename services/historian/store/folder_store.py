@@ -226,7 +226,7 @@ class FolderStore:
             for day_ns in self.live.days_ns(span.station, -(2**63), 2**63 - 1):
                 self.live.put_aside_damaged(span.station, day_ns, day_ns + DAY_NS)
                 yield
-        self._refused_files += self.archive.missing()
+        self._refused_files += self.archive.put_aside_damaged_ledgers() + self.archive.missing()
         yield
         for station in self.archive.stations():
             for form in get_args(Form):

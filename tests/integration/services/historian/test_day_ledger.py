@@ -102,6 +102,33 @@ def test_a_line_that_is_missing_in_the_ledger_shows(folder, damage):
     assert told.endswith("lines at its end are lost" if damage == "cut" else "line 3 is not what was written")
 
 
+@pytest.mark.parametrize("damage", ["remove", "cut", "change", "all"])
+def test_a_damaged_ledger_is_put_aside_and_told_once_and_goes_on_with_its_whole_lines(folder, caplog, damage):
+    ledger = folder / "days" / "alpha-days.jsonl"
+    lines = ledger.read_text().splitlines()
+    left = {
+        "remove": [*lines[:2], *lines[3:]],
+        "cut": lines[:-1],
+        "change": [lines[0].replace("write", "wrote"), *lines[1:]],
+        "all": [],
+    }[damage]
+    ledger.write_text("".join(f"{line}\n" for line in left))
+    assert scrubbed(folder) == 1
+    assert "its list of daily files is put aside" in caplog.text
+    assert ledger.with_name(f"{ledger.name}.refused").exists()
+    assert Archive(folder).damage() == []
+    assert len(DayLedger(folder).expected("alpha")) == 8
+    assert scrubbed(folder) == 0
+
+
+def test_a_file_that_is_missing_beside_a_damaged_ledger_shows(folder):
+    ledger = folder / "days" / "alpha-days.jsonl"
+    lines = ledger.read_text().splitlines()
+    ledger.write_text("".join(f"{line}\n" for line in [*lines[:2], "", *lines[2:]]))
+    min((folder / "samples" / "station=alpha").iterdir()).unlink()
+    assert scrubbed(folder) == 2
+
+
 def test_what_was_deleted_for_its_age_or_became_minutes_is_not_missing(tmp_path):
     with contextlib.closing(FolderStore(tmp_path, downsample_after_days=4, keep_days=8)) as store:
         write(store, range(12))
