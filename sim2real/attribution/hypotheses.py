@@ -45,8 +45,7 @@ class Hypothesis:
     is_there : bool
         Whether none of its effects may be neutral, and none that is told could do another's work.
     told : tuple of str
-        Its effects that are needed and matter, in order of the alphabet. The others are companions, too small to be
-        told, where each is there.
+        Its effects that matter, in order of the alphabet. The others are companions: too small to be told.
     """
 
     fit: Fit
@@ -111,7 +110,7 @@ class Hypotheses:
         hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
         found = list(self._each(self._weighed, hopeful))
         is_known = {*self._best, *(one.effects for one in found)}
-        alone = [self._fitter.only(one.fit, one.told) for one in found if one.told not in is_known]
+        alone = [self._fitter.only(one.fit, one.told) for one in found if one.is_there and one.told not in is_known]
         refined = self._each(self._fitter.refine, [fit for fit in alone if fit is not None])
         for one in [*found, *self._each(self._weighed, refined)]:
             known = self._best.get(one.effects)
@@ -166,12 +165,10 @@ class Hypotheses:
             for k, (neutral, signature) in enumerate(zip(strengths_of(fit), signatures, strict=True))
         ]
         found = evidence(cells, residuals, slopes, form, members)
-        needed = are_there(found, [len(one.neutral) for one in members])
         told = [
             member
             for member, (signature, its) in enumerate(zip(signatures, late, strict=True))
-            if needed[member]
-            and not is_only_late(fit, member, self._fitter.station.materiality.time_s)
+            if not is_only_late(fit, member, self._fitter.station.materiality.time_s)
             and self._matters(signature, form, form.late - its)
         ]
         return Hypothesis(
@@ -179,7 +176,7 @@ class Hypotheses:
             evidence=found,
             form=form,
             is_there=None not in fewer
-            and bool(needed.all())
+            and are_there(found, [len(one.neutral) for one in members])
             and self._are_apart(of_member, told, signatures, slopes),
             told=tuple(sorted(fit.names[member] for member in told)),
         )

@@ -19,8 +19,6 @@ HALF_SCAN_S = 0.5
 """Least half width of a time: a sample may stand for the begin or the end of its second."""
 FORM = (0.01, 0.03)
 """Least half width, as a share of the way from neutral, where a name fixes the equation, and where it does not."""
-WHOLE = 0.95
-"""Share of its range from which an interval spans it: what is even over the range has it in that of 95 %."""
 STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 0.8)
 """Steps to such ends, as shares of the way to neutral, or of as far on the other side."""
 
@@ -82,8 +80,8 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
 def are_sized(fit: Fit, ends: Floats) -> bool:
     """Whether the recording says how large each effect of a fit is.
 
-    The interval of an only strength must neither hold neutral nor span the range. Those of several may: one may act
-    alone, and wear by head takes the place of wear by leak.
+    The interval of an only strength must not hold neutral, as that of all its range does. Those of several may: one
+    may act alone, and wear by head takes the place of wear by leak.
 
     Parameters
     ----------
@@ -101,7 +99,7 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
         ]
         if len(strengths) == 1:
             neutral, low, high = strengths[0]
-            if low <= neutral <= high or high - low >= WHOLE:
+            if low <= neutral <= high:
                 return False
         first += len(candidate.free)
     return True

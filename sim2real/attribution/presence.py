@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import gammaincinv
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import LATE
@@ -15,8 +15,8 @@ SURE = 0.95
 """Probability with which the recording must be likelier with an effect than without it."""
 
 
-def are_there(found: Evidence, strengths: Sequence[int]) -> Flags:
-    r"""(effects,) whether the recording needs each effect of a set; the simulator says what is without it.
+def are_there(found: Evidence, strengths: Sequence[int]) -> bool:
+    r"""Whether the recording needs each effect of a set: whether it can be neutral is asked of the simulator.
 
     $$2 \ln \frac{p(z \mid \hat x)}{p(z \mid \hat x_{-i},\ \text{without } i)} > \chi^2_{.95}$$
 
@@ -30,7 +30,7 @@ def are_there(found: Evidence, strengths: Sequence[int]) -> Flags:
         How many strengths each effect has: the degrees of freedom of χ².
     """
     quantiles = 2.0 * gammaincinv(np.maximum(strengths, 1) / 2.0, SURE)  # scipy.stats would take .3 s to load
-    return np.asarray(found.needed > quantiles)
+    return bool(np.all(found.needed > quantiles))
 
 
 def strengths_of(fit: Fit) -> list[dict[int, float]]:

@@ -11,8 +11,8 @@ MOST_EFFECTS = 4
 def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
     """Weigh sets of effects until no neighbour of the most probable one is left to try.
 
-    Greedy choices are taken back: each effect of a set makes room for every other, the rest kept, and then for two
-    others at once. A set may have a companion that is too small to be told.
+    Greedy choices are taken back: each effect of a set makes room for every other, the rest kept. A set may have a
+    companion that is too small to be told.
 
     Parameters
     ----------
@@ -28,15 +28,11 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
         if len(best.names) > 1:
             bases += [base for k in range(len(best.names)) if (base := fitter.without(best, k)) is not None]
         bases = [base for base in bases if frozenset(base.names) not in tried]
+        if not bases:
+            return
         for base in bases:
             tried.add(frozenset(base.names))
             hypotheses.add(trials.with_one_more(base))
-        if bases:
-            continue
-        found = trials.with_two_more(best, MOST_EFFECTS)
-        if not found:
-            return
-        hypotheses.add(found)
 
 
 def in_order(fitter: Fitter, fit: Fit) -> Fit:

@@ -1,7 +1,6 @@
 """The effects of the library, tried one by one: alone, and beside others."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -23,20 +22,6 @@ LEAST_PROMISED = 10.0
 """Drop of the sum of squares under which a further effect is not fitted: it could not pay for its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
-MOST_PAIRS = 2
-"""Pairs of further effects that are fitted, the most promising first."""
-LEAST_APART = 1e-3
-"""Share of a change that another one cannot do, by its square, under which both are the same."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pair:
-    """Two effects beside a fit, the (fitted bins,) change that the second makes, and the drop that both promise."""
-
-    beside: Fit
-    candidates: tuple[Candidate, Candidate]
-    change: Floats
-    promise: float
 
 
 class Trials:
@@ -64,7 +49,6 @@ class Trials:
         self._guesses = guesses
         self._progress = progress
         self._each = each
-        self._pairs: list[Pair] = []
 
     def singles(self) -> list[Fit]:
         """Single effects, each with the pump or channel that fits best; the best effect first."""
@@ -95,13 +79,10 @@ class Trials:
         """Fits of the current effects with one more, the most promising ones, each as the pump or channel it fits."""
         fitter = self._fitter
         reach = fitter.reach(current)
-        before = current.residuals[fitter.rows]
-        free = [candidate for candidate in self._guesses if candidate.name not in current.names]
-        changes = list(self._each(lambda candidate: self._changes(candidate, current, reach), free))
-        self._pairs += pairs_of(free, changes, current, before)
+        free = [c for c in self._guesses if c.name not in current.names]
+        promises = list(self._each(lambda candidate: self._promise(candidate, current, reach), free))
         promising: dict[str, tuple[float, Candidate]] = {}
-        for candidate, its in zip(free, changes, strict=True):
-            promise = float(np.max(np.maximum(-(before @ its), 0.0), initial=0.0)) ** 2
+        for promise, candidate in zip(promises, free, strict=True):
             if promise > max(LEAST_PROMISED, promising.get(candidate.name, (0.0, candidate))[0]):
                 promising[candidate.name] = (promise, candidate)
         likely = [one for _, one in sorted(promising.values(), key=lambda pair: -pair[0])][:MOST_FITTED]
@@ -110,34 +91,6 @@ class Trials:
         )
         firsts = [fit for fit, _ in sorted(tried, key=lambda start: start[1]) if fit is not None]
         return list(self._each(partial(self._refined, current), firsts[:MOST_REFINED]))
-
-    def with_two_more(self, best: Fit, most: int) -> list[Fit]:
-        """Fits of sets that were tried with one more, with two more, where these promise more than the best explains.
-
-        Two effects that only explain together what one of another kind does by half are found by no single step.
-
-        Parameters
-        ----------
-        best : Fit
-        most : int
-            Effects of a set.
-        """
-        fitter, least = self._fitter, self._fitter.cost(best)
-
-        def fitted(pair: Pair) -> Fit | None:
-            first, second = pair.candidates
-            both = np.column_stack([fitter.reach(pair.beside), pair.change])
-            fit, _ = fitter.first(first, self._start_grids(first), pair.beside, both)
-            if fit is not None:
-                fit, _ = fitter.first(second, self._start_grids(second), fit, fitter.reach(fit))
-            return None if fit is None else fitter.refine(fit)
-
-        def may_be_better(pair: Pair) -> bool:
-            return len(pair.beside.names) + 2 <= most and fitter.cost(pair.beside) - pair.promise < least
-
-        chosen = [pair for pair in self._pairs if may_be_better(pair)]
-        self._pairs = [pair for pair in self._pairs if not may_be_better(pair)]
-        return [fit for fit in self._each(fitted, chosen) if fit is not None]
 
     def _refined(self, current: Fit, fit: Fit) -> Fit:
         """A fit with one more effect, refined: where it ends worse than without that, from another start.
@@ -159,52 +112,19 @@ class Trials:
         grids = [grid for guess in self._guesses[candidate] for grid in candidate.start_grids(guess, strengths)]
         return list({b"".join(point.tobytes() for point in grid): grid for grid in grids}.values())
 
-    def _changes(self, candidate: Candidate, current: Fit, reach: Floats) -> Floats:
-        """(fitted bins, trials) unit changes of the residuals that small trials of each strength make.
+    def _promise(self, candidate: Candidate, current: Fit, reach: Floats) -> float:
+        """Drop of the sum of squares that small trials of each strength promise, as if all were linear.
 
         What the current effects can reach they are fitted to again: a lag gives way to the inertia beside it.
         """
         rows = self._fitter.rows
         before = current.residuals[rows]
-        found = []
+        most = 0.0
         for start in (point for grid in self._start_grids(candidate, PROBES) for point in grid):
             tried = self._fitter.at((*current.candidates, candidate), (*current.points, start))
             if tried is not None:
                 change = tried.residuals[rows] - before
                 change -= reach @ (reach.T @ change)
-                found.append(change / max(float(np.linalg.norm(change)), 1e-6))
-        return np.array(found).reshape(-1, before.size).T
-
-
-def pairs_of(candidates: Sequence[Candidate], changes: Sequence[Floats], beside: Fit, before: Floats) -> list[Pair]:
-    r"""The most promising pairs of effects, as if all were linear.
-
-    $$\max_{x_1, x_2 > 0} \; |r|^2 - |r + x_1 c_1 + x_2 c_2|^2$$
-
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-    changes : sequence of (fitted bins, trials) array
-        Unit changes c of each candidate.
-    beside : Fit
-        What they act beside.
-    before : (fitted bins,) array
-        Residuals r without them.
-    """
-    columns = np.concatenate(changes, axis=1)
-    owner = np.repeat(np.arange(len(candidates)), [one.shape[1] for one in changes])
-    along, alike = -(before @ columns), columns.T @ columns
-    apart = np.maximum(1.0 - alike**2, LEAST_APART)
-    steps = (along[:, None] - alike * along) / apart
-    gains = np.where((steps > 0.0) & (steps.T > 0.0) & (alike**2 < 1.0 - LEAST_APART), steps * along[:, None], 0.0)
-    gains = np.triu(gains + gains.T)
-    found: dict[frozenset[str], Pair] = {}
-    for k in np.argsort(-gains, axis=None):
-        i, j = divmod(int(k), owner.size)
-        if len(found) == MOST_PAIRS or gains[i, j] < LEAST_PROMISED:
-            break
-        pair = candidates[owner[i]], candidates[owner[j]]
-        names = frozenset(one.name for one in pair)
-        if len(names) == 2 and names not in found:
-            found[names] = Pair(beside=beside, candidates=pair, change=columns[:, j], promise=float(gains[i, j]))
-    return list(found.values())
+                along = max(-float(change @ before), 0.0)
+                most = max(most, along**2 / max(float(change @ change), 1e-12))
+        return most

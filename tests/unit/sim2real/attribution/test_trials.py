@@ -5,9 +5,9 @@ import pytest
 
 from wetwell.sim2real.attribution.attribution import halves
 from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.trials import Trials, pairs_of
+from wetwell.sim2real.attribution.trials import Trials
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -40,18 +40,3 @@ def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start()
     assert fitter.cost(both) < 0.5 * fitter.cost(alone)
     (limit,) = (effect for effect in both.effects if effect.name == "flow_low_cutoff")
     assert limit.cutoff_m3h == pytest.approx(truth.deviations[1].parameters["cutoff_m3h"], rel=0.06)
-
-
-def test_two_effects_that_explain_only_together_are_a_pair():
-    """Each undoes nearly all that the other does: alone they explain little, and a third one more."""
-    first, beside, third = np.eye(200)[:3]
-    second = beside * 0.1 - first * np.sqrt(0.99)
-    before = -(1000.0 * first + 1000.0 * second + 20.0 * third)
-    assert max(-before @ first, -before @ second) < -before @ third
-    beside = Fit(candidates=(), points=(), residuals=before)
-    candidates = [candidates_of(1, 1, only=[name])[0] for name in ("friction_bias", "motor_slip", "air_pocket")]
-    best, *_ = pairs_of(candidates, [first[:, None], second[:, None], third[:, None]], beside, before)
-    assert best.candidates == tuple(candidates[:2])
-    assert best.promise == pytest.approx(1000.0**2 * np.sum((first + second) ** 2))
-    turned = pairs_of(candidates, [first[:, None], -second[:, None], third[:, None]], beside, before)
-    assert all(candidates[1] not in pair.candidates for pair in turned), "a strength has one way"
