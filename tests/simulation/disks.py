@@ -1,4 +1,4 @@
-"""What disks do to files: bits that flip, writes that go astray, writes that were never made, copies brought back."""
+"""What disks do to files: bits that flip, blocks that are gone, writes astray or never made, copies brought back."""
 
 import random
 import shutil
@@ -7,6 +7,8 @@ from pathlib import Path
 
 PAGE = 4096
 """What a disk writes at once, and a page of SQLite. [byte]"""
+SECTOR = 512
+"""The least that a disk writes. [byte]"""
 FLIPPED = (1, 1, 4, 32)
 """Bits that flip at once."""
 _NOT_DATA = ("-shm", ".at", ".part", ".lock")
@@ -29,7 +31,7 @@ def flip_bits(folder: Path, dice: random.Random) -> Path | None:
     sizes = [file.stat().st_size for file in files]
     path = dice.choice(files) if dice.random() < 0.5 else dice.choices(files, sizes)[0]
     size = path.stat().st_size
-    begin, end = dice.choice(((0, size), (0, min(PAGE, size)), (max(0, size - PAGE), size)))
+    begin, end = _part_of(size, dice)
     with path.open("r+b") as file:
         for _ in range(dice.choice(FLIPPED)):
             place = dice.randrange(begin, end)
@@ -65,6 +67,49 @@ def misdirect(folder: Path, dice: random.Random) -> Path | None:
     return path
 
 
+def clear(folder: Path, dice: random.Random) -> Path | None:
+    """Let a block of a file be gone: nothing but zeros is read there. None if there is no file."""
+    files = files_of(folder)
+    if not files:
+        return None
+    path, block = dice.choice(files), dice.choice((SECTOR, PAGE))
+    size = path.stat().st_size
+    place = dice.randrange(*_part_of(size, dice)) // block * block
+    _overwrite(path, place, bytes(min(block, size - place)))
+    return path
+
+
+def lose_write(copy: Path, folder: Path, dice: random.Random) -> Path | None:
+    """Let a block of a file be as it was in a copy: what was written there never was. None if nothing was."""
+    files = [file for file in files_of(folder) if (copy / file.relative_to(folder)).is_file()]
+    size = dice.choice((SECTOR, PAGE))
+    changed = [(file, blocks) for file in files if (blocks := _changed(copy / file.relative_to(folder), file, size))]
+    if not changed:
+        return None
+    path, blocks = dice.choice(changed)
+    _overwrite(path, *dice.choice((blocks[0], dice.choice(blocks), blocks[-1])))
+    return path
+
+
+def _part_of(size: int, dice: random.Random) -> tuple[int, int]:
+    """All of a file, or the page at an end of it, where what tells of the rest stands."""
+    return dice.choice(((0, size), (0, min(PAGE, size)), (max(0, size - PAGE), size)))
+
+
+def _changed(before: Path, after: Path, size: int) -> list[tuple[int, bytes]]:
+    """Place of each block that has another content now, and what was there before, as far as both have it."""
+    old, new = before.read_bytes(), after.read_bytes()
+    places = range(0, min(len(old), len(new)), size)
+    blocks = ((place, old[place : min(place + size, len(new))]) for place in places)
+    return [(place, block) for place, block in blocks if new[place : place + len(block)] != block]
+
+
+def _overwrite(path: Path, place: int, content: bytes) -> None:
+    with path.open("r+b") as file:
+        file.seek(place)
+        file.write(content)
+
+
 def backup_of(folder: Path) -> Path:
     """A copy of a folder, as it is in this moment."""
     copy = Path(tempfile.mkdtemp(prefix="backup-", dir=_place_of_copies(folder)))
@@ -73,10 +118,11 @@ def backup_of(folder: Path) -> Path:
     return copy
 
 
-def bring_back(copy: Path, folder: Path) -> None:
-    """A copy in the place of a folder."""
+def bring_back(copy: Path, folder: Path) -> bool:
+    """A copy in the place of a folder: it is another one now."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(copy, folder)
+    return True
 
 
 class LyingDisk:

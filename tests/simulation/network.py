@@ -44,6 +44,8 @@ class Network:
     ----------
     sent : dict
         All that was given to a bus on some keys, whether or not it got out.
+    places : dict
+        Key and place there of each time that something was given, by what it was.
     """
 
     dice: random.Random
@@ -51,12 +53,19 @@ class Network:
     doubles: float = 0.01
     buses: "list[SimulatedBus]" = field(default_factory=list)
     sent: dict[str, list[Sent]] = field(default_factory=dict)
+    places: dict[bytes, list[tuple[str, int]]] = field(default_factory=dict)
 
     def join(self, name: str) -> "SimulatedBus":
         """Connection of a process."""
         bus = SimulatedBus(self, name)
         self.buses.append(bus)
         return bus
+
+    def note(self, key: str, sent: Sent) -> None:
+        """Remember what was given to a bus."""
+        all_sent = self.sent.setdefault(key, [])
+        self.places.setdefault(sent.payload, []).append((key, len(all_sent)))
+        all_sent.append(sent)
 
 
 class Cache:
@@ -127,7 +136,7 @@ class SimulatedBus:
         """Send a message to all who listen."""
         if not self.is_alive:
             return
-        self._network.sent.setdefault(key, []).append(Sent(payload, _now_s(), self))
+        self._network.note(key, Sent(payload, _now_s(), self))
         number = self.caches[key].add(payload)
         for bus in self._network.buses:
             for subscription in bus._subscriptions:

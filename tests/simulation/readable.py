@@ -5,16 +5,21 @@ import shutil
 import sqlite3
 import tempfile
 from collections.abc import Iterator
+from functools import lru_cache
+from itertools import repeat
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
+from wetwell.protocols.recordings.origin import Origin
+from wetwell.services.historian.store.live.connection import UNREADABLE
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
 
-Readable = dict[str, set[tuple[int, int]]]
-"""Time and number of samples, by station."""
+Row = tuple[str, int, int]
+"""Station, time and number of a sample."""
 _ROWS = (
     "SELECT name, s.time_ns, s.seq, s.quality, s.size, s.data, s.station, s.crc "
     "FROM sample AS s JOIN station ON id = s.station"
@@ -22,53 +27,96 @@ _ROWS = (
 _ORDERS = ("s.station, s.time_ns, s.seq", "s.station DESC, s.time_ns DESC, s.seq DESC")
 
 
-def readable_in(folder: Path) -> Readable:
-    """Samples of a folder that are what was written, whether its historian goes on or begins again.
+class Stock(NamedTuple):
+    """What a history has.
 
-    One that goes on sees its log as it remembers it; one that begins again only as far as that is whole.
+    Attributes
+    ----------
+    samples : set of (str, int, int)
+        Samples that are what was written.
+    messages : set of bytes
+        Verdicts, alarms and so on that can be read, changed or not.
+    is_whole : bool
+        Whether SQLite finds nothing wrong in the database.
     """
+
+    samples: set[Row]
+    messages: set[bytes]
+    is_whole: bool
+
+
+def stock_of(folder: Path) -> Stock:
+    """Stock of a folder, as its historian sees it: one that goes on knows its log as it remembers it."""
     path = folder / "live.sqlite"
-    found = _filed(folder)
+    filed = _filed(folder)
     if not path.exists():
-        return found
-    with tempfile.TemporaryDirectory(dir=folder.parent) as place:
+        return Stock(filed, set(), is_whole=True)
+    view = _going_on(path) if path.with_name("live.sqlite-shm").exists() else _beginning(path)
+    return Stock(filed | view.samples, view.messages, view.is_whole)
+
+
+def readable_in(folder: Path) -> set[Row]:
+    """Samples that can be read whether the historian of a folder goes on or begins again."""
+    path = folder / "live.sqlite"
+    rows = _beginning(path).samples if path.exists() else set()
+    if path.with_name("live.sqlite-shm").exists():
+        rows &= _going_on(path).samples
+    return _filed(folder) | rows
+
+
+def _going_on(path: Path) -> "_View":
+    return _View(f"{path.absolute().as_uri()}?mode=ro")
+
+
+def _beginning(path: Path) -> "_View":
+    """One who begins again sees the log only as far as that is whole."""
+    with tempfile.TemporaryDirectory(dir=path.parent.parent) as place:
         for suffix in ("", "-wal"):
             with contextlib.suppress(FileNotFoundError):
                 shutil.copyfile(f"{path}{suffix}", f"{place}/live.sqlite{suffix}")
-        views = [_rows(f"{place}/live.sqlite")]
-    if path.with_name("live.sqlite-shm").exists():
-        views.append(_rows(f"{path.absolute().as_uri()}?mode=ro"))
-    for name, *key in set.intersection(*views):
-        found.setdefault(name, set()).add(tuple(key))
-    return found
+        return _View(f"{place}/live.sqlite")
 
 
-def _rows(place: str) -> set[tuple[str, int, int]]:
-    """Samples that can be read from either end of a database."""
-    found: set[tuple[str, int, int]] = set()
-    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(place, uri=True)) as database:
-        database.text_factory = lambda content: content.decode(errors="replace")
-        for order in _ORDERS:
-            with contextlib.suppress(sqlite3.Error):
-                for name, time_ns, seq, quality, size, data, station, crc in database.execute(
-                    f"{_ROWS} ORDER BY {order}"
-                ):
-                    if size == 1 and is_sample_intact(station, time_ns, seq, quality, size, data, crc):
-                        found.add((name, time_ns, seq))
-    return found
+class _View:
+    """A database as one connection sees it."""
+
+    def __init__(self, place: str) -> None:
+        self.samples: set[Row] = set()
+        self.messages: set[bytes] = set()
+        self.is_whole = False
+        with contextlib.suppress(*UNREADABLE), contextlib.closing(sqlite3.connect(place, uri=True)) as database:
+            database.text_factory = lambda content: content.decode(errors="replace")
+            with contextlib.suppress(*UNREADABLE):
+                self.is_whole = database.execute("PRAGMA integrity_check(1)").fetchall() == [("ok",)]
+            with contextlib.suppress(*UNREADABLE):
+                self.messages.update(payload for (payload,) in database.execute("SELECT payload FROM event"))
+            for order in _ORDERS[: 1 if self.is_whole else 2]:
+                with contextlib.suppress(*UNREADABLE):
+                    self.samples.update(_intact(database.execute(f"{_ROWS} ORDER BY {order}")))
 
 
-def _filed(folder: Path) -> Readable:
+def _intact(rows: sqlite3.Cursor) -> Iterator[Row]:
+    for name, time_ns, seq, quality, size, data, station, crc in rows:
+        if size == 1 and is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+            yield name, time_ns, seq
+
+
+def _filed(folder: Path) -> set[Row]:
     """Samples in daily files that are whole and stand in their place."""
-    found: Readable = {}
-    for path in sorted(folder.glob("samples/station=*/*.parquet")):
-        with contextlib.suppress(OSError, ValueError, KeyError, pa.ArrowException):
-            found.setdefault(path.parent.name.removeprefix("station="), set()).update(_stamps(path))
+    found: set[Row] = set()
+    for path in folder.glob("samples/station=*/*.parquet"):
+        station = path.parent.name.removeprefix("station=")
+        found |= _rows_of(path.read_bytes(), station, path.stem)
     return found
 
 
-def _stamps(path: Path) -> Iterator[tuple[int, int]]:
-    table = pa.parquet.ParquetFile(path, page_checksum_verification=True).read()
-    time_ns = table["time"].cast(pa.int64()).to_numpy()
-    is_of_day = (time_ns.astype("datetime64[ns]").astype("datetime64[D]") == np.datetime64(path.stem)).all()
-    return zip(time_ns.tolist(), table["seq"].to_pylist(), strict=True) if is_of_day else iter(())
+@lru_cache(maxsize=100)
+def _rows_of(content: bytes, station: str, day: str) -> frozenset[Row]:
+    """Samples of a daily file; none if it is not that of a station and a day."""
+    with contextlib.suppress(OSError, ValueError, KeyError, pa.ArrowException):
+        table = pa.parquet.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
+        time_ns = table["time"].cast(pa.int64()).to_numpy()
+        days = time_ns.astype("datetime64[ns]").astype("datetime64[D]")
+        if Origin.of_metadata(table.schema.metadata or {}).station == station and (days == np.datetime64(day)).all():
+            return frozenset(zip(repeat(station), time_ns.tolist(), table["seq"].to_pylist()))
+    return frozenset()

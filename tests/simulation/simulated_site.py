@@ -17,10 +17,11 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
-from accidents import SLOW_S, Plan, happen
+from accidents import SLOW_S, Plan
+from acts import happen
 from judged import Judged
 from network import Network, Sent, SimulatedBus
-from readable import Readable, readable_in
+from readable import Row, Stock, readable_in, stock_of
 from simulated_plc import SimulatedPlc
 from virtual_loop import LIFE, Life
 
@@ -58,7 +59,7 @@ HOURS = 24
 """A life begins at one of these of the day: the earlier, the later there is a day that becomes a file."""
 EARLIER_DAYS, EARLIER_S = 2, 1_800
 """The history of a site has samples of so many days before its life, one in so many seconds."""
-MAINTAIN_S = (1_800, 7_200)
+MAINTAIN_S = (3_600, 7_200)
 COMMIT_PERIODS = (0.5, 2.0)
 CHECKPOINT_PERIODS = (6.0, 60.0)
 """How often things are done at a site, of which a seed has rolled one; in periods of the poll."""
@@ -72,6 +73,8 @@ EARLIER_AT_S = -1.0
 """When what was before the life was sent."""
 LOOK_S = 60.0
 """Between the looks of the alarms at what is silent: often against samples of a light site."""
+STOCK_S = 3_600.0
+"""So often somebody looks at what the history has."""
 LATE_S = 60.0
 """So long somebody listens then who comes new."""
 
@@ -86,11 +89,20 @@ class Span(NamedTuple):
 
 
 class Harm(NamedTuple):
-    """What was done to the files of a daemon, and when."""
+    """What was done to the files of a daemon, and when; samples of a history that could be read afterwards."""
 
     kind: str
     name: str
     at_s: float
+    readable: set[Row]
+
+
+class Stocktaking(NamedTuple):
+    """What the history had at a time, and what was done to its files last before it."""
+
+    at_s: float
+    stock: Stock
+    harm: Harm | None
 
 
 class Told(NamedTuple):
@@ -234,14 +246,14 @@ class Site:
         What has happened, in order.
     spans, harms : list
         When what could not work, and what was done to files.
+    stocks : list
+        What the history had from time to time, and before its files were harmed.
     crashes : list of str
         Errors of the program itself that have ended a daemon, and pairs that worked on one folder.
     told_late : set of (str, str)
         Alarms that one hears of who comes at the end, by station and id.
     verdicts_late : set of bytes
         Verdicts that one hears of who comes at the end.
-    readable : dict
-        Samples of the history that could be read when its files were harmed last, by station.
     log : list of Told
         What the operator was told by the logs.
     judged : Judged
@@ -261,11 +273,11 @@ class Site:
     accidents: list[str] = field(default_factory=list)
     spans: list[Span] = field(default_factory=list)
     harms: list[Harm] = field(default_factory=list)
+    stocks: list[Stocktaking] = field(default_factory=list)
     crashes: list[str] = field(default_factory=list)
     log: list[Told] = field(default_factory=list)
     told_late: set[tuple[str, str]] = field(default_factory=set)
     verdicts_late: set[bytes] = field(default_factory=set)
-    readable: Readable = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.dice = random.Random(self.seed)
@@ -311,7 +323,7 @@ class Site:
             for process in self.processes.values():
                 process.start_again()
             async with asyncio.TaskGroup() as group:
-                group.create_task(asyncio.sleep(self.seconds - 0.5 * self.period_s))
+                group.create_task(self._take_stock_often(), name="stock")
                 group.create_task(happen(self, self.plan), name="accidents")
             await self.processes["gateway"].stop()
             await asyncio.sleep(QUIET_S)
@@ -322,6 +334,13 @@ class Site:
             for name in ("detector", "alarms", "historian"):
                 await self.processes[name].stop()
             await observer.kill()
+
+    async def _take_stock_often(self) -> None:
+        """Until the last sample."""
+        end_s = self.seconds - 0.5 * self.period_s
+        while _now_s() < end_s:
+            await asyncio.sleep(min(STOCK_S, end_s - _now_s()))
+            self.take_stock()
 
     @contextlib.contextmanager
     def heard(self) -> Iterator[None]:
@@ -355,11 +374,24 @@ class Site:
         yield
         self.spans.append(Span(what, name, begin_s, _now_s()))
 
-    def harm(self, kind: str, name: str) -> None:
-        """Note what was done to the files of a daemon."""
-        self.harms.append(Harm(kind, name, _now_s()))
+    def harm(self, kind: str, name: str, act: Callable[[Path], bool]) -> None:
+        """Let something be done to the files of a daemon, and note it if it was."""
+        folder = self.folder_of(name)
         if name == "historian":
-            self.readable = readable_in(self.folder_of(name))
+            self.take_stock()
+        if act(folder):
+            readable = readable_in(folder) if name == "historian" else set()
+            self.harms.append(Harm(kind, name, _now_s(), readable))
+
+    def take_stock(self) -> None:
+        """Note what the history has now."""
+        harms = self.harms_of("historian")
+        stock = stock_of(self.folder_of("historian"))
+        self.stocks.append(Stocktaking(_now_s(), stock, harms[-1] if harms else None))
+
+    def harms_of(self, name: str) -> list[Harm]:
+        """What was done to the files of a daemon."""
+        return [harm for harm in self.harms if harm.name == name]
 
     def _feed(self, number: int, station: Station) -> Recording:
         recording = Simulation(station, self.scenario, self.seed * 1000 + number).advance(self.seconds, truth=False)
@@ -379,9 +411,8 @@ class Site:
                 columns = {column: values[:count] for column, values in plc.recording.columns.items()}
                 samples = list(Recording(time_ns=time_ns, columns=columns).samples(name))
                 store.write(Batch([pack(name, sample) for sample in samples]))
-                self.network.sent[sample_key(name)] = [
-                    Sent(sample.encode(), EARLIER_AT_S, gone) for sample in samples
-                ]
+                for sample in samples:
+                    self.network.note(sample_key(name), Sent(sample.encode(), EARLIER_AT_S, gone))
 
     async def _poll(self, bus: SimulatedBus) -> None:
         plcs = [simulated.plc for simulated in self.plcs.values()]

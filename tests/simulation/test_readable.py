@@ -29,14 +29,14 @@ def history(tmp_path):
     return tmp_path / "history", samples
 
 
-def keys(samples) -> set[tuple[int, int]]:
-    return {(sample.time, sample.seq) for sample in samples}
+def keys(samples) -> set[tuple[str, int, int]]:
+    return {("alpha", sample.time, sample.seq) for sample in samples}
 
 
 def test_all_of_a_whole_history_can_be_read_in_files_and_database(history):
     folder, samples = history
     assert list(folder.glob("samples/*/*.parquet"))
-    assert readable_in(folder) == {"alpha": keys(samples)}
+    assert readable_in(folder) == keys(samples)
 
 
 def test_a_row_with_a_bit_that_flipped_cannot_be_read_and_the_others_can(history):
@@ -44,12 +44,22 @@ def test_a_row_with_a_bit_that_flipped_cannot_be_read_and_the_others_can(history
     content = bytearray((folder / "live.sqlite").read_bytes())
     content[content.index(pack("alpha", samples[-1]).data) + 3] ^= 1
     (folder / "live.sqlite").write_bytes(content)
-    assert readable_in(folder) == {"alpha": keys(samples[:-1])}
+    assert readable_in(folder) == keys(samples[:-1])
 
 
 def test_a_daily_file_in_the_place_of_another_day_cannot_be_read(history):
     folder, samples = history
     file = min(folder.glob("samples/*/*.parquet"))
     file.replace(file.with_name("2031-01-01.parquet"))
-    day = {sample for sample in keys(samples) if sample[0] < DAY_NS}
-    assert readable_in(folder) == {"alpha": keys(samples) - day}
+    day = {sample for sample in keys(samples) if sample[1] < DAY_NS}
+    assert readable_in(folder) == keys(samples) - day
+
+
+def test_a_daily_file_in_the_place_of_that_of_another_station_cannot_be_read(history):
+    folder, samples = history
+    file = min(folder.glob("samples/*/*.parquet"))
+    other = folder / "samples" / "station=beta"
+    other.mkdir()
+    file.replace(other / file.name)
+    day = {sample for sample in keys(samples) if sample[1] < DAY_NS}
+    assert readable_in(folder) == keys(samples) - day

@@ -102,7 +102,7 @@ def test_a_defect_breaks_a_rule_that_holds_without_it(folder, name):
     patches, accidents = DEFECTS[name]
     plan = tuple(sorted(accidents, key=lambda accident: accident.at_s))
     with contextlib.ExitStack() as defect:
-        defect.enter_context(mock.patch("accidents.flip_bits", flip_bit_of_row))
+        defect.enter_context(mock.patch("acts.flip_bits", flip_bit_of_row))
         assert broken_rules(light_site(3, 1, 1.0, 300, folder / "without", plan)) == []
         for patch in patches:
             defect.enter_context(patch)

@@ -57,9 +57,9 @@ class Way:
         return free_s if end_s - free_s >= self._least_s else None
 
 
-def until_s(site: Site, sent: Sequence[Sent], place: int) -> float:
-    """Until when a sample can be had from its sender: it dies, or keeps newer ones in its place."""
+def until_s(sent: Sequence[Sent], place: int, history: int) -> float:
+    """Until when a message can be had from its sender: it dies, or keeps so many newer ones."""
     one = sent[place]
-    newer = sent[place + site.kept_samples] if place + site.kept_samples < len(sent) else None
+    newer = sent[place + history] if place + history < len(sent) else None
     expires_s = newer.at_s if newer is not None and newer.bus is one.bus else float("inf")
     return min(one.bus.died_s, expires_s)
