@@ -9,7 +9,7 @@ from network import Sent
 from offers import EVER_S, NEVER_S, Offers, harms_s
 from published import Key, begin_of, keys_of, published_by, samples_of, until_gone_s
 from readable import Row
-from simulated_site import EARLIER_AT_S, Site, Stocktaking
+from simulated_site import EARLIER_AT_S, MOST_ASKED, Answer, Site, Stocktaking
 from windows import until_s
 
 from wetwell.protocols.bus.keys import alarm_key
@@ -20,8 +20,6 @@ from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, StoreError, day_of
 from wetwell.services.historian.summary import TEN_NS, Summary
 
-MOST = 1_000_000
-"""Messages of a kind that are asked for."""
 TINY = 1e-9
 """By which a mean of equal values may differ from them."""
 
@@ -68,37 +66,45 @@ def _at_the_end(site: Site, published: dict[str, dict[Key, Sent]]) -> Iterator[s
     for station, sent in published.items():
         try:
             samples = store.samples(station, 0, MAX_STAMP_NS)
-            verdicts = store.events("verdicts", station, 0, MAX_STAMP_NS, MOST)
+            verdicts = store.events("verdicts", station, 0, MAX_STAMP_NS, MOST_ASKED)
         except StoreError as error:
             if not harms:
                 yield f"{station}: its history cannot be read: {error}"
             continue
         kept = keys_of(samples)
         wanted = samples_of(station, sent)
-        yield from _as_published(station, samples, kept, wanted)
+        for answer in [*(one for one in site.answers if one.station == station), Answer(station, samples, verdicts)]:
+            yield from _as_told(site, answer, wanted)
         yield from _as_summed_up(station, store, wanted)
         yield from _lost_samples(site, station, set(kept), sent, stretch)
         if harms:
             yield from _given_up(harms[-1].readable, {(station, *key) for key in kept}, {station: sent})
         if not is_told and not is_told_since(site, first_s):
             yield from _lost_unsaid(site, station, set(kept), sent, stretch)
-        if len(verdicts) != len(set(verdicts)) or set(verdicts) - site.told.get(station, {}).keys():
-            yield f"{station}: the history has verdicts twice, or some that nobody told"
         yield from _lost_verdicts(site, station, verdicts, stretch)
     yield from _lost_alarms(site, store, stretch)
     store.close()
 
 
+def _as_told(site: Site, answer: Answer, wanted: Samples) -> Iterator[str]:
+    """What is given out is what was told, each once."""
+    station, samples, verdicts = answer
+    yield from _as_published(station, samples, keys_of(samples), wanted)
+    if len(verdicts) != len(set(verdicts)) or set(verdicts) - site.told.get(station, {}).keys():
+        yield f"{station}: the history has verdicts twice, or some that nobody told"
+
+
 def _as_published(station: str, samples: Samples, keys: list[Key], wanted: Samples) -> Iterator[str]:
-    """What is kept is what was published, each once, with its values."""
+    """Samples are those that were published, with their values."""
     if len(keys) != len(set(keys)):
         yield f"{station}: {len(keys) - len(set(keys))} samples were kept twice"
     places = {key: place for place, key in enumerate(keys_of(wanted))}
+    rows = [places.get(key, -1) for key in keys]
     pumps = max(samples.pumps, wanted.pumps)
-    for key, values in zip(keys, samples.padded(pumps), strict=True):
-        if key not in places or not np.array_equal(values, wanted.padded(pumps)[places[key]], equal_nan=True):
-            yield f"{station}: sample {key[1]} of {key[0]} ns was kept, but never published like that"
-            return
+    given, meant = samples.padded(pumps), wanted.padded(pumps)[rows]
+    is_same = ((given == meant) | (np.isnan(given) & np.isnan(meant))).all(axis=1) & (np.array(rows) >= 0)
+    for key in [key for key, same in zip(keys, is_same.tolist(), strict=True) if not same][:1]:
+        yield f"{station}: sample {key[1]} of {key[0]} ns was kept, but never published like that"
 
 
 def _as_summed_up(station: str, store: FolderStore, wanted: Samples) -> Iterator[str]:
@@ -188,7 +194,7 @@ def _lost_verdicts(site: Site, station: str, kept: Collection[bytes], stretch: S
 def _lost_alarms(site: Site, store: FolderStore, stretch: Stretch) -> Iterator[str]:
     for station, name in site.alarms:
         try:
-            kept = store.events("alarms", station, 0, MAX_STAMP_NS, MOST)
+            kept = store.events("alarms", station, 0, MAX_STAMP_NS, MOST_ASKED)
         except StoreError:
             continue  # told as that of the samples
         yield from _lost_alarm(site, station, name, kept, stretch)

@@ -5,8 +5,8 @@ from windows import MARGIN_S, Way, blocked
 
 NEVER_S = float("-inf")
 EVER_S = float("inf")
-LOOKS = 6
-"""So often the historian looks through a part of what it keeps until it has seen all of it."""
+PARTS = 60
+"""More than all that the historian looks through, of which it takes some in each pause."""
 
 
 def harms_s(site: Site) -> tuple[float, float]:
@@ -22,14 +22,14 @@ def commit_s(site: Site) -> float:
 
 def looked_through_s(site: Site) -> float:
     """In which the historian has looked through all that it keeps, if nothing keeps it from that."""
-    return LOOKS * site.settings.historian.maintain_s + MARGIN_S
+    return PARTS / site.scrubbed_at_once * site.settings.historian.maintain_s + MARGIN_S
 
 
 class Offers:
     """When the historian can take what was sent: at once, or anew after its files were harmed.
 
     It takes anew what publishers keep when it begins, when it has told that something is damaged, and when it has had
-    the time to find that.
+    the time to find that. What it took while something was damaged, and not yet told, may be lost with it.
 
     Parameters
     ----------
@@ -42,7 +42,6 @@ class Offers:
     """
 
     def __init__(self, site: Site, sender: str, harmed_s: float, until_s: float = EVER_S) -> None:
-        self._last_s = harmed_s
         self._until_s = until_s
         self._way = Way(site, sender, "historian", commit_s(site))
         looked_s = looked_through_s(site)
@@ -54,13 +53,17 @@ class Offers:
             if told.logger.startswith("wetwell.services.historian.store")
             and not any(begin_s <= told.at_s <= end_s for begin_s, end_s in full)
         ]
+        self._settled_s = max((at_s for at_s in told if harmed_s <= at_s <= until_s), default=harmed_s)
+        self._is_found = not any(until_s <= at_s <= until_s + looked_s for at_s in told)
         begun = [span.end_s for span in site.spans if (span.what, span.name) == ("away", "historian")]
         found = [] if searched is None else [searched + looked_s]
-        self._again_s = min((at_s for at_s in [*begun, *told, *found] if at_s >= harmed_s), default=EVER_S)
+        self._again_s = min((at_s for at_s in [*begun, *told, *found] if at_s >= self._settled_s), default=EVER_S)
 
     def could_be_kept(self, at_s: float, end_s: float) -> bool:
         """Whether what was sent then, and could be had until the end, could be kept for good."""
-        return self.was_open(at_s if at_s >= self._last_s else self._again_s, end_s)
+        if at_s < self._settled_s:
+            return self.was_open(self._again_s, end_s)
+        return self._is_found and self.was_open(at_s, end_s)
 
     def was_open(self, at_s: float, end_s: float) -> bool:
         """Whether it could be kept at all, whatever became of it."""

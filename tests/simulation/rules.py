@@ -151,7 +151,7 @@ def _alarmed(site: Site, station: str, last: dict[int, Verdict]) -> Iterator[str
         if faults is None or sum(time_ns >= verdict.time for time_ns in times_ns) != 1:
             continue
         changes = site.alarms.get((station, f"pump{pump}.pump_fault"), [])
-        if changes and _said_s(site, changes[-1]) <= harmed_s:
+        if changes and _said_s(site, changes)[-1] <= harmed_s:
             continue
         is_standing = bool(changes) and changes[-1].is_active
         if is_standing != any(fault.asset == f"pump:{pump}" for fault in faults):
@@ -175,16 +175,16 @@ def _alarms(site: Site) -> Iterator[str]:
     odd_s = harmed_s + [accident.at_s for accident in site.plan if accident.kind.startswith("clock")]
     full = blocked(site.spans, ["machine"], ["full"])
     for (station, name), changes in site.alarms.items():
-        whole = [change for change in changes if _said_s(site, change) < min(harmed_s, default=EVER_S)]
+        said_s = _said_s(site, changes)
+        whole = [change for change, at_s in zip(changes, said_s, strict=True) if at_s < min(harmed_s, default=EVER_S)]
         raised = [change.raised for change in whole if change.raised is not None]
         if any(later < earlier - step_ns for earlier, later in pairwise(raised)):
             yield f"{station}: alarm {name} goes back in time"
-        for before, after in pairwise(changes):
+        for (before, before_s), (after, after_s) in pairwise(zip(changes, said_s, strict=True)):
             if before.is_active and after.is_active and after.raised != before.raised and not is_harmed:
                 yield f"{station}: alarm {name} is raised twice"
             if not is_raised_anew(before, after):
                 continue
-            before_s, after_s = _said_s(site, before), _said_s(site, after)
             is_kept = all(end_s < before_s or begin_s > after_s for begin_s, end_s in full)
             if is_kept and after_s < min(odd_s, default=site.seconds):
                 yield f"{station}: alarm {name} is raised anew for what has returned"
@@ -201,10 +201,15 @@ def _alarms(site: Site) -> Iterator[str]:
             yield f"{station.name}: pump faults {sorted(faulty - alarmed)} raised no alarm"
 
 
-def _said_s(site: Site, alarm: Alarm) -> float:
-    """When an alarm was told like that first. [s]"""
-    sent = site.network.sent[alarm_key(alarm.station, alarm.id)]
-    return min(one.at_s for one in sent if one.payload == alarm.encode())
+def _said_s(site: Site, changes: Sequence[Alarm]) -> list[float]:
+    """When each change of an alarm was told, one after the other: alarms that begin anew may tell one again. [s]"""
+    times_s: list[float] = []
+    for change in changes:
+        last_s = times_s[-1] if times_s else NEVER_S
+        sent = site.network.sent[alarm_key(change.station, change.id)]
+        told_s = (one.at_s for one in sent if one.payload == change.encode())
+        times_s.append(min((at_s for at_s in told_s if at_s >= last_s), default=last_s))
+    return times_s
 
 
 def is_raised_anew(before: Alarm, after: Alarm) -> bool:
@@ -220,7 +225,7 @@ def _told_late(site: Site) -> Iterator[str]:
         return
     in_the_way = blocked(site.spans, ["alarms", "machine"], ["mute", "stalled", "full", "slow"])
     for (station, name), changes in site.alarms.items():
-        is_free = all(end_s < _said_s(site, changes[-1]) - MARGIN_S for _, end_s in in_the_way)
+        is_free = all(end_s < _said_s(site, changes)[-1] - MARGIN_S for _, end_s in in_the_way)
         if changes[-1].is_active and is_free and (station, name) not in site.told_late:
             yield f"{station}: alarm {name} stands, and who comes late does not hear of it"
 

@@ -32,16 +32,17 @@ from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms import daemon as alarms_daemon
 from wetwell.services.detector.daemon import judge_alone
 from wetwell.services.detector.station_detector import VERDICT_HISTORY
 from wetwell.services.gateway import daemon as gateway_daemon
 from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.rows import pack
+from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import Batch, StoreError
+from wetwell.services.historian.store.interface import Batch, Store, StoreError
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.settings import (
@@ -60,6 +61,8 @@ HOURS = 24
 EARLIER_DAYS, EARLIER_S = 2, 1_800
 """The history of a site has samples of so many days before its life, one in so many seconds."""
 MAINTAIN_S = (3_600, 7_200)
+SCRUBBED_AT_ONCE = (2, 10)
+"""Parts of a history that are looked through in each pause: few of all, as at a site of many stations, or many."""
 COMMIT_PERIODS = (0.5, 2.0)
 CHECKPOINT_PERIODS = (6.0, 60.0)
 """How often things are done at a site, of which a seed has rolled one; in periods of the poll."""
@@ -73,8 +76,11 @@ EARLIER_AT_S = -1.0
 """When what was before the life was sent."""
 LOOK_S = 60.0
 """Between the looks of the alarms at what is silent: often against samples of a light site."""
+IS_ASKED = 0.5
+"""Share of sites in which somebody asks for all that is kept: what is read shows, and is mended, earlier."""
 STOCK_S = 3_600.0
 """So often somebody looks at what the history has."""
+MOST_ASKED = 1_000_000
 LATE_S = 60.0
 """So long somebody listens then who comes new."""
 
@@ -103,6 +109,14 @@ class Stocktaking(NamedTuple):
     at_s: float
     stock: Stock
     harm: Harm | None
+
+
+class Answer(NamedTuple):
+    """What the historian gives out of a station."""
+
+    station: str
+    samples: Samples
+    verdicts: list[bytes]
 
 
 class Told(NamedTuple):
@@ -248,6 +262,8 @@ class Site:
         When what could not work, and what was done to files.
     stocks : list
         What the history had from time to time, and before its files were harmed.
+    answers : list
+        What the historian gave out then, where somebody asks.
     crashes : list of str
         Errors of the program itself that have ended a daemon, and pairs that worked on one folder.
     told_late : set of (str, str)
@@ -274,6 +290,7 @@ class Site:
     spans: list[Span] = field(default_factory=list)
     harms: list[Harm] = field(default_factory=list)
     stocks: list[Stocktaking] = field(default_factory=list)
+    answers: list[Answer] = field(default_factory=list)
     crashes: list[str] = field(default_factory=list)
     log: list[Told] = field(default_factory=list)
     told_late: set[tuple[str, str]] = field(default_factory=set)
@@ -286,6 +303,9 @@ class Site:
         self.full = self.slow = 0
         self.clock_s = 0.0
         self.kept_samples = self.dice.choice(KEPT_SAMPLES)
+        self.is_asked = self.dice.random() < IS_ASKED
+        self.store: Store | None = None
+        self.scrubbed_at_once = self.dice.choice(SCRUBBED_AT_ONCE)
         self.start_ns = FIRST_DAY_NS + self.dice.randrange(HOURS) * 3_600 * NS_PER_S
         self.settings = Settings(
             health=HealthSettings(period_s=60.0 * self.period_s),
@@ -341,6 +361,16 @@ class Site:
         while _now_s() < end_s:
             await asyncio.sleep(min(STOCK_S, end_s - _now_s()))
             self.take_stock()
+            if self.is_asked and self.store is not None:
+                self._ask(self.store)
+
+    def _ask(self, store: Store) -> None:
+        """What cannot be read now is not answered."""
+        for station in self.stations:
+            with contextlib.suppress(StoreError):
+                samples = store.samples(station.name, 0, MAX_STAMP_NS)
+                verdicts = store.events("verdicts", station.name, 0, MAX_STAMP_NS, MOST_ASKED)
+                self.answers.append(Answer(station.name, samples, verdicts))
 
     @contextlib.contextmanager
     def heard(self) -> Iterator[None]:
@@ -425,11 +455,13 @@ class Site:
         kept = self.settings.historian
         with open_store(kept) as store:
             historian = Historian(store, spool_rows=kept.spool_rows)
+            self.store = store
             try:
                 await historian_daemon.keep(
                     bus, historian, kept.commit_s, kept.maintain_s, self.settings.health.period_s
                 )
             finally:
+                self.store = None if self.store is store else self.store
                 historian.commit(now_ns())
 
     async def _alarm(self, bus: SimulatedBus) -> None:
@@ -496,6 +528,7 @@ class Site:
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
                 ("wetwell.services.runtime.sample_sender.LEAST_KEPT", self.kept_samples),
+                ("wetwell.services.historian.service.SCRUBBED_AT_ONCE", self.scrubbed_at_once),
                 ("wetwell.services.alarms.daemon.LOOK_S", LOOK_S),
                 ("wetwell.services.alarms.daemon.SAVE_S", 60.0 * self.period_s),
                 ("wetwell.services.runtime.state_file.atomic_file", file),
