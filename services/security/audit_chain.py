@@ -69,7 +69,7 @@ def broken_lines(path: Path) -> list[int]:
     """
     if not path.exists():
         return []
-    return broken_among(path.read_text(encoding="utf-8", errors="replace").splitlines())
+    return broken_among(_lines(path))
 
 
 def broken_among(lines: Iterable[str]) -> list[int]:
@@ -109,22 +109,29 @@ def end_found(path: Path) -> tuple[str, bool]:
 
 def entries_of(path: Path) -> list[dict[str, object]]:
     """What the lines of an audit say, but for damaged ones; nothing where it cannot be read."""
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return []
-    return [entry for entry in map(entry_in, lines) if entry is not None]
+    return _entries(_lines_if_any(path))
 
 
 def whole_entries_of(path: Path) -> list[dict[str, object]]:
     """What the lines of an audit say that are what was written; nothing where it cannot be read."""
+    lines = _lines_if_any(path)
+    broken = set(broken_among(lines))
+    return _entries(line for number, line in enumerate(lines, start=1) if number not in broken)
+
+
+def _entries(lines: Iterable[str]) -> list[dict[str, object]]:
+    return [entry for entry in map(entry_in, lines) if entry is not None]
+
+
+def _lines_if_any(path: Path) -> list[str]:
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        return _lines(path)
     except OSError:
         return []
-    broken = set(broken_among(lines))
-    entries = [entry_in(line) for number, line in enumerate(lines, start=1) if number not in broken]
-    return [entry for entry in entries if entry is not None]
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8", errors="replace").splitlines()
 
 
 def entry_in(line: str) -> dict[str, object] | None:
@@ -140,6 +147,5 @@ def _links(path: Path) -> list[str]:
     """Links of all lines that have one."""
     if not path.exists():
         return []
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    links = (entry.get(LINK) for entry in map(entry_in, lines) if entry is not None)
+    links = (entry.get(LINK) for entry in _entries(_lines(path)))
     return [link for link in links if isinstance(link, str)]
