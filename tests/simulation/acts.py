@@ -150,19 +150,12 @@ async def _lie(site: "Site", _accident: Accident, dice: random.Random) -> AsyncI
 
 
 @contextlib.asynccontextmanager
-async def _full(site: "Site", _accident: Accident, _dice: random.Random) -> AsyncIterator[None]:
-    with site.span("full", "machine"):
-        site.full += 1
+async def _strain(site: "Site", accident: Accident, _dice: random.Random) -> AsyncIterator[None]:
+    """The disk of the machine is full, or slow."""
+    with site.span(accident.kind, "machine"):
+        site.strains[accident.kind] += 1
         yield
-        site.full -= 1
-
-
-@contextlib.asynccontextmanager
-async def _slow(site: "Site", _accident: Accident, _dice: random.Random) -> AsyncIterator[None]:
-    with site.span("slow", "machine"):
-        site.slow += 1
-        yield
-        site.slow -= 1
+        site.strains[accident.kind] -= 1
 
 
 @contextlib.asynccontextmanager
@@ -212,8 +205,8 @@ _ACTS: Mapping[str, Callable[["Site", Accident, random.Random], contextlib.Abstr
     "stale": _stale,
     "power": _kill,
     "lie": _lie,
-    "full": _full,
-    "slow": _slow,
+    "full": _strain,
+    "slow": _strain,
     "plc": _plc,
     "clock": _clock,
     "clock-restart": _clock_restart,

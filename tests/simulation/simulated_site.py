@@ -9,6 +9,7 @@ import contextlib
 import contextvars
 import logging
 import random
+from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -300,7 +301,7 @@ class Site:
         self.dice = random.Random(self.seed)
         self.network = Network(self.dice)
         self.judged = Judged()
-        self.full = self.slow = 0
+        self.strains: Counter[str] = Counter()
         self.clock_s = 0.0
         self.kept_samples = self.dice.choice(KEPT_SAMPLES)
         self.is_asked = self.dice.random() < IS_ASKED
@@ -393,7 +394,7 @@ class Site:
     @property
     def disk_s(self) -> float:
         """How long a write waits for the disk. [s]"""
-        return SLOW_S if self.slow else 0.0
+        return SLOW_S if self.strains["slow"] else 0.0
 
     @contextlib.contextmanager
     def span(self, what: str, name: str) -> Iterator[None]:
@@ -508,7 +509,7 @@ class Site:
 
         def is_lost() -> bool:
             life = LIFE.get()
-            return self.full > 0 or (life is not None and life.is_dead)
+            return self.strains["full"] > 0 or (life is not None and life.is_dead)
 
         def keep(store: FolderStore, batch: Batch) -> int:
             if is_lost():
