@@ -50,7 +50,7 @@ class Fit:
         return np.concatenate(self.points) if self.points else np.zeros(0)
 
     def split(self, position: Floats) -> tuple[Floats, ...]:
-        """Points of the candidates in a position."""
+        """Rows of each candidate, of points or of what there is for each parameter."""
         return tuple(np.split(position, np.cumsum([point.size for point in self.points])[:-1]))
 
 

@@ -226,6 +226,6 @@ class Hypotheses:
         """
         cells = self._cells
         others = np.maximum(form.signature**2 - signature**2, 0.0)
-        wrong = cells.allowed**2 + (LATE[-1] * late) ** 2 + 2.0 * GOOD.form**2 * others
+        wrong = cells.allowed**2 + (LATE[2] * late) ** 2 + 2.0 * GOOD.form**2 * others
         own = unshifted(cells, signature, late)
         return bool(np.any(cells.group_squares(own) > cells.group_squares(np.sqrt(wrong))))

@@ -6,6 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.testable import OF_TELEMETRY
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import POWER, Bins
@@ -28,8 +29,6 @@ BENCH = 8.0
 """Exponent of a sump's area with a bench."""
 EDGES = (0.25, 0.5, 0.75)
 """Heights of a bench's edge, as shares of the way from the first stop to the first start."""
-OF_PATTERNS = {"deadband", "quantum_m"}
-"""Parameters that single values show by their pattern."""
 FINER = 4
 """Frequencies between two that the length of the recording tells apart."""
 
@@ -43,7 +42,7 @@ def initial_guesses(
     """
     names = {free.name for free in candidate.free}
     guess = _seen(names, dict(candidate.fixed).get("channel"), residuals.telemetry.patterns)
-    if names & OF_PATTERNS and not guess:
+    if candidate.name in OF_TELEMETRY and not guess:
         return []
     control, middle_m = replay.station.control, replay.station.middle_level_m
     guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}

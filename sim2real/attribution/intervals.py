@@ -89,19 +89,14 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
     ends : (parameters, 2) array
         As `intervals_of` makes them.
     """
-    first = 0
-    for candidate in fit.candidates:
-        its = ends[first : first + len(candidate.free)]
-        strengths = [
-            (free.normalised(free.neutral), low, high)
+    for candidate, its in zip(fit.candidates, fit.split(ends), strict=False):  # of no candidates it is one empty part
+        may_be_neutral = [
+            low <= free.normalised(free.neutral) <= high
             for free, (low, high) in zip(candidate.free, its, strict=True)
             if free.neutral is not None
         ]
-        if len(strengths) == 1:
-            neutral, low, high = strengths[0]
-            if low <= neutral <= high:
-                return False
-        first += len(candidate.free)
+        if may_be_neutral == [True]:
+            return False
     return True
 
 
