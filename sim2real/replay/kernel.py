@@ -25,6 +25,7 @@ def replay_seconds(
     measured_level_m: Floats,
     level_gain: Floats,
     inflow_gain: Floats,
+    sensor_gain: Floats,
     is_inlet_shut: Flags,
     span_s: int,
     truth: Truth,
@@ -51,7 +52,9 @@ def replay_seconds(
     measured_level_m : (n,) array
         NaN is "no value".
     level_gain, inflow_gain : (n,) arrays
-        Shares of the error that a value of the level takes away; 1 begins anew. [1, 1/s]
+        Shares of the error of a value of the level that move the level, and the inflow over the area. [1, 1/s]
+    sensor_gain : (2, n) array
+        The same of what the filters of the level sensor hold; of the second 1 begins anew. [1]
     is_inlet_shut : (n,) array
         Whether nothing comes in that nobody measures.
     span_s : int
@@ -92,8 +95,7 @@ def replay_seconds(
             for before in range(span_s):
                 expected_m += level_m[max(second - before, 0)] / span_s
         error_m = measured_level_m[second] - expected_m
-        followed = level_gain[second]
-        if followed >= 1.0:
+        if sensor_gain[1, second] >= 1.0:
             anew_m = max(measured_level_m[second] - misread_m, plant.profile[0].level_m)
             now.volume_m3 = volume_at_level_m3(anew_m, plant.profile)
             filtered_m = sensed_m = measured_level_m[second]
@@ -101,10 +103,10 @@ def replay_seconds(
             area_m2 = (
                 volume_at_level_m3(true_m + 0.01, plant.profile) - volume_at_level_m3(true_m, plant.profile)
             ) / 0.01
-            corrected_m3 = now.volume_m3 + followed * error_m * area_m2
+            corrected_m3 = now.volume_m3 + level_gain[second] * error_m * area_m2
             now.volume_m3 = max(corrected_m3, 0.0)
-            filtered_m += followed * error_m
-            sensed_m += followed * error_m
+            filtered_m += sensor_gain[0, second] * error_m
+            sensed_m += sensor_gain[1, second] * error_m
             extra_m3h += coming * inflow_gain[second] * error_m * area_m2 * 3600.0
 
 

@@ -6,25 +6,21 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled
+from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.simulator.parameters import plant_parameters
+from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter
+from wetwell.simulator.parameters import SensorParameters, plant_parameters
 
 LEVEL_TIME_S = 150.0
 """Time constant with which the observer follows the recorded level where the inflow is measured."""
-MOST_FOLLOWED = 0.5
-"""Share of an error that one value may take away there, however long there was none."""
 LOST_S = 300
 """After that long without a level, and more than two rows, the observer begins anew."""
-BEGUN_ANEW = 1.0
-"""Share of an error that is taken away by beginning anew, which is all of it."""
 FIRST_SHARE = 0.5
 """Standard deviation of an inflow before anything is known of it, as a share of what a pump carries."""
 MIN_NOISE_M = 1e-4
 """Standard deviation of a level sensor at the least: a reading without any noise is rounded. [m]"""
-UNKNOWN = 1e6
-"""Variance of a level of which nothing is known, over that of its sensor."""
 RANGE = (0.05, 0.95)
 """Quantiles of the level between which the wet well is emptied and filled."""
 
@@ -39,15 +35,21 @@ class Observer:
         Level that is followed, NaN where there is none. [m]
     level_gain, inflow_gain : (n,) arrays
         Shares of the error of a value by which the level, and the inflow over the area, are moved. [1, 1/s]
+    sensor_gain : (2, n) array
+        The same of what both filters of the sensor hold; of the second 1 where all begins anew, else less. [1]
     deviation_m : (n,) array or None
         Standard deviation of the error under a right model, noise of the value included; None where the gains are
         constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
+    uncertain : Uncertain or None
+        From which the gains come; None where they are constant.
     """
 
     level_m: Floats
     level_gain: Floats
     inflow_gain: Floats
+    sensor_gain: Floats
     deviation_m: Floats | None
+    uncertain: Uncertain | None = None
 
     def of_late_level(self, late_s: int) -> "Observer":
         """The same where a level is recorded so much after it was: its values are taken when they were.
@@ -62,20 +64,24 @@ class Observer:
             level_m=np.r_[self.level_m[late_s:], none + np.nan],
             level_gain=np.r_[self.level_gain[late_s:], none],
             inflow_gain=np.r_[self.inflow_gain[late_s:], none],
+            sensor_gain=np.c_[self.sensor_gain[:, late_s:], [none, none]],
         )
 
-    def of_lagging_level(self, followed: float) -> "Observer":
-        """The same where the sensor lags, and follows the level by a share a second: it is followed no faster.
+    def of_lagging_level(self, sensor: SensorParameters) -> "Observer":
+        """The same where the sensor lags: an error of its value says more of the level, and later.
 
-        An inflow that is corrected by what has not yet come through would swing with the time of the lag.
+        With the gains of a sensor that does not, the inflow would swing with the time of the lag.
         """
-        if followed >= 1.0:
+        if self.uncertain is None or sensor.followed >= 1.0:
             return self
-        known = np.flatnonzero(np.isfinite(self.level_m))
-        most = np.ones(self.level_m.size)
-        most[known] = 1.0 - (1.0 - followed) ** np.diff(known, prepend=-1)
-        share = np.where(self.level_gain < BEGUN_ANEW, most / np.maximum(self.level_gain, most), 1.0)
-        return replace(self, level_gain=self.level_gain * share, inflow_gain=self.inflow_gain * share**2)
+        gains, variance_m2 = level_filter(self.uncertain, sensor)
+        return replace(
+            self,
+            level_gain=gains[0],
+            inflow_gain=gains[1],
+            sensor_gain=gains[2:],
+            deviation_m=np.sqrt(variance_m2),
+        )
 
     def left_m(self, gained_m: Floats, misread_m: Floats) -> Floats:
         r"""What an error of the balance, or of the reading, leaves of itself before each value corrects it.
@@ -112,10 +118,12 @@ def constant_observer(level_m: Floats) -> Observer:
     last = np.maximum.accumulate(np.where(np.isfinite(level_m), place, -1))
     lost_s = place - np.r_[-1, last[:-1]] - 1
     gain = np.minimum(1.0 / LEVEL_TIME_S * (lost_s + 1), MOST_FOLLOWED)
+    gain = np.where(lost_s > LOST_S, BEGUN_ANEW, gain)
     return Observer(
         level_m=level_m,
-        level_gain=np.where(lost_s > LOST_S, BEGUN_ANEW, gain),
+        level_gain=gain,
         inflow_gain=np.zeros(level_m.size),
+        sensor_gain=np.array([gain, gain]),
         deviation_m=None,
     )
 
@@ -129,6 +137,7 @@ def forced_observer(traces: Traces) -> Observer:
         level_m=np.interp(place, middle, traces.level_m[rows]) if rows.size else traces.level_m,
         level_gain=np.full(traces.seconds, BEGUN_ANEW),
         inflow_gain=np.zeros(traces.seconds),
+        sensor_gain=np.full((2, traces.seconds), BEGUN_ANEW),
         deviation_m=np.full(traces.seconds, np.inf),
     )
 
@@ -146,12 +155,12 @@ def hides_cycles(traces: Traces, station: Station) -> bool:
 def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: Floats) -> Observer:
     r"""Observer of a level in rows, or of one whose inflow is not measured: Kalman's filter of level and inflow.
 
-    $$x = \begin{pmatrix} L \\ b \end{pmatrix}, \quad F = \begin{pmatrix} 1 & \Delta t \\ 0 & 1 \end{pmatrix}, \quad
-    P \leftarrow F P F^T + q \begin{pmatrix} \Delta t^3/3 & \Delta t^2/2 \\ \Delta t^2/2 & \Delta t \end{pmatrix}
-    + \begin{pmatrix} \sum_i (Q_i \tau_i / A)^2 / 12 & 0 \\ 0 & 0 \end{pmatrix}$$
+    A switch at a moment that the rows do not show may hide a volume, which is taken from the next row and held
+    against nobody:
 
-    with τ the time within which a pump was switched at a moment that the rows do not show: the volume that it may
-    hide is taken from the next row and held against nobody. Q is the flow that the recording shows, or the rated one.
+    $$P_{LL} \leftarrow P_{LL} + \sum_i (Q_i \tau_i / A)^2 / 12$$
+
+    with τ the time within which the pump was switched. Q is the flow that the recording shows, or the rated one.
     A measured inflow leaves no b; its error between rows goes to L.
 
     Parameters
@@ -162,10 +171,6 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
         q, by which the variance of an unknown inflow over the area grows. [m²/s³]
     level_m : (n,) array
         Level of the recording, or what of it was sent where only changes are: NaN is "no value".
-
-    References
-    ----------
-    Kalman, R. E.: A new approach to linear filtering and prediction problems. J. Basic Eng. 82 (1960) 35-45.
     """
     plant = plant_parameters(station)
     area_m2 = station.sump.mean_area_m2
@@ -174,26 +179,24 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
     open_m2 = np.sum((carried_m3h[:, None] / 3600.0 / area_m2 * traces.drives.open_s) ** 2, axis=0) / 12.0
     noise_m = level_noise_m(traces, station)
     is_free = traces.inflow_m3h is None
-    level_gain, inflow_gain = np.zeros(traces.seconds), np.zeros(traces.seconds)
-    variance_m2 = np.full(traces.seconds, np.nan)
-    _filter(
-        np.isfinite(level_m),
-        open_m2,
-        noise_m**2,
-        drift_m2_s3 if is_free else 0.0,
-        (FIRST_SHARE * float(speed_m_s.max())) ** 2 if is_free else 0.0,
-        0.0 if is_free else (inflow_error_m3h(traces) / 3600.0 / area_m2) ** 2,
-        max(LOST_S, 2.5 * traces.rate_s),
-        0.0 if is_free else 1.0 / LEVEL_TIME_S,
-        level_gain,
-        inflow_gain,
-        variance_m2,
+    uncertain = Uncertain(
+        is_known=np.isfinite(level_m),
+        open_m2=open_m2,
+        noise_m2=noise_m**2,
+        drift_m2_s3=drift_m2_s3 if is_free else 0.0,
+        first_m2_s2=(FIRST_SHARE * float(speed_m_s.max())) ** 2 if is_free else 0.0,
+        metered_m2_s2=0.0 if is_free else (inflow_error_m3h(traces) / 3600.0 / area_m2) ** 2,
+        lost_s=max(LOST_S, 2.5 * traces.rate_s),
+        least_gain=0.0 if is_free else 1.0 / LEVEL_TIME_S,
     )
+    gains, variance_m2 = level_filter(uncertain, plant.sensors[LEVEL])
     return Observer(
         level_m=level_m,
-        level_gain=level_gain,
-        inflow_gain=inflow_gain,
+        level_gain=gains[0],
+        inflow_gain=gains[1],
+        sensor_gain=gains[2:],
         deviation_m=np.sqrt(variance_m2),
+        uncertain=uncertain,
     )
 
 
@@ -203,47 +206,6 @@ def _carried_m3h(traces: Traces, pump: int, rated_m3h: float) -> float:
     flow_m3h = traces.signals["flow_m3h"][pump, running] if "flow_m3h" in traces.signals else np.zeros(0)
     flow_m3h = flow_m3h[flow_m3h > 0.0]  # NaN is no flow either
     return float(np.median(flow_m3h)) if flow_m3h.size else rated_m3h
-
-
-@compiled
-def _filter(
-    is_known: Flags,
-    open_m2: Floats,
-    noise_m2: float,
-    drift: float,
-    first_inflow: float,
-    inflow_error: float,
-    lost_s: float,
-    least_gain: float,
-    level_gain: Floats,
-    inflow_gain: Floats,
-    variance_m2: Floats,
-) -> None:
-    """Write gains, and variances of the error before each value, its own noise included."""
-    level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
-    last, hidden = -1, 0.0
-    for k in range(is_known.size):
-        hidden += open_m2[k]
-        if not is_known[k]:
-            continue
-        step = float(k - last)
-        level += 2.0 * step * both + step**2 * inflow + drift * step**3 / 3.0 + hidden + inflow_error * step**2
-        both += step * inflow + 0.5 * drift * step**2
-        inflow += drift * step
-        if step > lost_s:
-            level, both, inflow = UNKNOWN * noise_m2, 0.0, first_inflow
-        seen = level + noise_m2
-        gain = max(level / seen, min(least_gain * step, MOST_FOLLOWED))
-        of_inflow = both / seen
-        variance_m2[k] = seen
-        level_gain[k], inflow_gain[k] = gain, of_inflow
-        if step > lost_s or last < 0:
-            level_gain[k] = 1.0
-        # Joseph's form: right for any gain
-        inflow = inflow - 2.0 * of_inflow * both + of_inflow**2 * seen
-        both = (1.0 - gain) * (both - of_inflow * level) + gain * of_inflow * noise_m2
-        level = (1.0 - gain) ** 2 * level + gain**2 * noise_m2
-        last, hidden = k, 0.0
 
 
 @compiled

@@ -207,8 +207,8 @@ class Replay:
         traces, pumps = self.traces, self.traces.pumps
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         is_held = observer.level_m is not traces.level_m
+        observer = observer.of_lagging_level(plant.sensors[LEVEL])
         observer = observer.of_late_level(int(plant.sensors[LEVEL].delay_s))
-        observer = observer.of_lagging_level(plant.sensors[LEVEL].followed)
         known = np.flatnonzero(np.isfinite(observer.level_m))
         first = observer.level_m[known[:FIRST]]  # a single value may be wrong
         first_level_m = float(np.median(first)) if known.size else self.station.middle_level_m
@@ -223,6 +223,7 @@ class Replay:
             observer.level_m,
             observer.level_gain,
             observer.inflow_gain,
+            observer.sensor_gain,
             traces.by_hand.is_inlet_shut,
             1 if is_held and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
@@ -262,6 +263,7 @@ class Replay:
     def _squares(self, observer: Observer, plant: PlantParameters, rows: Flags) -> tuple[Floats, Floats]:
         """Squares of standardised errors of some levels, none of which counts for much; logarithms of variances."""
         traces = self.traces
+        observer = observer.of_lagging_level(plant.sensors[LEVEL])
         if observer.deviation_m is None:
             return np.zeros(0), np.zeros(0)
         level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]

@@ -42,6 +42,7 @@ def run(station, frequency_hz):
         np.full(seconds, np.nan),
         np.zeros(seconds),
         np.zeros(seconds),
+        np.zeros((2, seconds)),
         np.zeros(seconds, dtype=bool),
         1,
         still_truth(pumps, 1),

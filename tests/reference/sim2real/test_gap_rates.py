@@ -113,6 +113,13 @@ def test_friction_is_told_at_every_rate(alpha, every, value, without):
         assert any("friction_bias" in effect.equivalent for effect in report.effects)
 
 
+def test_a_lag_of_the_level_is_no_other_effect_where_nobody_measures_the_inflow(alpha):
+    recording = stored(record(alpha, [{"name": "level_sensor_lag", "lag_s": 20.0}]), 1, without=("inflow",))
+    (told,) = diagnose(recording, alpha).report().effects
+    assert told.name == "level_sensor_lag"
+    assert told.parameters["lag_s"].value == pytest.approx(20.0, rel=0.1)
+
+
 def test_what_cannot_be_shown_is_listed_with_the_reason(alpha, plain):
     report = diagnose(stored(plain, 60, without=("inflow", "head")), alpha).report()
     reasons = {one.effect: one.reason for one in report.not_tested}
