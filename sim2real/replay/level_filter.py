@@ -14,7 +14,7 @@ BEGUN_ANEW = 1.0
 """Share of an error that is taken away by beginning anew, which is all of it."""
 UNKNOWN = 1e6
 """Variance of a level of which nothing is known, over that of its sensor."""
-SETTLED = 1e-12
+STEADY_GAIN = 1e-12
 """Change of a gain in a second, and of a variance as a share of it, under which they stay what they are."""
 
 
@@ -160,7 +160,7 @@ def _filter(
         if is_anew:
             gains[0, k] = gains[2, k] = gains[3, k] = BEGUN_ANEW
             gains[1, k] = 0.0
-        is_settled = since == 1 and moved < SETTLED and abs(seen - variance_m2[k - 1]) < SETTLED * seen
+        is_settled = since == 1 and moved < STEADY_GAIN and abs(seen - variance_m2[k - 1]) < STEADY_GAIN * seen
         last = k
 
 
