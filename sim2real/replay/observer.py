@@ -41,7 +41,7 @@ class Observer:
         Standard deviation of the error under a right model, noise of the value included; None where the gains are
         constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
     uncertain : Uncertain or None
-        From which the gains come; None where they are constant.
+        From which the gains of a lag come; None where they are constant, or those of a lag.
     """
 
     level_m: Floats
@@ -81,6 +81,7 @@ class Observer:
             inflow_gain=gains[1],
             sensor_gain=gains[2:],
             deviation_m=np.sqrt(variance_m2),
+            uncertain=None,
         )
 
     def left_m(self, gained_m: Floats, misread_m: Floats) -> Floats:

@@ -253,8 +253,8 @@ class Replay:
         regime, is_known = regimes_of(traces, station).of_station, np.isfinite(level_m)
         settled = is_known & _settled(regime)
         rows, calm = (settled & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
-        observers = [row_observer(traces, station, drift * carried_m_s**2, level_m) for drift in DRIFTS]
-        tried = [(observer, *self._squares(observer, plant, rows)) for observer in observers]
+        observers = (row_observer(traces, station, drift * carried_m_s**2, level_m) for drift in DRIFTS)
+        tried = ((observer, *self._squares(observer, plant, rows)) for observer in observers)
         best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
         squares, _ = self._squares(best, plant, calm)
         scale = np.sqrt(max(float(np.mean(squares)), 1.0)) if squares.size else 1.0
