@@ -8,7 +8,7 @@ IMAGE ?= wetwell:latest
 BUILDER ?= docker
 BASE ?= python:3.11-slim-bookworm
 WORKERS := 3
-PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=worksteal --durations=10
+PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=loadgroup --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
@@ -37,7 +37,7 @@ others: $(VENV)/.dev  ## What of `make check` looks at no page; it gives way to 
 	nice -n 5 $(PYTEST) -m "check and not long and not soak" \
 	  $$(grep -rlE 'mark\.check' tests --include='test_*.py' --exclude-dir=browser)
 
-long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each other Python
+long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each Python, the slowest pages of docs
 	$(PYTEST) -m "long and not soak"
 
 soak: $(VENV)/.dev  ## What needs the machine alone: kills at 600 times life; twenty starts, with a load on purpose

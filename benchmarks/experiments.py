@@ -139,9 +139,10 @@ def tried(case: TrialCase) -> dict[str, object]:
         set(one.names) - set(case.family.inherent) == set(case.names) - set(case.family.inherent)
         for one in first.attribution.possible
     )
-    if not first.proposals.best:
+    proposals = first.proposals().best
+    if not proposals:
         return told | {"proposed": None}
-    best = first.proposals.best[0]
+    best = proposals[0]
     site = site_of(station, set())
     seconds = round(2.0 * best.length_h * 3600.0) + AFTERWARDS_S
     seconds = max(seconds, 1801 + case.every_s)

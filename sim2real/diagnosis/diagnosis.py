@@ -51,14 +51,13 @@ from wetwell.simulator.effects.effect import Component
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """All that is found; `station` has the effects, or the correction, added; `remarks` are on that and on columns.
+    """All that is found; `station` is `own_station` with the effects, or the correction, added.
 
-    `attribution` and what follows are for drawings.
+    `remarks` are on the correction and on columns; `attribution` and what follows are for drawings.
 
     `own_effects` are the effects with their sizes by this recording alone, without what other stations say.
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
-    is in a component, whether an effect of the library or something unknown. `proposals` are the acts that would tell
-    apart what is left, under `conditions`.
+    is in a component, whether an effect of the library or something unknown. `seed` is that of all that is drawn.
     """
 
     verdict: Verdict
@@ -71,8 +70,9 @@ class Diagnosis:
     remarks: tuple[str, ...]
     posterior: tuple[SetProbability, ...]
     component_probability: dict[str, float]
-    proposals: Proposals
     conditions: Conditions
+    seed: int
+    own_station: Station
     station: Station
     attribution: Attribution
     bins: Bins
@@ -80,14 +80,27 @@ class Diagnosis:
     regimes: Regimes
     replay: Replay
 
+    def proposals(self, each: Each = map) -> Proposals:
+        """Acts that would tell apart what is left, under the conditions of the recording: each is simulated.
+
+        Parameters
+        ----------
+        each : callable
+            As `map`; that of a pool of threads weighs acts side by side.
+        """
+        left = self.attribution.possible if self.verdict != "unknown" else ()
+        return proposals_of(self.own_station, left, self.conditions, seed=self.seed, each=each)
+
     def report(
         self,
         closed_loop: ClosedLoopComparison | None = None,
         detector: DetectorVerdicts | None = None,
         notes: tuple[str, ...] = (),
         prior_stations: int = 0,
+        each: Each = map,
     ) -> GapReport:
-        """What programs read; `notes` come before those on what is not measured."""
+        """What programs read; `notes` come before those on what is not measured; `each` weighs the proposals."""
+        proposals = self.proposals(each)
         blamed = self.where[0].component if self.where else None
         return GapReport(
             station=self.station.name,
@@ -116,10 +129,10 @@ class Diagnosis:
             ),
             notes=(*notes, *self.remarks, *limitations(self.traces)),
             recordings=_recordings(self.traces),
-            experiments=proposed_acts(self.proposals),
-            refused=refused_acts(self.proposals),
+            experiments=proposed_acts(proposals),
+            refused=refused_acts(proposals),
             prior_stations=prior_stations,
-            next_experiment=next_experiment(self.verdict, self.proposals.best, blamed),
+            next_experiment=next_experiment(self.verdict, proposals.best, blamed),
         )
 
 
@@ -145,7 +158,7 @@ def diagnose(
     only, without : names of effects
         Restrict the library.
     seed : int
-        Of the bootstrap.
+        Of the bootstrap, and of what is simulated of acts.
     progress : callable
         Gets the share of the work that is done.
     each : callable
@@ -177,8 +190,6 @@ def diagnose(
     unknown = localise(excess, found.plain, bins, plain.plant)
     blamed = unknown if found.accepted is None else found.accepted.candidates[0].component
     effects = () if found.accepted is None else found.accepted.effects
-    conditions = conditions_of(traces, station)
-    possible = found.possible if verdict != "unknown" else ()
     tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
     correction: Correction | None = None
     columns = list(dict.fromkeys(name for one in recordings for name in one.covariates))
@@ -201,8 +212,9 @@ def diagnose(
         gap=gap_of(found.plain, found.after, bins, found.validation, rng),
         posterior=found.posterior,
         component_probability=_by_component(found.posterior, unknown),
-        proposals=proposals_of(station, possible, conditions, seed=seed, each=each),
-        conditions=conditions,
+        conditions=conditions_of(traces, station),
+        seed=seed,
+        own_station=station,
         station=station.model_copy(update={"effect": (*station.effect, *tables)}),
         attribution=found,
         bins=bins,

@@ -19,7 +19,7 @@ from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.sim2real.replay.observer import Observer, constant_observer, forced_observer, hides_cycles, row_observer
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
-from wetwell.simulator.parameters import PlantParameters, plant_parameters
+from wetwell.simulator.parameters import PlantParameters, SensorParameters, plant_parameters
 from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels_of
 
@@ -69,6 +69,15 @@ class _Run:
     reading: Floats
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Lagging:
+    """Observer of a level that lags, and what it was made of."""
+
+    of: Observer
+    lag: tuple[float, ...]
+    observer: Observer
+
+
 class Replay:
     """A recording and a station, ready to be replayed under any effects, also side by side.
 
@@ -90,6 +99,7 @@ class Replay:
         self._forcing = self._healthy(inflow_m3h, None)
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
+        self._lagging: _Lagging | None = None
         self.observer = self._observer_of(traces.level_m)
 
     def run(self, effects: Sequence[Acting] = ()) -> Prediction:
@@ -207,7 +217,7 @@ class Replay:
         traces, pumps = self.traces, self.traces.pumps
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         is_held = observer.level_m is not traces.level_m
-        observer = observer.of_lagging_level(plant.sensors[LEVEL])
+        observer = self._of_lagging_level(observer, plant.sensors[LEVEL])
         observer = observer.of_late_level(int(plant.sensors[LEVEL].delay_s))
         known = np.flatnonzero(np.isfinite(observer.level_m))
         first = observer.level_m[known[:FIRST]]  # a single value may be wrong
@@ -231,6 +241,14 @@ class Replay:
             reading,
         )
         return level_m, reading
+
+    def _of_lagging_level(self, observer: Observer, sensor: SensorParameters) -> Observer:
+        """Observer of a level that lags; the last one, where neither the lag nor the observer is another."""
+        lag = (sensor.followed, sensor.followed_again, sensor.carried)
+        last = self._lagging
+        if last is None or last.of is not observer or last.lag != lag:
+            last = self._lagging = _Lagging(of=observer, lag=lag, observer=observer.of_lagging_level(sensor))
+        return last.observer
 
     @cached_property
     def _observer_of_changes(self) -> Observer:

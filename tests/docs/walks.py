@@ -123,7 +123,7 @@ wetwell simulate --station north.toml --days 0.2 --out north.parquet""",
         },
     ),
     Walk(("docs/convert.md",), shows_output=True),
-    Walk(("docs/tutorial-your-own-export.md",), shows_output=True, near=0.1),
+    Walk(("docs/tutorial-your-own-export.md",), shows_output=True, near=0.1, is_long=True),
     Walk(("docs/gateway.md",), before=("wetwell plc",), patient=("wetwell gateway read",)),
     Walk(
         ("docs/fleet.md",),
@@ -155,12 +155,13 @@ printf 'station_file,recording\nstations/alpha.toml,a.parquet\n' > table.csv""",
     ),
     Walk(("docs/gap.md",), shows_output=True, near=0.1, is_long=True),
     Walk(("docs/correction.md",), shows_output=True, near=0.1, is_long=True),
-    Walk(("docs/experiments.md",), shows_output=True, near=0.2),
+    Walk(("docs/experiments.md",), shows_output=True, near=0.2, is_long=True),
     Walk(("docs/gap-watch.md",), shows_output=True, near=0.1, is_long=True),
     Walk(
         ("docs/isolability.md",),
         given="""cp "$ROOT"/simulator/stations/alpha.toml north.toml
 wetwell simulate --station north.toml --days 0.2 --seed 3 --out field.csv.gz""",
+        is_long=True,
     ),
     Walk(
         ("docs/field-data.md",),

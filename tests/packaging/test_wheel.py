@@ -11,15 +11,11 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.check, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.check, pytest.mark.xdist_group("wheel"), pytest.mark.timeout(1800)]
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
-OWN = f"3.{sys.version_info.minor}"
-VERSIONS = [
-    version if version == OWN else pytest.param(version, marks=pytest.mark.long)
-    for version in ("3.11", "3.12", "3.13", "3.14")
-]
+VERSIONS = ("3.11", "3.12", "3.13", "3.14")
 IMPORT_ALL = """
 import importlib, json, pkgutil, wetwell
 names = [found.name for found in pkgutil.walk_packages(wetwell.__path__, "wetwell.") if "__main__" not in found.name]
@@ -88,6 +84,7 @@ def test_the_metadata_are_those_of_the_project(wheel):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 def test_it_installs_and_runs_in_an_empty_environment(version, wheel, tmp_path):
     uv = BIN / "uv"

@@ -122,8 +122,9 @@ def diagnose_rows(
     ValueError
         If the recording cannot be diagnosed.
     """
+    recordings = [recording for recording, _ in rows]
+    longest = max(recordings, key=len)
     with ThreadPoolExecutor(THREADS) as pool:
-        recordings = [recording for recording, _ in rows]
         diagnosis = diagnose(
             recordings,
             station,
@@ -133,11 +134,14 @@ def diagnose_rows(
             each=pool.map,
             priors=EVEN if prior is None else prior.priors,
         )
-    longest = max(recordings, key=len)
-    closed_loop = _closed_loop(longest, station, diagnosis.station)
-    notes = tuple(note for _, preparation in rows for note in _notes(preparation, diagnosis.traces.rate_s))
-    heard = 0 if prior is None else prior.stations
-    return diagnosis.report(closed_loop, _detector(longest, station, diagnosis.station), notes, heard), diagnosis
+        report = diagnosis.report(
+            _closed_loop(longest, station, diagnosis.station),
+            _detector(longest, station, diagnosis.station),
+            tuple(note for _, preparation in rows for note in _notes(preparation, diagnosis.traces.rate_s)),
+            0 if prior is None else prior.stations,
+            each=pool.map,
+        )
+    return report, diagnosis
 
 
 def replay_file(

@@ -104,18 +104,18 @@ def test_without_a_gap_nobody_is_blamed(alpha, plain, every, value, without):
 )
 def test_friction_is_told_at_every_rate(alpha, every, value, without):
     recording = stored(record(alpha, [{"name": "friction_bias", "factor": 1.4}]), every, value, without)
-    report = diagnose(recording, alpha).report()
-    assert report.verdict == "effect"
-    found = [effect for effect in report.effects if effect.name == "friction_bias"]
+    told = diagnose(recording, alpha)
+    assert told.verdict == "effect"
+    found = [effect for effect in told.effects if effect.name == "friction_bias"]
     if found:
         assert found[0].parameters["factor"].value == pytest.approx(1.4, rel=0.1)
     else:
-        assert any("friction_bias" in effect.equivalent for effect in report.effects)
+        assert any("friction_bias" in effect.equivalent for effect in told.effects)
 
 
 def test_a_lag_of_the_level_is_no_other_effect_where_nobody_measures_the_inflow(alpha):
     recording = stored(record(alpha, [{"name": "level_sensor_lag", "lag_s": 20.0}]), 1, without=("inflow",))
-    (told,) = diagnose(recording, alpha).report().effects
+    (told,) = diagnose(recording, alpha).effects
     assert told.name == "level_sensor_lag"
     assert told.parameters["lag_s"].value == pytest.approx(20.0, rel=0.1)
 

@@ -23,6 +23,8 @@ from wetwell.services.trial.swmm_plant import run_swmm
 from wetwell.sim2real.trial.cases import KINDS, StoragePlan, trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
+pytestmark = pytest.mark.xdist_group("trial")
+
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
 COUNT = 12
 SECONDS = 14_400
@@ -166,7 +168,7 @@ def test_a_second_run_resumes_and_another_plan_is_refused(folder, monkeypatch):
         run_fake("perfect", folder, monkeypatch, command=(*FAKE, "--only", "friction_bias"))
 
 
-@pytest.mark.check
+@pytest.mark.long
 def test_shrinkage_on_unseen_recordings(folder, monkeypatch):
     replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
     _, result = run_fake("perfect", folder, monkeypatch, replay=replay)
@@ -326,7 +328,7 @@ def test_swmm_refuses_what_it_cannot_express(alpha):
 @pytest.mark.check
 def test_a_trial_with_swmm(tmp_path, monkeypatch):
     pytest.importorskip("pyswmm", exc_type=ImportError)
-    _, result = run_fake("perfect", tmp_path, monkeypatch, count=3, kinds=("single",), plants=("swmm",))
+    _, result = run_fake("perfect", tmp_path, monkeypatch, count=1, kinds=("single",), plants=("swmm",))
     assert result["plants_scored"]["swmm"]["top_1"]["value"] == 1.0
     recording = read_recording(tmp_path / "published" / "case-0000" / "recording.parquet")
     assert np.isfinite(recording.columns["level_m"]).all()
