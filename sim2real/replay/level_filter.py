@@ -32,6 +32,8 @@ class Uncertain:
         Variance of the sensor's noise. [m²]
     drift_m2_s3 : float
         q, by which the variance of an unknown inflow over the area grows. [m²/s³]
+    waves_m2_s : float
+        w, by which the variance of the level grows, of what comes in anew in each second. [m²/s]
     first_m2_s2 : float
         Variance of that inflow before anything is known of it; 0 where it is measured. [m²/s²]
     metered_m2_s2 : float
@@ -40,16 +42,20 @@ class Uncertain:
         After that long without a value the filter begins anew. [s]
     least_gain : float
         Share of an error that is taken away in a second at the least. [1/s]
+    keeps_inflow : bool
+        Whether the inflow is known after such a time but for its drift.
     """
 
     is_known: Flags
     open_m2: Floats
     noise_m2: float
     drift_m2_s3: float
+    waves_m2_s: float
     first_m2_s2: float
     metered_m2_s2: float
     lost_s: float
     least_gain: float
+    keeps_inflow: bool = False
 
 
 def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats, Floats]:
@@ -58,9 +64,10 @@ def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats
     $$x = (L, b, s_1, s_2)^T, \qquad L' = L + b, \qquad s_1' = f L' + (1 - f)\, s_1, \qquad y = s_2 + v$$
 
     with L the level, b the inflow that is not known over the area, and $s_1$, $s_2$ what the filters of the sensor
-    hold after a second; $s_2 = s_1$ where it has one, and L where it has none. The inflow wanders with q:
+    hold after a second; $s_2 = s_1$ where it has one, and L where it has none. The inflow wanders with q, and w of it
+    is of a second only:
 
-    $$P \leftarrow F P F^T + q\, G \begin{pmatrix} 1/3 & 1/2 \\ 1/2 & 1 \end{pmatrix} G^T, \qquad
+    $$P \leftarrow F P F^T + G \begin{pmatrix} w + q/3 & q/2 \\ q/2 & q \end{pmatrix} G^T, \qquad
     K = \frac{P h}{h^T P h + \sigma^2}, \qquad P \leftarrow (I - K h^T) P (I - K h^T)^T + \sigma^2 K K^T$$
 
     Parameters
@@ -80,6 +87,33 @@ def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats
     ----------
     Kalman, R. E.: A new approach to linear filtering and prediction problems. J. Basic Eng. 82 (1960) 35-45.
     """
+    step, of_level, lag_s = step_of(sensor)
+    seconds = uncertain.is_known.size
+    gains, variance_m2 = np.zeros((4, seconds)), np.full(seconds, np.nan)
+    _filter(
+        step,
+        of_level,
+        lag_s,
+        uncertain.is_known,
+        uncertain.open_m2,
+        uncertain.noise_m2,
+        uncertain.drift_m2_s3,
+        uncertain.waves_m2_s,
+        uncertain.first_m2_s2,
+        uncertain.metered_m2_s2,
+        uncertain.lost_s,
+        uncertain.least_gain,
+        uncertain.keeps_inflow,
+        np.zeros((3, 4, 4)),
+        np.zeros(4),
+        gains,
+        variance_m2,
+    )
+    return gains, variance_m2
+
+
+def step_of(sensor: SensorParameters) -> tuple[Floats, Floats, float]:
+    """(4, 4) F of a second, (4,) shares of the level that each state takes, and the whole lag. [1, 1, s]."""
     first, again = sensor.followed, sensor.followed_again
     second = (
         (again - sensor.carried, sensor.carried, 1.0 - again) if sensor.carried > 0.0 else (first, 1.0 - first, 0.0)
@@ -91,26 +125,7 @@ def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats
     step[2, 2] = 1.0 - first
     step[3, 2:] = second[1:]
     lag_s = (1.0 - first) / first + (1.0 / again - 1.0 if sensor.carried > 0.0 else 0.0)
-    seconds = uncertain.is_known.size
-    gains, variance_m2 = np.zeros((4, seconds)), np.full(seconds, np.nan)
-    _filter(
-        step,
-        of_level,
-        lag_s,
-        uncertain.is_known,
-        uncertain.open_m2,
-        uncertain.noise_m2,
-        uncertain.drift_m2_s3,
-        uncertain.first_m2_s2,
-        uncertain.metered_m2_s2,
-        uncertain.lost_s,
-        uncertain.least_gain,
-        np.zeros((3, 4, 4)),
-        np.zeros(4),
-        gains,
-        variance_m2,
-    )
-    return gains, variance_m2
+    return step, of_level, lag_s
 
 
 @compiled
@@ -122,10 +137,12 @@ def _filter(
     open_m2: Floats,
     noise_m2: float,
     drift: float,
+    waves: float,
     first: float,
     metered: float,
     lost_s: float,
     least_gain: float,
+    keeps_inflow: bool,
     room: Floats,
     gain: Floats,
     gains: Floats,
@@ -136,7 +153,7 @@ def _filter(
     Where each second has a value and nothing is open, they soon stay what they are.
     """
     spread, before, wandering = room[0], room[1], room[2]
-    _wander(drift, of_level, wandering)
+    _wander(drift, waves, of_level, wandering)
     last, is_settled = -1, False
     for k in range(is_known.size):
         since = k - last
@@ -152,7 +169,8 @@ def _filter(
             continue
         is_anew = last < 0 or since > lost_s
         if is_anew:
-            _begin(UNKNOWN * noise_m2, first, lag_s, spread)
+            unknown_m2_s2 = min(spread[1, 1], first) if keeps_inflow and last >= 0 else first
+            _begin(UNKNOWN * noise_m2, unknown_m2_s2, lag_s, spread)
         seen = variance_m2[k] = spread[3, 3] + noise_m2
         moved = _weigh(spread, seen, min(least_gain * since, MOST_FOLLOWED), gain)
         _copy(gain, gains, k)
@@ -165,11 +183,11 @@ def _filter(
 
 
 @compiled
-def _wander(drift: float, of_level: Floats, wandering: Floats) -> None:
-    """Write q G (1/3 1/2; 1/2 1) G^T."""
+def _wander(drift: float, waves: float, of_level: Floats, wandering: Floats) -> None:
+    """Write G (w + q/3, q/2; q/2, q) G^T."""
     for i in range(4):
         for j in range(4):
-            wandering[i, j] = drift * of_level[i] * of_level[j] / 3.0
+            wandering[i, j] = (waves + drift / 3.0) * of_level[i] * of_level[j]
     for i in range(4):
         wandering[i, 1] = wandering[1, i] = 0.5 * drift * of_level[i]
     wandering[1, 1] = drift

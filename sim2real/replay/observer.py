@@ -6,11 +6,11 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled
-from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter
+from wetwell.sim2real.replay.inflow_process import InflowProcess
+from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter, step_of
 from wetwell.simulator.parameters import SensorParameters, plant_parameters
 
 LEVEL_TIME_S = 150.0
@@ -40,7 +40,7 @@ class Observer:
     deviation_m : (n,) array or None
         Standard deviation of the error under a right model, noise of the value included; None where the gains are
         constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
-    uncertain : Uncertain or None
+    process : InflowProcess or None
         From which the gains of a lag come; None where they are constant, or those of a lag.
     """
 
@@ -49,7 +49,7 @@ class Observer:
     inflow_gain: Floats
     sensor_gain: Floats
     deviation_m: Floats | None
-    uncertain: Uncertain | None = None
+    process: InflowProcess | None = None
 
     def of_late_level(self, late_s: int) -> "Observer":
         """The same where a level is recorded so much after it was: its values are taken when they were.
@@ -72,16 +72,16 @@ class Observer:
 
         With the gains of a sensor that does not, the inflow would swing with the time of the lag.
         """
-        if self.uncertain is None or sensor.followed >= 1.0:
+        if self.process is None or sensor.followed >= 1.0:
             return self
-        gains, variance_m2 = level_filter(self.uncertain, sensor)
+        gains, variance_m2 = level_filter(self.process.at(step_of(sensor)[2]), sensor)
         return replace(
             self,
             level_gain=gains[0],
             inflow_gain=gains[1],
             sensor_gain=gains[2:],
             deviation_m=np.sqrt(variance_m2),
-            uncertain=None,
+            process=None,
         )
 
     def left_m(self, gained_m: Floats, misread_m: Floats) -> Floats:
@@ -153,8 +153,8 @@ def hides_cycles(traces: Traces, station: Station) -> bool:
     return bool(traces.rate_s * carried_m_s > high_m - low_m)
 
 
-def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: Floats) -> Observer:
-    r"""Observer of a level in rows, or of one whose inflow is not measured: Kalman's filter of level and inflow.
+def uncertain_of(traces: Traces, station: Station, level_m: Floats) -> Uncertain:
+    r"""What is uncertain of a level in rows, or of one whose inflow is not measured; how that moves is still open.
 
     A switch at a moment that the rows do not show may hide a volume, which is taken from the next row and held
     against nobody:
@@ -168,8 +168,6 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
     ----------
     traces : Traces
     station : Station
-    drift_m2_s3 : float
-        q, by which the variance of an unknown inflow over the area grows. [m²/s³]
     level_m : (n,) array
         Level of the recording, or what of it was sent where only changes are: NaN is "no value".
     """
@@ -178,26 +176,39 @@ def row_observer(traces: Traces, station: Station, drift_m2_s3: float, level_m: 
     speed_m_s = plant.rated_flow_m3h / 3600.0 / area_m2
     carried_m3h = np.array([_carried_m3h(traces, i, rated) for i, rated in enumerate(plant.rated_flow_m3h)])
     open_m2 = np.sum((carried_m3h[:, None] / 3600.0 / area_m2 * traces.drives.open_s) ** 2, axis=0) / 12.0
-    noise_m = level_noise_m(traces, station)
     is_free = traces.inflow_m3h is None
-    uncertain = Uncertain(
+    return Uncertain(
         is_known=np.isfinite(level_m),
         open_m2=open_m2,
-        noise_m2=noise_m**2,
-        drift_m2_s3=drift_m2_s3 if is_free else 0.0,
+        noise_m2=level_noise_m(traces, station) ** 2,
+        drift_m2_s3=0.0,
+        waves_m2_s=0.0,
         first_m2_s2=(FIRST_SHARE * float(speed_m_s.max())) ** 2 if is_free else 0.0,
         metered_m2_s2=0.0 if is_free else (inflow_error_m3h(traces) / 3600.0 / area_m2) ** 2,
         lost_s=max(LOST_S, 2.5 * traces.rate_s),
         least_gain=0.0 if is_free else 1.0 / LEVEL_TIME_S,
     )
-    gains, variance_m2 = level_filter(uncertain, plant.sensors[LEVEL])
+
+
+def row_observer(level_m: Floats, process: InflowProcess, sensor: SensorParameters) -> Observer:
+    """Observer of a level in rows, or of one whose inflow is not measured: Kalman's filter of level and inflow.
+
+    Parameters
+    ----------
+    level_m : (n,) array
+        As `uncertain_of` was given it.
+    process : InflowProcess
+    sensor : SensorParameters
+        Of the level.
+    """
+    gains, variance_m2 = level_filter(process.at(step_of(sensor)[2]), sensor)
     return Observer(
         level_m=level_m,
         level_gain=gains[0],
         inflow_gain=gains[1],
         sensor_gain=gains[2:],
         deviation_m=np.sqrt(variance_m2),
-        uncertain=uncertain,
+        process=process,
     )
 
 

@@ -15,8 +15,16 @@ from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.changing import Acting, Changing, in_period
+from wetwell.sim2real.replay.inflow_process import MOST_SQUARE, InflowProcess, learnt_process
 from wetwell.sim2real.replay.kernel import replay_seconds
-from wetwell.sim2real.replay.observer import Observer, constant_observer, forced_observer, hides_cycles, row_observer
+from wetwell.sim2real.replay.observer import (
+    Observer,
+    constant_observer,
+    forced_observer,
+    hides_cycles,
+    row_observer,
+    uncertain_of,
+)
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, SensorParameters, plant_parameters
@@ -25,10 +33,6 @@ from wetwell.simulator.telemetry.channels import channels_of
 
 FIRST = 5
 """Values of the level from which the observer begins."""
-DRIFTS = tuple(2.0 * 0.05**2 / 900.0 * 8.0**k for k in range(-4, 5))
-"""Rates by which the variance of an unknown inflow may grow, over the square of what a pump carries. [1/s]"""
-MOST_SQUARE = 9.0
-"""Square of a standardised error beyond which it says no more about how an inflow drifts."""
 KEPT_RUNS = 3
 """Runs that are kept: what only the telemetry or the controller does differently is not computed again."""
 
@@ -257,37 +261,32 @@ class Replay:
         return self._observer_of(np.where(repeated(level_m), np.nan, level_m))
 
     def _observer_of(self, level_m: Floats) -> Observer:
-        """Observer of a level; where the inflow is not measured, with its likeliest drift by rows at rest."""
+        """Observer of a level; where the inflow is not measured, as the process that rows at rest show."""
         traces, station = self.traces, self.station
         if hides_cycles(traces, station):
             forced = forced_observer(traces)
             return forced if level_m is traces.level_m else replace(forced, level_m=level_m)
         if traces.inflow_m3h is not None and traces.is_each_second:
             return constant_observer(level_m)
+        uncertain, sensor = uncertain_of(traces, station, level_m), self._plant(self.own).sensors[LEVEL]
         if traces.inflow_m3h is not None:
-            return row_observer(traces, station, 0.0, level_m)
-        plant = self._plant(self.own)
-        carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
-        regime, is_known = regimes_of(traces, station).of_station, np.isfinite(level_m)
-        settled = is_known & _settled(regime)
-        rows, calm = (settled & np.isin(regime, regimes) for regimes in ((IDLE,), (IDLE, STEADY, MULTI_PUMP)))
-        observers = (row_observer(traces, station, drift * carried_m_s**2, level_m) for drift in DRIFTS)
-        tried = ((observer, *self._squares(observer, plant, rows)) for observer in observers)
-        best, _, _ = min(tried, key=lambda one: float(np.sum(one[1] + one[2])))
-        squares, _ = self._squares(best, plant, calm)
-        scale = np.sqrt(max(float(np.mean(squares)), 1.0)) if squares.size else 1.0
-        return replace(best, deviation_m=None if best.deviation_m is None else scale * best.deviation_m)
+            return row_observer(level_m, InflowProcess(lags_s=(0.0,), under=(uncertain,)), sensor)
+        regime = regimes_of(traces, station).of_station
+        settled = uncertain.is_known & _settled(regime)
+        carried_m_s = float(np.max(self._plant(self.own).rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
+        process = learnt_process(uncertain, level_m, regime == IDLE, settled, sensor, carried_m_s, traces.rate_s)
+        observer = row_observer(level_m, process, sensor)
+        scale = self._scale(observer, settled & np.isin(regime, (IDLE, STEADY, MULTI_PUMP)))
+        return replace(observer, deviation_m=None if observer.deviation_m is None else scale * observer.deviation_m)
 
-    def _squares(self, observer: Observer, plant: PlantParameters, rows: Flags) -> tuple[Floats, Floats]:
-        """Squares of standardised errors of some levels, none of which counts for much; logarithms of variances."""
+    def _scale(self, observer: Observer, rows: Flags) -> float:
+        """By how much errors of some levels are larger than they may be, 1 at the least; none counts for much."""
         traces = self.traces
-        observer = observer.of_lagging_level(plant.sensors[LEVEL])
-        if observer.deviation_m is None:
-            return np.zeros(0), np.zeros(0)
-        level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
-        variance_m2 = observer.deviation_m[rows] ** 2
-        squares = (traces.level_m - trailing_means(level_m, traces.span_s))[rows] ** 2 / variance_m2
-        return np.minimum(squares, MOST_SQUARE), np.log(variance_m2)
+        if observer.deviation_m is None or not rows.any():
+            return 1.0
+        level_m = self._computed(self.own, self._plant(self.own), traces.frequency_hz, observer)[0]
+        squares = ((traces.level_m - trailing_means(level_m, traces.span_s)) / observer.deviation_m)[rows] ** 2
+        return float(np.sqrt(max(float(np.mean(np.minimum(squares, MOST_SQUARE))), 1.0)))
 
     def _healthy(self, inflow_m3h: Floats, columns: Floats | None) -> Forcing:
         """Forcing without faults, the valves of the mains as the crew had them."""

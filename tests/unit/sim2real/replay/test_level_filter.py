@@ -16,6 +16,7 @@ UNCERTAIN = Uncertain(
     open_m2=np.zeros(SECONDS),
     noise_m2=4e-6,
     drift_m2_s3=1e-8,
+    waves_m2_s=1e-7,
     first_m2_s2=1e-6,
     metered_m2_s2=0.0,
     lost_s=300.0,
@@ -35,7 +36,8 @@ def test_gains_settle_at_those_of_the_riccati_equation(lag_s, second_share):
     held = np.array([[0.0, 0.0], [0.0, 0.0], [left[0], 0.0], [crossed, left[1] if second_s > 0.0 else 0.0]])
     step = np.column_stack([follows, follows + inflow, held])
     through = np.column_stack([follows, inflow])
-    wandering = 1e-8 * through @ np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]) @ through.T
+    of_inflow = 1e-8 * np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]) + np.diag([1e-7, 0.0])
+    wandering = through @ of_inflow @ through.T
     seen = np.array([[0.0], [0.0], [0.0], [1.0]])
     before = linalg.solve_discrete_are(step.T, seen, wandering + 1e-22 * np.eye(4), np.array([[4e-6]]))
     gains, variance_m2 = level_filter(UNCERTAIN, sensor)
@@ -47,9 +49,10 @@ def test_rows_of_a_minute_are_those_of_the_continuous_model():
     """Without a lag, against the two states that go from row to row at once."""
     rows = np.arange(SECONDS) % 60 == 59
     gains, variance_m2 = level_filter(replace(UNCERTAIN, is_known=rows), SENSOR)
-    step, drift = 60.0, 1e-8
+    step, drift, waves = 60.0, 1e-8, 1e-7
     move = np.array([[1.0, step], [0.0, 1.0]])
     wandering = drift * np.array([[step**3 / 3.0, step**2 / 2.0], [step**2 / 2.0, step]])
+    wandering[0, 0] += waves * step
     before = linalg.solve_discrete_are(move.T, np.array([[1.0], [0.0]]), wandering, np.array([[4e-6]]))
     last = np.flatnonzero(rows)[-1]
     assert variance_m2[last] == pytest.approx(before[0, 0] + 4e-6, rel=1e-6)

@@ -6,12 +6,27 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from wetwell.protocols.quantities import LEVEL
 from wetwell.sim2real.recording.by_hand import left_alone
 from wetwell.sim2real.recording.drives import Drives
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.observer import constant_observer, forced_observer, hides_cycles, row_observer
+from wetwell.sim2real.replay.inflow_process import InflowProcess
+from wetwell.sim2real.replay.observer import (
+    constant_observer,
+    forced_observer,
+    hides_cycles,
+    row_observer,
+    uncertain_of,
+)
+from wetwell.simulator.parameters import plant_parameters
 
 SECONDS = 7200
+
+
+def observer_of(traces, station, **process):
+    uncertain = replace(uncertain_of(traces, station, traces.level_m), **process)
+    process = InflowProcess(lags_s=(0.0,), under=(uncertain,))
+    return row_observer(traces.level_m, process, plant_parameters(station).sensors[LEVEL])
 
 
 @pytest.fixture
@@ -48,7 +63,7 @@ def test_a_level_of_each_second_is_followed_slowly_and_begun_anew_after_a_pause(
 
 
 def test_after_a_start_whose_moment_is_open_the_level_is_taken_from_the_row_and_nobody_is_blamed(alpha, traces):
-    observer = row_observer(traces, alpha, 0.0, traces.level_m)
+    observer = observer_of(traces, alpha)
     carried_m = 50.0 * 3600.0**-1 / alpha.sump.area_m2
     assert observer.deviation_m[3600] > 10.0 * observer.deviation_m[3540] > 0.1 * carried_m
     assert observer.level_gain[3600] > 0.99 > observer.level_gain[3540]
@@ -59,7 +74,7 @@ def test_what_a_start_may_hide_goes_by_the_flow_that_is_recorded(alpha, traces):
     frequency_hz = np.where(np.arange(SECONDS) >= 3600, 50.0, 0.0) * np.eye(pumps)[0][:, None]
     running = replace(traces, drives=replace(traces.drives, frequency_hz=frequency_hz))
     rated, half = (
-        row_observer(one, alpha, 0.0, traces.level_m).deviation_m[3600]
+        observer_of(one, alpha).deviation_m[3600]
         for one in (running, replace(running, signals={"flow_m3h": np.where(frequency_hz > 0.0, 50.0, np.nan)}))
     )
     assert half == pytest.approx(50.0 / 3600.0 * 50.0 / alpha.sump.area_m2 / np.sqrt(12.0), rel=0.05)
@@ -67,7 +82,7 @@ def test_what_a_start_may_hide_goes_by_the_flow_that_is_recorded(alpha, traces):
 
 
 def test_an_inflow_that_is_not_measured_is_followed_but_for_what_a_start_may_hide(alpha, traces):
-    observer = row_observer(replace(traces, inflow_m3h=None), alpha, 1e-12, traces.level_m)
+    observer = observer_of(replace(traces, inflow_m3h=None), alpha, drift_m2_s3=1e-12)
     assert observer.inflow_gain[3540] > 0.0
     assert observer.inflow_gain[3600] < 0.1 * observer.inflow_gain[3540]
     assert np.all(observer.deviation_m[3660:3780:60] >= observer.deviation_m[3540])
