@@ -18,9 +18,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from past_defects import PAST_DEFECTS, PastDefect
 
@@ -30,6 +31,8 @@ MOST_S = 120.0
 """Of a core for one site without a defect: it takes a few."""
 HOUR_S = 3_600.0
 """Of each core, in which all defects are looked for."""
+FURTHER = 1_000
+"""Seeds further on from which defects are looked for that were not found."""
 PARTS = ("benchmarks", "detector", "protocols", "services", "sim2real", "simulator", "src", "tests")
 
 
@@ -50,7 +53,7 @@ def put_back(folder: Path, defect: PastDefect) -> None:
     path.write_text(text.replace(defect.now, defect.then), encoding="utf-8")
 
 
-def looked_for(folder: Path, first_seed: int, budget_s: float) -> dict[str, object]:
+def looked_for(folder: Path, first_seed: int, budget_s: float) -> dict[str, Any]:
     """What a copy of the project breaks within some seconds of a core: seed and rule; None where nothing was found.
 
     A seed that breaks a rule without the defect, too, has not found it. The seconds are those that the processes had
@@ -71,12 +74,36 @@ def looked_for(folder: Path, first_seed: int, budget_s: float) -> dict[str, obje
     return {"seed": None, "rule": None, "s": round(spent_s, 1)}
 
 
-def looked_for_in_copy(defect: PastDefect, first_seed: int, budget_s: float) -> dict[str, object]:
+def looked_for_in_copy(defect: PastDefect, first_seed: int, budget_s: float) -> dict[str, Any]:
     """The same for a defect, put back into a copy of its own."""
     with copied() as folder:
         put_back(folder, defect)
         found = looked_for(folder, first_seed, budget_s)
     print(f"{defect.name}: {found}", file=sys.stderr)
+    return found
+
+
+def all_looked_for(
+    pool: ThreadPoolExecutor, defects: Sequence[PastDefect], first_seed: int, budget_s: float
+) -> dict[str, dict[str, Any]]:
+    """What is found of each defect within some seconds of a core."""
+    results = pool.map(lambda defect: looked_for_in_copy(defect, first_seed, budget_s), defects)
+    return {defect.name: result for defect, result in zip(defects, results, strict=True)}
+
+
+def found_in_an_hour(
+    pool: ThreadPoolExecutor, defects: Sequence[PastDefect], first_seed: int, left_s: float
+) -> dict[str, dict[str, Any]]:
+    """The same, where what is found early leaves its time to the others, which go on with further seeds."""
+    found: dict[str, dict[str, Any]] = {}
+    open_ = list(defects)
+    while open_ and left_s > MOST_S * len(open_):
+        results = all_looked_for(pool, open_, first_seed, left_s / len(open_))
+        left_s -= sum(one["s"] for one in results.values())
+        for name, one in results.items():
+            found[name] = one | {"s": round(one["s"] + found.get(name, {"s": 0.0})["s"], 1)}
+        open_ = [defect for defect in open_ if found[defect.name]["seed"] is None]
+        first_seed += FURTHER
     return found
 
 
@@ -125,7 +152,7 @@ def main() -> None:
     parser.add_argument(
         "--budget-s",
         type=float,
-        help="of a core for each defect; without it all together have an hour of each worker",
+        help="of a core for each defect; without it all together have an hour of each worker, and share what is left",
     )
     parser.add_argument("--only", default="", help="those whose name has this text")
     parser.add_argument("--list", action="store_true", help="print the defects, and look for none")
@@ -134,14 +161,16 @@ def main() -> None:
     if given.list:
         print("\n".join(f"{defect.mended_in}  {defect.name}" for defect in chosen))
         return
-    budget_s, begin_s = given.budget_s or HOUR_S * given.workers / len(PAST_DEFECTS), time.monotonic()
+    begin_s = time.monotonic()
     with ThreadPoolExecutor(given.workers) as pool:
-        results = pool.map(lambda defect: looked_for_in_copy(defect, given.first_seed, budget_s), chosen)
-        found = {defect.name: result for defect, result in zip(chosen, results, strict=True)}
+        if given.budget_s:
+            found = all_looked_for(pool, chosen, given.first_seed, given.budget_s)
+        else:
+            found = found_in_an_hour(pool, chosen, given.first_seed, HOUR_S * given.workers)
     result = {
         "first_seed": given.first_seed,
         "workers": given.workers,
-        "budget_s": budget_s,
+        "budget_s": given.budget_s,
         "wall_s": round(time.monotonic() - begin_s, 1),
         "load": os.getloadavg(),
         "defects": len(chosen),
