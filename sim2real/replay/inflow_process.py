@@ -33,7 +33,7 @@ COST_ALIKE = 1.0
 LEAST_TOLD = 3.84
 """Twice the logarithm of the likelihood by which a lag must be the less likely one: 95 % of chi-squared."""
 MOST_S = 100_000
-"""Seconds at rest from which an inflow is learnt: evenly chosen rests, where there are more."""
+"""Seconds at rest from which an inflow is learnt: those of the first rests, where there are more."""
 MOST_SQUARE = 9.0
 """Square of a standardised error beyond which it says no more about how an inflow moves."""
 
@@ -170,7 +170,7 @@ def _at_rest(
 ) -> _Rest:
     """Level of the idle seconds; before each rest there is a pause, after which all but the inflow begins anew."""
     rests = np.split(idle, np.flatnonzero(np.diff(idle) > 1) + 1)
-    rests = rests[:: -(-idle.size // MOST_S)]
+    rests = rests[: int(np.searchsorted(np.cumsum([rest.size for rest in rests]), MOST_S)) + 1]
     begin = np.cumsum([rest.size for rest in rests])[:-1]
     place = np.insert(np.concatenate(rests), np.repeat(begin, int(uncertain.lost_s) + 1), -1)
     is_known = uncertain.is_known[place] & (place >= 0)
