@@ -8,7 +8,7 @@ IMAGE ?= wetwell:latest
 BUILDER ?= docker
 BASE ?= python:3.11-slim-bookworm
 WORKERS := 3
-PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=loadgroup --durations=10
+PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.

@@ -17,12 +17,16 @@ from wetwell.services.stations import find_station
 settings.register_profile("wetwell", deadline=None)
 settings.load_profile("wetwell")
 
-LONGEST = ("test_site.py", "test_wheel.py", "test_kill.py", "test_run_commands.py")
-"""Files with the tests that take longest."""
+LONGEST = (
+    *("test_site.py", "test_kill.py", "test_run_commands.py", "test_gap_rates.py", "test_gap.py", "test_trial.py"),
+    *("test_processes.py", "test_blocks.py", "test_restart.py", "test_fleet.py", "test_watching.py", "test_start.py"),
+    *("test_experiments.py", "test_simulated_site.py", "test_prometheus.py", "test_historian.py", "test_failover.py"),
+)
+"""Files that take longest: each is run by one process, which makes its fixtures once."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest tests, so that at the end no worker waits for another."""
+    """Begin with the longest files, so that at the end no worker waits for another."""
     items.sort(key=lambda item: item.path.name not in LONGEST)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.check, pytest.mark.xdist_group("site")]
+pytestmark = pytest.mark.check
 
 ROOT = Path(__file__).parents[2]
 SAID = {

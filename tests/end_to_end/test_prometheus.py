@@ -19,7 +19,6 @@ from ports import free_port
 
 pytestmark = [
     pytest.mark.check,
-    pytest.mark.xdist_group("prometheus"),
     pytest.mark.skipif(
         shutil.which("prometheus") is None, reason="prometheus is not installed (Debian package of that name)"
     ),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.check, pytest.mark.xdist_group("wheel"), pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.check, pytest.mark.timeout(1800)]
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent

@@ -22,8 +22,6 @@ from wetwell.simulator.effects import effects_of
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = pytest.mark.xdist_group("correction")
-
 HOURS_S = 43_200
 
 

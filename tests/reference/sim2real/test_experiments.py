@@ -14,7 +14,7 @@ from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.simulator.scenario import DEFAULT_START_NS
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = [pytest.mark.check, pytest.mark.xdist_group("experiments")]
+pytestmark = pytest.mark.check
 
 ONLY = ("motor_slip", "friction_bias", "static_head_bias")
 STATION = """name = "north"

@@ -23,8 +23,6 @@ from wetwell.services.trial.swmm_plant import run_swmm
 from wetwell.sim2real.trial.cases import KINDS, StoragePlan, trial_case
 from wetwell.sim2real.truth.case import Deviation, TruthCase
 
-pytestmark = pytest.mark.xdist_group("trial")
-
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
 COUNT = 12
 SECONDS = 14_400

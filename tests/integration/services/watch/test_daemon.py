@@ -21,8 +21,6 @@ from wetwell.services.watch.daemon import WatchService
 from wetwell.services.watch.station_watcher import StationWatcher
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = pytest.mark.xdist_group("watch")
-
 ALPHA = find_station("alpha")
 DAYS_S = 2 * 86_400 + 60
 

@@ -20,8 +20,6 @@ CONDITIONS = Conditions(
     inflow_m3h=60.0, signals=("level_m", "flow_m3h", "head_m", "power_kw"), rate_s=1.0, value="instant"
 )
 
-pytestmark = pytest.mark.xdist_group("proposals")
-
 
 def possible(probability, name, **parameters):
     return PossibleSet(effects=(EFFECTS[name](**parameters),), probability=probability, spread=())
