@@ -20,9 +20,14 @@ def files(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def fitted(files):
-    return files / "fitted.toml"
+@pytest.fixture
+def fitted(run_wetwell, capsys, files):
+    """The station file as the recording has it, made once, and what was told of it."""
+    out, told = files / "fitted.toml", files / "told.json"
+    if not told.exists():
+        given = ("--recording", files / "week.parquet", "--station", files / "station.toml", "--out", out)
+        told.write_text(json.dumps(asked(run_wetwell, capsys, "calibrate", *given)))
+    return out, json.loads(told.read_text())
 
 
 def asked(run_wetwell, capsys, *arguments):
@@ -30,11 +35,8 @@ def asked(run_wetwell, capsys, *arguments):
     return json.loads(capsys.readouterr().out)
 
 
-def test_calibrate_tells_value_interval_prior_unit_and_reason(run_wetwell, capsys, files, fitted):
-    told = asked(
-        run_wetwell, capsys, "calibrate", "--recording", files / "week.parquet", "--station", files / "station.toml",
-        "--out", fitted,
-    )  # fmt: skip
+def test_calibrate_tells_value_interval_prior_unit_and_reason(fitted):
+    _, told = fitted
     rows = {row["name"]: row for row in told["parameters"]}
     row = rows["pump[5].head_scale"]
     assert row["low"] < row["value"] < row["high"]
@@ -46,8 +48,9 @@ def test_calibrate_tells_value_interval_prior_unit_and_reason(run_wetwell, capsy
 
 
 def test_validate_compares_row_by_row_beside_the_file_before(run_wetwell, capsys, files, fitted):
+    path, _ = fitted
     told = asked(
-        run_wetwell, capsys, "validate", "--recording", files / "week.parquet", "--station", fitted,
+        run_wetwell, capsys, "validate", "--recording", files / "week.parquet", "--station", path,
         "--before", files / "station.toml",
     )  # fmt: skip
     assert told["closed_loop"] == "control.mode 'external': no levels start pumps"
