@@ -268,25 +268,26 @@ class Replay:
             return forced if level_m is traces.level_m else replace(forced, level_m=level_m)
         if traces.inflow_m3h is not None and traces.is_each_second:
             return constant_observer(level_m)
-        uncertain, sensor = uncertain_of(traces, station, level_m), self._plant(self.own).sensors[LEVEL]
+        plant = self._plant(self.own)
+        uncertain, sensor = uncertain_of(traces, station, level_m), plant.sensors[LEVEL]
         if traces.inflow_m3h is not None:
             return row_observer(level_m, InflowProcess(lags_s=(0.0,), under=(uncertain,)), sensor)
         regime = regimes_of(traces, station).of_station
         settled = uncertain.is_known & _settled(regime)
-        carried_m_s = float(np.max(self._plant(self.own).rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
+        carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
         process = learnt_process(uncertain, level_m, regime == IDLE, settled, sensor, carried_m_s, traces.rate_s)
         observer = row_observer(level_m, process, sensor)
-        scale = self._scale(observer, settled & np.isin(regime, (IDLE, STEADY, MULTI_PUMP)))
-        return replace(observer, deviation_m=None if observer.deviation_m is None else scale * observer.deviation_m)
+        return self._widened(observer, plant, settled & np.isin(regime, (IDLE, STEADY, MULTI_PUMP)))
 
-    def _scale(self, observer: Observer, rows: Flags) -> float:
-        """By how much errors of some levels are larger than they may be, 1 at the least; none counts for much."""
+    def _widened(self, observer: Observer, plant: PlantParameters, rows: Flags) -> Observer:
+        """The same with deviations as large as errors of some levels are, if that is more; none counts for much."""
         traces = self.traces
         if observer.deviation_m is None or not rows.any():
-            return 1.0
-        level_m = self._computed(self.own, self._plant(self.own), traces.frequency_hz, observer)[0]
+            return observer
+        level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
         squares = ((traces.level_m - trailing_means(level_m, traces.span_s)) / observer.deviation_m)[rows] ** 2
-        return float(np.sqrt(max(float(np.mean(np.minimum(squares, MOST_SQUARE))), 1.0)))
+        scale = np.sqrt(max(float(np.mean(np.minimum(squares, MOST_SQUARE))), 1.0))
+        return replace(observer, deviation_m=scale * observer.deviation_m)
 
     def _healthy(self, inflow_m3h: Floats, columns: Floats | None) -> Forcing:
         """Forcing without faults, the valves of the mains as the crew had them."""
