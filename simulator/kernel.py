@@ -168,15 +168,15 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
             now.ragging = 0.0
             if state.flow_m3h[i] <= 0.0:
                 continue
-        left = (1.0 - pump.slip * now.load) * (1.0 - now.ragging)
+        left = (1.0 - pump.slip * now.load) * (1.0 - pump.ragging_speed_loss * now.ragging)
         factor = forcing.speed_factor[i, second] * (1.0 + state.correction[SPEED, i])
         state.speed_ratio[i] = now.shaft_ratio * left * factor
-        now.ragging += (pump.ragging_limit - now.ragging) / pump.ragging_s
         factor = forcing.head_factor[i, second] * (1.0 + state.correction[PUMP_HEAD, i])
         leak_m3h = forcing.internal_leak_m3h[i, second]
         state.curves[i, 0] = factor * (pump.c0 + (pump.c1 + pump.c2 * leak_m3h) * leak_m3h)
         state.curves[i, 1] = factor * (pump.c1 + 2.0 * pump.c2 * leak_m3h)
-        state.curves[i, 2] = factor * pump.c2
+        state.curves[i, 2] = factor * pump.c2 - pump.ragging_h2_m5 * now.ragging
+        now.ragging += (1.0 - now.ragging) / pump.ragging_s
 
 
 @inlined

@@ -32,10 +32,11 @@ SMALLEST_HEAD_M = 1e-6
 class PumpParameters:
     """A pump: its main, its curve and rated duty, and what is not as new.
 
-    Its shaft power is a line over the flow, from `shutoff_power_share` of the rated one at no flow. Rags take speed,
-    in a run ever more, towards `ragging_limit` with time constant `ragging_s`. `slip` is the loss of speed at rated
-    torque, and `slip_power_exponent` the power of that speed with which the electrical power falls. While the pump
-    stands, `valve_leak_m3h` flows back through its check valve at 1 m of head.
+    Its shaft power is a line over the flow, from `shutoff_power_share` of the rated one at no flow. Rags gather in a
+    run with time constant `ragging_s`: all of them cost `ragging_speed_loss` of the speed, and `ragging_h2_m5` Q² of
+    head. `slip` is the loss of speed at rated torque, and `slip_power_exponent` the power of that speed with which
+    the electrical power falls. While the pump stands, `valve_leak_m3h` flows back through its check valve at 1 m of
+    head.
     """
 
     c0: float
@@ -46,7 +47,8 @@ class PumpParameters:
     rated_flow_m3h: float
     rated_shaft_kw: float
     shutoff_power_share: float
-    ragging_limit: float = 0.0
+    ragging_speed_loss: float = 0.0
+    ragging_h2_m5: float = 0.0
     ragging_s: float = math.inf
     slip: float = 0.0
     slip_power_exponent: float = 0.0

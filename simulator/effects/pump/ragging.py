@@ -8,15 +8,19 @@ from wetwell.simulator.parameters import PlantParameters
 
 
 class Ragging(Effect):
-    r"""Rags gather on the impeller in a run, as a loss of speed that grows to a limit; the stop sheds them.
+    r"""Rags gather in a run, to a limit: on the impeller they cost speed, before it head; the stop sheds them.
 
-    $$N = N_c (1 - \rho), \qquad \frac{d\rho}{dt} = \frac{\rho_{\max} - \rho}{\tau} \text{ in a run}, \qquad
-    \rho = 0 \text{ after a stop}$$
+    $$\frac{d\rho}{dt} = \frac{1 - \rho}{\tau} \text{ in a run}, \qquad \rho = 0 \text{ after a stop}, \qquad
+    N = N_c (1 - \rho\,n), \qquad H = H(Q, N) - \rho\,h\,(Q / Q_r)^2$$
+
+    with the rated flow Q_r.
 
     Parameters
     ----------
     speed_loss : float
-        ρ_max, share of the speed that all rags together cost; 0 is no effect. [1]
+        n, share of the speed that all rags together cost; 0 is none. [1]
+    throttle_m : float
+        h, head that all rags together cost at the rated flow; 0 is none. [m]
     growth_s : float
         τ, running time in which 63 % of the rags have gathered. [s]
     pump : int
@@ -26,19 +30,27 @@ class Ragging(Effect):
     ----------
     .. [1] After Eshkofti et al., Modeling and physics-enhanced fault detection in wastewater pump stations:
        a blockage as a loss of effective speed.
+    .. [2] I. E. Idelchik, Handbook of Hydraulic Resistance: a narrowed inlet loses head with the square of the flow.
     """
 
     component: ClassVar[Component] = "pump"
-    neutral: ClassVar[dict[str, float]] = {"speed_loss": 0.0}
+    neutral: ClassVar[dict[str, float]] = {"speed_loss": 0.0, "throttle_m": 0.0}
     may_change: ClassVar[bool] = True
 
     name: Literal["ragging"] = "ragging"
-    speed_loss: Annotated[float, limits(0.0, 0.5, "1")]
+    speed_loss: Annotated[float, limits(0.0, 0.5, "1")] = 0.0
+    throttle_m: Annotated[float, limits(0.0, 20.0, "m")] = 0.0
     growth_s: Annotated[float, limits(30.0, 1.0e5, "s")] = 600.0
     pump: PumpNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let rags gather."""
         return parameters.with_pumps(
-            lambda pump: replace(pump, ragging_limit=self.speed_loss, ragging_s=self.growth_s), self.pump
+            lambda pump: replace(
+                pump,
+                ragging_speed_loss=self.speed_loss,
+                ragging_h2_m5=self.throttle_m / pump.rated_flow_m3h**2,
+                ragging_s=self.growth_s,
+            ),
+            self.pump,
         )

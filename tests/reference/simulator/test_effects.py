@@ -259,6 +259,19 @@ def test_ragging_grows_in_a_run_and_is_shed_at_the_stop(quiet_alpha):
     np.testing.assert_allclose(speeds_of(rows, 2)[steady(rows, 2)], 1.0, atol=1e-9)
 
 
+def test_rags_that_throttle_cost_head_with_the_square_of_the_flow(quiet_alpha):
+    throttle_m, growth_s = 6.0, 120.0
+    effect = {"name": "ragging", "throttle_m": throttle_m, "growth_s": growth_s, "pump": 1}
+    rows = run(quiet_alpha, effect, inflow_m3h=600.0, level_m=2.2, seconds=400)
+    (start, *_) = np.flatnonzero(rows["pump1_frequency_hz"] > 0)
+    for second in (60, 150, 300):
+        share = 1.0 - np.exp(-second / growth_s)
+        square = FRICTION + share * throttle_m / duty_m3h() ** 2
+        throttled = brentq(lambda q, k=square: head_m(1.0, q) - STATIC_M - k * q**2, 0, 1e3, xtol=1e-12)
+        assert rows["pump1_flow_m3h"][start + second] == pytest.approx(throttled, rel=2e-3)
+    assert rows["pump2_flow_m3h"][-1] == pytest.approx(duty_m3h(), abs=EXACT)
+
+
 @pytest.mark.parametrize("slip", [0.05, 0.15])
 def test_motor_slip_follows_the_torque(quiet_alpha, slip):
     """Torque over rated torque at commanded speed: 0.4 + 0.6 Q / Q_n; power as commanded."""
