@@ -10,6 +10,7 @@ from wetwell.sim2real.attribution.testable import OF_TELEMETRY
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import POWER, Bins
+from wetwell.sim2real.residuals.signals import ZERO_SHARE
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import plant_parameters
@@ -52,7 +53,7 @@ def initial_guesses(
         guess |= _swing(residuals.bins, replay.traces.time_s, plain)
     if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
         flow_m3h = replay.traces.signals["flow_m3h"]
-        least_m3h = float(np.min(flow_m3h[flow_m3h > 0.0], initial=np.inf))
+        least_m3h = float(np.min(flow_m3h[flow_m3h > ZERO_SHARE * np.nanmax(flow_m3h)], initial=np.inf))
         return [guess | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [guess]
     if "reference_level_m" in names:
         return [guess | {"reference_level_m": far * middle_m} for far in REFERENCES]

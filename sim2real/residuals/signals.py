@@ -36,6 +36,8 @@ RAMP_ROWS = 4
 """Rows in a ramp from which it is looked at."""
 TRANSIENT_S = 2.0
 """Time for which a mean may miss, or have too much of, a flow at each start and stop: nobody sees its form. [s]"""
+ZERO_SHARE = 0.001
+"""Share of a flow under which a reading is a zero: what a filter forgets, or rounding leaves. [1]"""
 QUANTUM_SHARE = 0.75
 """Share of a quantum by which a rounded value may be off: half of it, and the same if it is cut off instead."""
 
@@ -61,10 +63,37 @@ class SignalResiduals:
         error = self.recorded - values[self.seconds.second]
         sensor = prediction.plant.sensors[_channel(prediction.plant, self.name, self.pump)]
         if self.pattern is not None:
+            if sensor.deadband > 0.0 and self.pattern.pause_s > 0:
+                low, high = _since(values, self.pattern.pause_s)
+                nearest = np.clip(self.recorded, low[self.seconds.second], high[self.seconds.second])
+                error = np.where(self.is_repeated, self.recorded - nearest, error)
             held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
             allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum)
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
+        if sensor.cutoff > 0.0:
+            error -= _cut(self.recorded, values[self.seconds.second], sensor.cutoff)
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
+
+
+def _since(values: Floats, pause_s: int) -> tuple[Floats, Floats]:
+    """(n,) least and most that a value was within a pause before, and now."""
+    low, high = values.copy(), values.copy()
+    for back in range(1, pause_s + 1):
+        low[back:] = np.minimum(low[back:], values[:-back])
+        high[back:] = np.maximum(high[back:], values[:-back])
+    return low, high
+
+
+def _cut(recorded: Floats, predicted: Floats, cutoff: float) -> Floats:
+    """(n,) what a cutoff explains of recorded minus predicted: a zero only says that the value was under it.
+
+    References
+    ----------
+    .. [1] J. Tobin, Estimation of relationships for limited dependent variables, Econometrica 26, 1958.
+    """
+    is_cut = (recorded < ZERO_SHARE * cutoff) & (predicted >= cutoff)
+    was_cut = (predicted == 0.0) & (recorded >= cutoff)
+    return np.asarray(cutoff * (was_cut.astype(np.float64) - is_cut), dtype=np.float64)
 
 
 def _channel(plant: PlantParameters, name: AnalogueQuantity, pump: int) -> int:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
@@ -56,12 +56,14 @@ STRENGTH = 12.0
 class Pattern:
     """A channel that is held within a deadband, or lies on a lattice of a quantum; in its unit, 0 for neither.
 
-    `within` are the shares of it between which it may be.
+    `within` are the shares of it between which it may be. A held value is not sent again for `pause_s`, however far
+    it moves.
     """
 
     quantity: AnalogueQuantity
     deadband: float = 0.0
     quantum: float = 0.0
+    pause_s: int = 0
     within: tuple[float, float] = (1.0, 1.0)
 
     @property
@@ -164,14 +166,21 @@ class _Moves:
     """Sizes of the moves of a channel, and the share of its values that are held.
 
     `soon` are those that follow another soon, so were not sent as their time was up, `is_soon_calm` which of these
-    are in no ramp, and `calm` all that are in none.
+    are in no ramp, and `calm` all that are in none. `waits_s` is the time from move to move in ramps, where a value
+    would move each second.
     """
 
     all: Floats
     soon: Floats
     is_soon_calm: Flags
     calm: Floats
+    waits_s: Integers
     held_share: float
+
+    @property
+    def pause_s(self) -> int:
+        """Whole seconds for which a value is held in ramps too."""
+        return round(float(np.quantile(self.waits_s, FEW))) - 1 if self.waits_s.size >= MIN_MOVES else 0
 
 
 def _moves(parts: list[Floats], is_ramp: Flags) -> _Moves:
@@ -185,8 +194,15 @@ def _moves(parts: list[Floats], is_ramp: Flags) -> _Moves:
         soon=np.concatenate([size[at] for size, at in zip(sizes, soon_s, strict=True)]),
         is_soon_calm=np.concatenate([calm[at] for calm, at in zip(is_calm, soon_s, strict=False)]),
         calm=np.concatenate([size[at][calm[at]] for size, at, calm in zip(sizes, at_s, is_calm, strict=False)]),
+        waits_s=np.concatenate([np.diff(at)[_within(ramp, at)] for at, ramp in zip(at_s, is_ramp, strict=False)]),
         held_share=1.0 - moved.size / max(sum(int(np.isfinite(size).sum()) for size in sizes), 1),
     )
+
+
+def _within(is_ramp: Flags, at_s: Integers) -> Flags:
+    """Which of the times from move to move lie within one ramp."""
+    count = np.r_[0, np.cumsum(is_ramp)]
+    return np.asarray(count[at_s[1:] + 1] - count[at_s[:-1]] == np.diff(at_s) + 1)
 
 
 def _held(quantity: AnalogueQuantity, moves: _Moves, quantum: float) -> Pattern | None:
@@ -211,7 +227,8 @@ def _held(quantity: AnalogueQuantity, moves: _Moves, quantum: float) -> Pattern 
     deadband = float(np.quantile(soon, FEW))
     low, high = SEEN_SHARES if moves.is_soon_calm.sum() >= MIN_MOVES else IN_RAMPS
     rounding = quantum / deadband
-    return Pattern(quantity=quantity, deadband=deadband, within=(low * (1.0 - rounding), high * (1.0 + rounding)))
+    within = (low * (1.0 - rounding), high * (1.0 + rounding))
+    return Pattern(quantity=quantity, deadband=deadband, pause_s=moves.pause_s, within=within)
 
 
 def _has_edge(jumps: Floats) -> bool:

@@ -1,8 +1,9 @@
-"""What is left open where a pump is switched faster than a recording shows."""
+"""What residuals leave open: moments of switching, values under a cutoff, values that were not sent again."""
 
 import numpy as np
+import pytest
 
-from wetwell.sim2real.residuals.signals import _unresolved
+from wetwell.sim2real.residuals.signals import _cut, _since, _unresolved
 
 
 def test_a_jump_is_open_by_half_when_it_happens_and_by_less_and_less_afterwards():
@@ -16,3 +17,26 @@ def test_a_jump_is_open_by_half_when_it_happens_and_by_less_and_less_afterwards(
 
 def test_a_slow_ramp_leaves_nothing_open():
     assert not np.any(_unresolved(np.linspace(0.0, 100.0, 12), np.zeros(12, dtype=bool)))
+
+
+@pytest.mark.parametrize(
+    ("recorded", "predicted", "left"),
+    [
+        (0.0, 0.0, 0.0),
+        (0.0, 31.0, -1.0),
+        (4e-320, 31.0, -1.0),
+        (31.0, 0.0, 1.0),
+        (31.0, 33.0, -2.0),
+        (12.0, 0.0, 12.0),
+        (12.0, 33.0, -21.0),
+    ],
+)
+def test_a_zero_says_only_that_a_flow_was_under_the_cutoff(recorded, predicted, left):
+    recorded, predicted = np.array([recorded]), np.array([predicted])
+    assert recorded - predicted - _cut(recorded, predicted, 30.0) == pytest.approx(left)
+
+
+def test_a_value_that_waits_may_be_any_that_it_had_since():
+    low, high = _since(np.array([3.0, 5.0, 4.0, 9.0, 2.0]), 2)
+    np.testing.assert_array_equal(low, [3.0, 3.0, 3.0, 4.0, 2.0])
+    np.testing.assert_array_equal(high, [3.0, 5.0, 5.0, 9.0, 9.0])

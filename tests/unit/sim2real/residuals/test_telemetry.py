@@ -12,12 +12,12 @@ from wetwell.simulator.simulation import Simulation
 NAMES = [f"pump{i}_power_kw" for i in (1, 2, 3)]
 
 
-def held(values, deadband, report_s):
-    """What is sent of values: after a move by a deadband, or a time."""
+def held(values, deadband, report_s, pause_s=0):
+    """What is sent of values: after a move by a deadband, or a time, and not again for a pause."""
     sent, since = values.copy(), 0
     for row in range(1, values.size):
         since += 1
-        if abs(values[row] - sent[row - 1]) >= deadband or since >= report_s:
+        if (abs(values[row] - sent[row - 1]) >= deadband and since > pause_s) or since >= report_s:
             since = 0
         else:
             sent[row] = sent[row - 1]
@@ -67,6 +67,13 @@ def test_a_deadband_that_noise_passes_is_known_to_a_few_percent(recorded):
     (found,) = patterns(station, recording, **{name: held(recording.columns[name], 0.25, 10**6) for name in NAMES})
     assert found.deadband == pytest.approx(0.25, rel=0.05)
     assert found.missed(0.3) > 0.0
+
+
+@pytest.mark.parametrize("pause_s", [0, 2])
+def test_a_pause_after_each_value_is_seen_in_ramps(recorded, pause_s):
+    station, recording = recorded
+    (found,) = patterns(station, recording, **{n: held(recording.columns[n], 0.25, 10**6, pause_s) for n in NAMES})
+    assert found.pause_s == pause_s
 
 
 @pytest.mark.parametrize(("step_m", "is_told"), [(0.005, False), (0.01, False), (0.02, True)])
