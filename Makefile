@@ -8,7 +8,9 @@ IMAGE ?= wetwell:latest
 BUILDER ?= docker
 BASE ?= python:3.11-slim-bookworm
 WORKERS := 3
-PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder --durations=10
+# A file of daemons and pages stays in one process, which makes its site once; of the others idle processes take over.
+DIST := loadfile
+PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=$(DIST) --no-loadscope-reorder --durations=10
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
@@ -23,6 +25,7 @@ up: $(VENV)/.runtime  ## Run the whole service with a simulated station; Ctrl-C 
 	@exec $(BIN)/wetwell up --scenario $(SCENARIO)
 
 test: WORKERS := 4
+test: DIST := worksteal
 test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard each commit
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync kernels types modules lint imports
 	$(PYTEST) -m "not check and not long and not soak"

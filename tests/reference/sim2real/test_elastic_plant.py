@@ -300,7 +300,7 @@ def test_what_is_sent_on_change_waits_for_its_pause_and_is_never_older_than_its_
     assert sent.tolist() == [0.0, 0.0, 4.0, 4.0, 4.0, 6.5, 6.5, 6.5]
 
 
-@pytest.mark.check
+@pytest.mark.long
 def test_stations_differ_and_run_within_their_wells():
     pumps, layouts, unequal = set(), set(), set()
     for seed in range(24):

@@ -88,6 +88,7 @@ def test_what_a_crew_switches_is_no_shifted_threshold(answers):
     assert report.verdict == "none"
 
 
+@pytest.mark.long
 def test_experiment_prints_what_it_weighs_and_refuses_other_folders(answers, tmp_path):
     code, out, _ = wetwell("gap", "experiment", answers / "first")
     assert code == 0

@@ -72,6 +72,7 @@ def test_a_cutoff_of_a_second_or_two_a_ramp_is_told_beside_a_rougher_main(alpha)
     assert [effect.name for effect in told.effects] == ["friction_bias", "flow_low_cutoff"]
 
 
+@pytest.mark.long
 def test_a_delay_that_matters_to_nobody_is_not_told_beside_a_lag(alpha):
     lag = {"name": "flow_meter_lag", "lag_s": 6.0}
     delay = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.05}
@@ -119,7 +120,9 @@ def test_an_effect_that_the_library_lacks_is_unknown_at_its_component(alpha):
     assert told.where[0].component == "flow_meter"
 
 
-@pytest.mark.parametrize(("head_share", "verdict"), [(0.01, "effect"), (0.1, "none")])
+@pytest.mark.parametrize(
+    ("head_share", "verdict"), [pytest.param(0.01, "effect", marks=pytest.mark.long), (0.1, "none")]
+)
 def test_what_matters_is_up_to_the_station(alpha, head_share, verdict):
     """A head that is .8 m off is a gap for those who care for a per cent, and none for a tenth of it."""
     station = alpha.model_copy(update={"materiality": Materiality(head_share=head_share)})
@@ -145,7 +148,10 @@ def test_a_late_frequency_is_no_late_controller(alpha):
     assert told.gap.by_signal["start_level"].after < 1.5
 
 
-@pytest.mark.parametrize("missing", ["inflow_m3h", "power_kw", "head_m"])
+@pytest.mark.parametrize(
+    "missing",
+    [*(pytest.param(name, marks=pytest.mark.long) for name in ("inflow_m3h", "power_kw")), "head_m"],
+)
 def test_it_works_without_a_channel(alpha, missing):
     recording = record(alpha, [{"name": "friction_bias", "factor": 1.3}])
     kept = {name: values for name, values in recording.columns.items() if not name.endswith(missing)}

@@ -12,7 +12,7 @@ from wetwell.sim2real.watch.agreement import ToldFault
 from wetwell.sim2real.watch.state import WatchState
 from wetwell.sim2real.watch.watching import watched
 
-pytestmark = pytest.mark.check
+pytestmark = [pytest.mark.check, pytest.mark.long]
 
 ALPHA = find_station("alpha")
 CHANGE_S = 36_000

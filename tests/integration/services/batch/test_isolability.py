@@ -25,6 +25,7 @@ def recording(alpha, tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 def test_the_table_of_the_page_is_that_of_the_code(alpha):
     assert signals_markdown(alpha) in PAGE.read_text(encoding="utf-8")
 

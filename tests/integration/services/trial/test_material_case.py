@@ -80,7 +80,7 @@ def test_a_deviation_under_the_size_that_matters_is_found_beside_one_over_it(nam
     assert immaterial_name(deviating(quiet_truth(), gain, (name, over)), "fine") == ""
 
 
-@pytest.mark.parametrize("plant", ["fine", "elastic"])
+@pytest.mark.parametrize("plant", ["fine", pytest.param("elastic", marks=pytest.mark.long)])
 def test_a_station_that_starts_fuller_is_no_other_station(plant):
     truth = quiet_truth(plant, seconds=43_200)
     fuller = replace(truth, initial_level_m=truth.initial_level_m + 0.1)

@@ -323,7 +323,7 @@ def test_swmm_refuses_what_it_cannot_express(alpha):
         run_swmm(TruthCase(station=alpha, deviations=(Deviation(name="ragging"),), seconds=60))
 
 
-@pytest.mark.check
+@pytest.mark.long
 def test_a_trial_with_swmm(tmp_path, monkeypatch):
     pytest.importorskip("pyswmm", exc_type=ImportError)
     _, result = run_fake("perfect", tmp_path, monkeypatch, count=1, kinds=("single",), plants=("swmm",))
