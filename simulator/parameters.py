@@ -107,8 +107,9 @@ class SensorParameters:
     r"""How a channel measures and transmits.
 
     The sensor: $y = g\, x_\tau + o$ with x damped by one or two first-order lags in a row, of which `followed` and
-    `followed_again` are the shares of a step that they follow within a second and `carried` what the first still
-    brings to the second of where it was before, then noise $y (1 + \sigma n)$ (the level: $y + \sigma n$) with $n$
+    `followed_again` are the shares of a step that they follow within a second, `carried` what the first still brings
+    to the second of where it was before, and `late` and `late_again` the shares of the value of a second before,
+    since it moves evenly from second to second; then noise $y (1 + \sigma n)$ (the level: $y + \sigma n$) with $n$
     white or AR(1), then 0 below a cutoff. The telemetry: a delay, rounding to a quantum, and a value that is held
     until it has moved by a deadband.
     """
@@ -118,6 +119,8 @@ class SensorParameters:
     followed: float = 1.0
     followed_again: float = 1.0
     carried: float = 0.0
+    late: float = 0.0
+    late_again: float = 0.0
     noise: float = 0.0
     correlation: float
     cutoff: float = -math.inf
@@ -348,10 +351,15 @@ def _sensor_parameters(sensors: Sensors, pumps: int) -> tuple[SensorParameters, 
 def damped_by(sensor: SensorParameters, lag_s: float, second_share: float) -> SensorParameters:
     r"""The sensor with a lag, of which a second filter in a row takes a share.
 
-    What comes in is held over a second, so that both filters are exact:
+    What comes in moves evenly from u₀ to u within a second, as both filters see it exactly:
 
-    $$x_1 = u + (x_0 - u)\, e^{-1/\tau_1}, \qquad y_1 = u + (y_0 - u)\, e^{-1/\tau_2} + (x_0 - u)\, c, \qquad
-    c = \frac{1}{\tau_2} \int_0^1 e^{-t/\tau_1} e^{-(1 - t)/\tau_2}\, dt$$
+    $$x_1 = u + (x_0 - u)\, e^{-1/\tau_1} + (u_0 - u)\, l_x, \qquad
+    y_1 = u + (y_0 - u)\, e^{-1/\tau_2} + (x_0 - u)\, c + (u_0 - u)\, l_y$$
+
+    $$c = \frac{1}{\tau_2} \int_0^1 e^{-t/\tau_1} e^{-(1 - t)/\tau_2}\, dt, \qquad
+    l_x = \tau_1 (1 - e^{-1/\tau_1}) - e^{-1/\tau_1}, \qquad
+    l_y = \tau_1 + \tau_2 - \frac{\tau_1^2 e^{-1/\tau_1} - \tau_2^2 e^{-1/\tau_2}}{\tau_1 - \tau_2}
+    - e^{-1/\tau_2} - c$$
 
     Parameters
     ----------
@@ -363,12 +371,25 @@ def damped_by(sensor: SensorParameters, lag_s: float, second_share: float) -> Se
     """
     first_s, second_s = (1.0 - second_share) * lag_s, second_share * lag_s
     followed, followed_again = followed_share(first_s), followed_share(second_s)
-    carried = 0.0
+    late = first_s * followed - (1.0 - followed)
+    carried = late_again = 0.0
     if second_s > 0.0:
         faster = 1.0 / second_s - 1.0 / first_s
         carried = (followed_again - followed) / faster if faster > 1e-6 else 1.0 - followed_again
         carried /= second_s
-    return replace(sensor, followed=followed, followed_again=followed_again, carried=carried)
+        late_again = lag_s - _kept_s(first_s, second_s) - (1.0 - followed_again) - carried
+    return replace(
+        sensor, followed=followed, followed_again=followed_again, carried=carried, late=late, late_again=late_again
+    )
+
+
+def _kept_s(first_s: float, second_s: float) -> float:
+    """What two filters in a row still keep of their lag a second after a value began to move. [s]."""
+    if first_s - second_s < 1e-4 * first_s:
+        middle_s = 0.5 * (first_s + second_s)
+        return (2.0 * middle_s + 1.0) * math.exp(-1.0 / middle_s)
+    squares = [lag_s**2 * (1.0 - followed_share(lag_s)) for lag_s in (first_s, second_s)]
+    return (squares[0] - squares[1]) / (first_s - second_s)
 
 
 def followed_share(lag_s: float) -> float:

@@ -64,6 +64,7 @@ class PumpState:
 class ChannelState:
     """Sensor and telemetry of a channel; NaN where nothing has been read or sent yet."""
 
+    undamped: float = math.nan
     damped: float = math.nan
     damped_again: float = math.nan
     last_noise: float = 0.0

@@ -46,8 +46,8 @@ def replay_seconds(
     ----------
     plant, state, forcing
         As in the simulator's kernel.
-    damped : (2, 3, pumps) array
-        State of both filters of flow, head and power; to come as zeros.
+    damped : (3, 3, pumps) array
+        State of both filters of flow, head and power, and what came in last; to come as zeros.
     frequency_hz : (pumps, n) array
     measured_level_m : (n,) array
         NaN is "no value".
@@ -69,7 +69,7 @@ def replay_seconds(
     """
     now, sensor = state.station[0], plant.sensors[LEVEL]
     extra_m3h = 0.0
-    filtered_m = sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
+    came_m = filtered_m = sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
     share = sensor.delay_s - int(sensor.delay_s)
     for second in range(forcing.inflow_m3h.size):
         for i in range(state.pumps.size):
@@ -81,12 +81,10 @@ def replay_seconds(
         misread_m = state.correction[LEVEL_READING, 0]
         _read(plant, state, damped, second, truth, reading)
 
-        before_m, begun_m = filtered_m, sensed_m
-        filtered_m = follow(before_m, true_m + misread_m, sensor.followed)
-        if sensor.carried > 0.0:
-            sensed_m = follow_again(sensed_m, before_m, true_m + misread_m, sensor)
-        else:
-            sensed_m = filtered_m
+        last_m, before_m, begun_m = came_m, filtered_m, sensed_m
+        came_m = true_m + misread_m
+        filtered_m = follow(before_m, last_m, came_m, sensor)
+        sensed_m = follow_again(sensed_m, before_m, last_m, came_m, sensor) if sensor.carried > 0.0 else filtered_m
         expected_m = level_m[second] = sensed_m - share * (sensed_m - begun_m)
         if math.isnan(measured_level_m[second]):
             continue
@@ -98,13 +96,14 @@ def replay_seconds(
         if sensor_gain[1, second] >= 1.0:
             anew_m = max(measured_level_m[second] - misread_m, plant.profile[0].level_m)
             now.volume_m3 = volume_at_level_m3(anew_m, plant.profile)
-            filtered_m = sensed_m = measured_level_m[second]
+            came_m = filtered_m = sensed_m = measured_level_m[second]
         else:
             area_m2 = (
                 volume_at_level_m3(true_m + 0.01, plant.profile) - volume_at_level_m3(true_m, plant.profile)
             ) / 0.01
             corrected_m3 = now.volume_m3 + level_gain[second] * error_m * area_m2
             now.volume_m3 = max(corrected_m3, 0.0)
+            came_m += level_gain[second] * error_m
             filtered_m += sensor_gain[0, second] * error_m
             sensed_m += sensor_gain[1, second] * error_m
             extra_m3h += coming * inflow_gain[second] * error_m * area_m2 * 3600.0
@@ -123,10 +122,11 @@ def _read(plant: PlantRecords, state: PlantState, damped: Floats, second: int, t
             value = true_value
             is_seen = is_active
             if sensor.followed < 1.0:
-                before, came = damped[0, k, i], value
-                value = damped[0, k, i] = follow(before, came, sensor.followed)
+                before, last, came = damped[0, k, i], damped[2, k, i], value
+                value = damped[0, k, i] = follow(before, last, came, sensor)
                 if sensor.carried > 0.0:
-                    value = damped[1, k, i] = follow_again(damped[1, k, i], before, came, sensor)
+                    value = damped[1, k, i] = follow_again(damped[1, k, i], before, last, came, sensor)
+                damped[2, k, i] = came
                 is_seen = is_active or value > RESTING
             reading[k, i, second] = 0.0
             if is_seen:

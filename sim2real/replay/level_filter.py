@@ -61,7 +61,7 @@ class Uncertain:
 def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats, Floats]:
     r"""Gains of the filter, and the variances of its errors.
 
-    $$x = (L, b, s_1, s_2)^T, \qquad L' = L + b, \qquad s_1' = f L' + (1 - f)\, s_1, \qquad y = s_2 + v$$
+    $$x = (L, b, s_1, s_2)^T, \qquad L' = L + b, \qquad s_1' = (f - l) L' + l L + (1 - f)\, s_1, \qquad y = s_2 + v$$
 
     with L the level, b the inflow that is not known over the area, and $s_1$, $s_2$ what the filters of the sensor
     hold after a second; $s_2 = s_1$ where it has one, and L where it has none. The inflow wanders with q, and w of it
@@ -113,19 +113,20 @@ def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats
 
 
 def step_of(sensor: SensorParameters) -> tuple[Floats, Floats, float]:
-    """(4, 4) F of a second, (4,) shares of the level that each state takes, and the whole lag. [1, 1, s]."""
+    """(4, 4) F of a second, (4,) shares of the new level that each state takes, and the whole lag. [1, 1, s]."""
     first, again = sensor.followed, sensor.followed_again
-    second = (
-        (again - sensor.carried, sensor.carried, 1.0 - again) if sensor.carried > 0.0 else (first, 1.0 - first, 0.0)
-    )
-    of_level = np.array([1.0, 0.0, first, second[0]])
+    whole_s = (1.0 - first + sensor.late) / first
+    row, late = [first, 1.0 - first, 0.0], sensor.late
+    if sensor.carried > 0.0:
+        row, late = [again - sensor.carried, sensor.carried, 1.0 - again], sensor.late_again
+        whole_s = (1.0 - again + sensor.carried * (1.0 + whole_s) + late) / again
+    of_level = np.array([1.0, 0.0, first - sensor.late, row[0] - late])
     step = np.zeros((4, 4))
-    step[:, 0] = step[:, 1] = of_level
-    step[1] = [0.0, 1.0, 0.0, 0.0]
-    step[2, 2] = 1.0 - first
-    step[3, 2:] = second[1:]
-    lag_s = (1.0 - first) / first + (1.0 / again - 1.0 if sensor.carried > 0.0 else 0.0)
-    return step, of_level, lag_s
+    step[0, 0] = step[1, 1] = 1.0
+    step[:, 1] += of_level
+    step[2, [0, 2]] = first, 1.0 - first
+    step[3, [0, 2, 3]] = row
+    return step, of_level, whole_s
 
 
 @compiled

@@ -198,7 +198,10 @@ class Replay:
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         records = replace(plant, control_delay_s=0.0).records()
         read = tuple(
-            (sensor.gain, sensor.offset, sensor.followed, sensor.followed_again, sensor.carried, sensor.cutoff)
+            (
+                *(sensor.gain, sensor.offset, sensor.followed, sensor.followed_again, sensor.carried),
+                *(sensor.late, sensor.late_again, sensor.cutoff),
+            )
             for sensor in plant.sensors
         )
         delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
@@ -232,7 +235,7 @@ class Replay:
             replace(plant, control_delay_s=0.0).records(),
             first_state(plant, max(first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
-            np.zeros((2, len(PUMP_METERS), pumps)),
+            np.zeros((3, len(PUMP_METERS), pumps)),
             np.ascontiguousarray(later(frequency_hz, -_delay_s(plant, "frequency_hz"))),
             observer.level_m,
             observer.level_gain,
@@ -248,7 +251,7 @@ class Replay:
 
     def _of_lagging_level(self, observer: Observer, sensor: SensorParameters) -> Observer:
         """Observer of a level that lags; the last one, where neither the lag nor the observer is another."""
-        lag = (sensor.followed, sensor.followed_again, sensor.carried)
+        lag = (sensor.followed, sensor.followed_again, sensor.carried, sensor.late, sensor.late_again)
         last = self._lagging
         if last is None or last.of is not observer or last.lag != lag:
             last = self._lagging = _Lagging(of=observer, lag=lag, observer=observer.of_lagging_level(sensor))

@@ -32,10 +32,11 @@ def sense(
     out. A stuck sensor repeats its last reading; its noise is drawn all the same, so that nothing else changes.
     """
     if sensor.followed < 1.0:
-        before, value = state.damped, true_value
-        true_value = state.damped = follow(before, value, sensor.followed)
+        before, last, value = state.damped, state.undamped, true_value
+        true_value = state.damped = follow(before, last, value, sensor)
         if sensor.carried > 0.0:
-            true_value = state.damped_again = follow_again(state.damped_again, before, value, sensor)
+            true_value = state.damped_again = follow_again(state.damped_again, before, last, value, sensor)
+        state.undamped = value
         is_active = is_active or true_value > RESTING
     reading = 0.0
     if is_active:
@@ -57,19 +58,20 @@ def sense(
 
 
 @inlined
-def follow(damped: float, value: float, share: float) -> float:
-    """Output of a first-order lag a second later; it begins at its first input."""
+def follow(damped: float, last: float, value: float, sensor: SensorParameters) -> float:
+    """Output of a first-order lag a second later, its input gone from its last to a value; it begins at its first."""
     if math.isnan(damped):
-        damped = value
-    return damped + (value - damped) * share
+        return value
+    return value + (damped - value) * (1.0 - sensor.followed) + (last - value) * sensor.late
 
 
 @inlined
-def follow_again(damped: float, before: float, value: float, sensor: SensorParameters) -> float:
-    """Output of a second lag in a row a second later, of which the first had `before`, and gets a value."""
+def follow_again(damped: float, before: float, last: float, value: float, sensor: SensorParameters) -> float:
+    """Output of a second lag in a row a second later, of which the first had `before`."""
     if math.isnan(damped) or math.isnan(before):
         return value
-    return value + (damped - value) * (1.0 - sensor.followed_again) + (before - value) * sensor.carried
+    moved = value + (damped - value) * (1.0 - sensor.followed_again)
+    return moved + (before - value) * sensor.carried + (last - value) * sensor.late_again
 
 
 @inlined

@@ -6,6 +6,7 @@ most 1 / (2 e τ) of the final value; tolerances name the step that they allow f
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -384,12 +385,18 @@ def test_flow_meter_gain(quiet_alpha):
 
 
 def test_flow_meter_lag(quiet_alpha):
-    """Against the ODE under the true flow, which is constant over each second."""
+    """Against the ODE under the true flow, which moves evenly over each second."""
     lag_s = 8.0
     rows = run(quiet_alpha, {"name": "flow_meter_lag", "lag_s": lag_s}, seconds=450)
     reading, expected = 0.0, []
-    for flow_m3h in rows["truth_pump1_flow_m3h"]:
-        step = solve_ivp(lambda _t, y, q=flow_m3h: (q - y) / lag_s, (0, 1), [reading], rtol=1e-9, atol=1e-9)
+    for last, flow in pairwise(np.r_[0.0, rows["truth_pump1_flow_m3h"]]):
+        step = solve_ivp(
+            lambda t, y, last=last, flow=flow: (last + (flow - last) * t - y) / lag_s,
+            (0, 1),
+            [reading],
+            rtol=1e-9,
+            atol=1e-9,
+        )
         reading = step.y[0, -1]
         expected.append(reading)
     np.testing.assert_allclose(rows["pump1_flow_m3h"], expected, atol=1e-5)
@@ -400,7 +407,7 @@ def test_flow_meter_lag(quiet_alpha):
 
 @pytest.mark.parametrize("second_share", [0.02, 0.2, 0.5])
 def test_lags_of_two_filters_in_a_row(quiet_alpha, second_share):
-    """Against the two ODEs under the true flow and level."""
+    """Against the two ODEs under the true flow and level, which move evenly over each second."""
     lag_s = 8.0
     times_s = (1.0 - second_share) * lag_s, second_share * lag_s
     effects = [
@@ -413,9 +420,12 @@ def test_lags_of_two_filters_in_a_row(quiet_alpha, second_share):
         ("truth_level_m", "level_m", 1e-3),
     ):
         filtered, expected = [rows[read][0]] * 2, []
-        for value in rows[true]:
+        for last, value in pairwise(np.r_[rows[true][0], rows[true]]):
             both = solve_ivp(
-                lambda _t, x, value=value: ((value - x[0]) / times_s[0], (x[0] - x[1]) / times_s[1]),
+                lambda t, x, last=last, value=value: (
+                    (last + (value - last) * t - x[0]) / times_s[0],
+                    (x[0] - x[1]) / times_s[1],
+                ),
                 (0, 1),
                 filtered,
                 rtol=1e-9,

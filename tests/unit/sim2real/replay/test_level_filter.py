@@ -26,15 +26,22 @@ UNCERTAIN = Uncertain(
 
 @pytest.mark.parametrize(("lag_s", "second_share"), [(0.0, 0.0), (5.0, 0.0), (29.0, 0.0), (29.0, 0.4)])
 def test_gains_settle_at_those_of_the_riccati_equation(lag_s, second_share):
-    """Against scipy, with the lag as two filters of which what comes in is held over a second."""
+    """Against scipy, with the lag as two filters of what comes in, which moves evenly over a second."""
     sensor = damped_by(SENSOR, lag_s, second_share)
     first_s, second_s = (1.0 - second_share) * lag_s, second_share * lag_s
-    left = [np.exp(-1.0 / one) if one > 0.0 else 0.0 for one in (first_s, second_s)]
-    crossed = (left[0] - left[1]) / (first_s - second_s) * first_s if second_s > 0.0 else left[0]
-    follows = np.array([1.0, 0.0, 1.0 - left[0], 1.0 - left[1] - crossed if second_s > 0.0 else 1.0 - left[0]])
-    inflow = np.array([0.0, 1.0, 0.0, 0.0])
-    held = np.array([[0.0, 0.0], [0.0, 0.0], [left[0], 0.0], [crossed, left[1] if second_s > 0.0 else 0.0]])
-    step = np.column_stack([follows, follows + inflow, held])
+    rates = np.zeros((4, 4))  # of the level, how fast it moves, and both filters
+    rates[0, 1] = 1.0
+    if lag_s > 0.0:
+        rates[2, [0, 2]] = 1.0 / first_s, -1.0 / first_s
+    if second_s > 0.0:
+        rates[3, [2, 3]] = 1.0 / second_s, -1.0 / second_s
+    step = linalg.expm(rates)
+    if lag_s == 0.0:
+        step[2] = [1.0, 1.0, 0.0, 0.0]
+    if second_s == 0.0:
+        step[3] = step[2]
+    follows, inflow = step[:, 1].copy(), np.array([0.0, 1.0, 0.0, 0.0])
+    follows[1] = 0.0
     through = np.column_stack([follows, inflow])
     of_inflow = 1e-8 * np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]) + np.diag([1e-7, 0.0])
     wandering = through @ of_inflow @ through.T
