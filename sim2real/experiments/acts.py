@@ -10,6 +10,8 @@ REPEATS = 2
 """How often what is quickly over is done: once could be chance."""
 RUN_S = 600.0
 """Longest run that is asked for. [s]"""
+LONG_S = 3600.0
+"""Longest run of a pump that is left to run for long. [s]"""
 IDLE_S = 3600.0
 SHUT_S = 60.0
 """How long a station is left standing, and a pump held against a shut valve. [s]"""
@@ -41,22 +43,43 @@ def at_speeds(site: Site) -> Iterator[Act]:
 def tour(site: Site) -> Iterator[Act]:
     """One session of many duties: ever lower speeds, two pumps where there are two, and a low stop."""
     for i in site.apart:
-        together = tuple(dict.fromkeys((i, *site.ready)))[:2]
-        low = replace(_run(site, 1.0, i), low_m=site.low_m)
-        others = [_run(site, 1.0, *together), low] if len(together) > 1 else [low]
-        for lowest in RATIOS[1:]:
-            ratios = [ratio for ratio in RATIOS if ratio >= lowest]
-            if lowest <= site.least_ratio:
-                continue
-            runs = [*(_run(site, ratio, i) for ratio in ratios), *others]
-            said = f"at {', '.join(f'{100 * ratio:g}' for ratio in ratios)} % of its speed"
-            pair = f", with pump {together[1] + 1}" if len(together) > 1 else ""
+        for lowest in _lowest(site):
+            steps, said = _duties(site, i, lowest)
+            yield Act(name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}", sentence=f"{said}.", steps=steps)
+
+
+def tour_and_rest(site: Site) -> Iterator[Act]:
+    """All that can be done at the screens in one session: a tour, an hour in which nothing runs, and a long run."""
+    for i in site.apart:
+        for lowest in _lowest(site):
+            steps, said = _duties(site, i, lowest)
+            long = replace(_run(site, lowest, i), longest_s=LONG_S, low_m=site.low_m)
             yield Act(
-                name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}",
-                sentence=f"Let the wet well fill before each run, and run pump {i + 1} {said}{pair}, and at last "
-                f"down to {site.low_m:.2f} m, under the stop level.",
-                steps=tuple(step for run in runs for step in (site.fill(site.brim_m), run)),
+                name=f"tour_and_rest_pump_{i + 1}_to_{round(100 * lowest)}",
+                sentence=f"{said}. Then let all pumps stand for an hour or until the wet well is full, and run pump "
+                f"{i + 1} at {100 * lowest:g} % of its speed down to that level, for an hour at most.",
+                steps=(*steps, _stand(site), long, _stand(site), replace(long, speed_ratio=site.speeds(1.0, i))),
             )
+
+
+def _lowest(site: Site) -> Iterator[float]:
+    """Speeds down to which a tour goes, as shares of nominal. [1]."""
+    return (ratio for ratio in RATIOS[1:] if ratio > site.least_ratio)
+
+
+def _duties(site: Site, i: int, lowest: float) -> tuple[tuple[Step, ...], str]:
+    """Runs of a pump at ever lower speeds, with another one, and to a low stop, and how they are asked for."""
+    together = tuple(dict.fromkeys((i, *site.ready)))[:2]
+    low = replace(_run(site, 1.0, i), low_m=site.low_m)
+    ratios = [ratio for ratio in RATIOS if ratio >= lowest]
+    pairs = [_run(site, 1.0, *together)] if len(together) > 1 else []
+    runs = [*(_run(site, ratio, i) for ratio in ratios), *pairs, low]
+    said = f"at {', '.join(f'{100 * ratio:g}' for ratio in ratios)} % of its speed"
+    pair = f", with pump {together[1] + 1}" if len(together) > 1 else ""
+    return tuple(step for run in runs for step in (site.fill(site.brim_m), run)), (
+        f"Let the wet well fill before each run, and run pump {i + 1} {said}{pair}, and at last down to "
+        f"{site.low_m:.2f} m, under the stop level"
+    )
 
 
 def two_together(site: Site) -> Iterator[Act]:
@@ -73,12 +96,11 @@ def two_together(site: Site) -> Iterator[Act]:
 def idle(site: Site) -> Iterator[Act]:
     """An hour in which nothing runs, and a long run after it."""
     i = site.ready[0]
-    stand = Step(longest_s=IDLE_S, speed_ratio=site.speeds(0.0), high_m=site.brim_m)
     yield Act(
         name="idle_hour",
         sentence="Empty the wet well, let all pumps stand for an hour or until it is full, then pump it down with "
         f"pump {i + 1}.",
-        steps=(_run(site, 1.0, i), stand, _run(site, 1.0, i)),
+        steps=(_run(site, 1.0, i), _stand(site), _run(site, 1.0, i)),
     )
 
 
@@ -134,9 +156,15 @@ def _run(site: Site, ratio: float, *pumps: int) -> Step:
     return Step(longest_s=RUN_S, speed_ratio=site.speeds(ratio, *pumps), low_m=site.stop_m, high_m=site.high_m)
 
 
+def _stand(site: Site) -> Step:
+    """Nothing runs for an hour, or until the wet well is full."""
+    return Step(longest_s=IDLE_S, speed_ratio=site.speeds(0.0), high_m=site.brim_m)
+
+
 ACTS: tuple[Callable[[Site], Iterator[Act]], ...] = (
     at_speeds,
     tour,
+    tour_and_rest,
     two_together,
     idle,
     pumped_low,
