@@ -53,12 +53,13 @@ def tour_and_rest(site: Site) -> Iterator[Act]:
     for i in site.apart:
         for lowest in _lowest(site):
             steps, said = _duties(site, i, lowest)
+            pair, too = _slow_pair(site, i, lowest)
             long = replace(_run(site, lowest, i), longest_s=LONG_S, low_m=site.low_m)
             yield Act(
                 name=f"tour_and_rest_pump_{i + 1}_to_{round(100 * lowest)}",
-                sentence=f"{said}. Then let all pumps stand for an hour or until the wet well is full, and run pump "
+                sentence=f"{said}.{too} Then let all pumps stand for an hour or until the wet well is full, and run pump "
                 f"{i + 1} at {100 * lowest:g} % of its speed down to that level, for an hour at most.",
-                steps=(*steps, _stand(site), long, _stand(site), replace(long, speed_ratio=site.speeds(1.0, i))),
+                steps=(*steps, *pair, _stand(site), long, _stand(site), replace(long, speed_ratio=site.speeds(1.0, i))),
             )
 
 
@@ -67,9 +68,23 @@ def _lowest(site: Site) -> Iterator[float]:
     return (ratio for ratio in RATIOS[1:] if ratio > site.least_ratio)
 
 
+def _slow_pair(site: Site, i: int, ratio: float) -> tuple[tuple[Step, ...], str]:
+    """A run with another pump, both at a lower speed, and how it is asked for; nothing where there is one pump."""
+    together = _together(site, i)
+    if len(together) == 1:
+        return (), ""
+    said = f" Run pumps {i + 1} and {together[1] + 1} together at {100 * ratio:g} %, too."
+    return (site.fill(site.brim_m), _run(site, ratio, *together)), said
+
+
+def _together(site: Site, i: int) -> tuple[int, ...]:
+    """A pump and another one, where there is one."""
+    return tuple(dict.fromkeys((i, *site.ready)))[:2]
+
+
 def _duties(site: Site, i: int, lowest: float) -> tuple[tuple[Step, ...], str]:
     """Runs of a pump at ever lower speeds, with another one, and to a low stop, and how they are asked for."""
-    together = tuple(dict.fromkeys((i, *site.ready)))[:2]
+    together = _together(site, i)
     low = replace(_run(site, 1.0, i), low_m=site.low_m)
     ratios = [ratio for ratio in RATIOS if ratio >= lowest]
     pairs = [_run(site, 1.0, *together)] if len(together) > 1 else []

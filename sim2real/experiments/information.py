@@ -1,6 +1,7 @@
 """What an act is expected to tell of the truth, by the diagnosis' likelihood."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import solve
@@ -13,6 +14,7 @@ from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.covariance import Form
 from wetwell.sim2real.likelihood.evidence import weighed
+from wetwell.sim2real.likelihood.ways import KNOWN
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
@@ -20,6 +22,8 @@ from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
+POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
+"""What may be wrong in what is simulated: no simulation is wrong by itself, and a plant departs from each alike."""
 
 
 def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet]) -> Floats:
@@ -27,8 +31,9 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
 
     $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
 
-    with the residuals r at the fit, the covariance C of the cells, in each block the likelier of that of a good and
-    of a poor model, and changes d of the residuals along the directions of the set's spread.
+    with the residuals r at the fit, the covariance C of the cells, and changes d of the residuals along the
+    directions of the set's spread. What pumps and cycles share is taken from a poor model: what is simulated fits its
+    own set too well to show how wrong the simulator is at a plant.
 
     Raises
     ------
@@ -64,7 +69,7 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form)
     columns = np.column_stack([residuals, moved])
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
-        likelier, products, _ = weighed(block, columns[block.rows], residuals[block.rows], form.chosen(block.rows))
+        likelier, products, _ = weighed(block, columns[block.rows], residuals[block.rows], form.chosen(block.rows), POOR_ALIKE)
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]
