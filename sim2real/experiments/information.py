@@ -22,6 +22,7 @@ from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
+
 POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
 """What may be wrong in what is simulated: no simulation is wrong by itself, and a plant departs from each alike."""
 
@@ -69,7 +70,8 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form)
     columns = np.column_stack([residuals, moved])
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
-        likelier, products, _ = weighed(block, columns[block.rows], residuals[block.rows], form.chosen(block.rows), POOR_ALIKE)
+        rows = block.rows
+        likelier, products, _ = weighed(block, columns[rows], residuals[rows], form.chosen(rows), POOR_ALIKE)
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]
