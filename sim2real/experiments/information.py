@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import solve
-from scipy.special import logsumexp, rel_entr
+from scipy.special import logit, logsumexp, ndtr, rel_entr
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
@@ -14,6 +14,7 @@ from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.covariance import Form
 from wetwell.sim2real.likelihood.evidence import weighed
+from wetwell.sim2real.likelihood.posterior import CREDIBLE
 from wetwell.sim2real.likelihood.ways import KNOWN
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of
@@ -23,11 +24,15 @@ from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
 
+SURE = 1e-9
+"""Probability that is as good as none. [1]"""
 POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
 """What may be wrong in what is simulated: no simulation is wrong by itself, and a plant departs from each alike."""
 
 
-def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet]) -> Floats:
+def evidences(
+    recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet], truth: PossibleSet
+) -> Floats:
     r"""(sets,) logarithm of how probable recordings are together under each set, as far as it is known by now.
 
     $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
@@ -55,14 +60,14 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
     def means(effects: Sequence[object]) -> Floats:
         return cells.means(residuals.of(replay.run(effects)))  # type: ignore[arg-type]
 
-    without = means(())
+    without, shown = means(()), means(truth.effects)
     found = []
     for one in sets:
         best = means(one.effects)
         moved = [means(effects) - best for effects in one.spread]
         signature = np.abs(without - best)
         form = Form(signature=signature, swinging=np.zeros(signature.size), late=np.zeros(signature.size))
-        found.append(_log_probability(cells, best, np.array([*moved]).reshape(len(moved), best.size).T, form))
+        found.append(_log_probability(cells, best - shown, np.array([*moved]).reshape(len(moved), best.size).T, form))
     return np.array(found)
 
 
@@ -122,3 +127,30 @@ def information_bits(probability: Floats, after: Floats) -> float:
     -2.33
     """
     return float(0.0 - rel_entr(probability, np.diag(after)).sum() / np.log(2.0))
+
+
+def resolved_probability(probability: Floats, after: Floats) -> float:
+    r"""Probability that the true set has `CREDIBLE` after an act.
+
+    $$\sum_T P(T)\, \Phi\left(\frac{g_T - n_T}{\sqrt{2 g_T}}\right), \quad
+    g_T = \operatorname{logit} P'(T \mid T) - \operatorname{logit} P(T), \quad
+    n_T = \operatorname{logit} P_c - \operatorname{logit} P(T)$$
+
+    What Gaussian data tell of two sets, the logarithm of their odds, has twice its mean as variance.
+
+    Parameters
+    ----------
+    probability : (sets,) array
+    after : (truths, sets) array
+        As `told` makes it, of what is shown without noise.
+
+    Examples
+    --------
+    >>> even = np.array([0.5, 0.5])
+    >>> resolved_probability(even, np.array([[0.95, 0.05], [0.05, 0.95]])), resolved_probability(even, np.eye(2))
+    (0.5, 1.0)
+    """
+    before = logit(np.clip(probability, SURE, 1.0 - SURE))
+    gained = logit(np.clip(np.diag(after), SURE, 1.0 - SURE)) - before
+    spread = np.sqrt(2.0 * np.maximum(gained, SURE))
+    return round(float(probability @ ndtr((gained + before - logit(CREDIBLE)) / spread)), 6)
