@@ -148,7 +148,7 @@ def resolved_probability(probability: Floats, after: Floats) -> float:
     --------
     >>> even = np.array([0.5, 0.5])
     >>> resolved_probability(even, np.array([[0.95, 0.05], [0.05, 0.95]])), resolved_probability(even, np.eye(2))
-    (0.5, 1.0)
+    (0.5, 0.997124)
     """
     before = logit(np.clip(probability, SURE, 1.0 - SURE))
     gained = logit(np.clip(np.diag(after), SURE, 1.0 - SURE)) - before
