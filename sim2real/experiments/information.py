@@ -27,7 +27,7 @@ from wetwell.simulator.effects import effects_of
 SURE = 1e-9
 """Probability that is as good as none. [1]"""
 POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
-"""What may be wrong in what is simulated: no simulation is wrong by itself, and a plant departs from each alike."""
+"""What may be wrong where an act is weighed: a poor model in what pumps and cycles share."""
 
 
 def evidences(
@@ -37,9 +37,19 @@ def evidences(
 
     $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
 
-    with the residuals r at the fit, the covariance C of the cells, and changes d of the residuals along the
-    directions of the set's spread. What pumps and cycles share is taken from a poor model: what is simulated fits its
-    own set too well to show how wrong the simulator is at a plant.
+    with the residuals r at the fit, less those of the truth: noise, and what the observer does not follow, tell of no
+    set. C is the covariance of the cells, d the changes of the residuals along the directions of the set's spread.
+    What pumps and cycles share is that of a poor model: what is simulated fits its own set too well to show how wrong
+    the simulator is at a plant.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        As they are simulated under the truth.
+    station : Station
+    sets : sequence of PossibleSet
+    truth : PossibleSet
+        One of them.
 
     Raises
     ------

@@ -90,7 +90,7 @@ def proposals_of(
 ) -> Proposals:
     """Weigh all acts that can be done at a station.
 
-    First come those that resolve what is left, the cheapest first; then the others, the likeliest to resolve it first.
+    First come those that resolve what is left, the cheapest first; then the others, the likeliest to do so first.
 
     Parameters
     ----------
