@@ -157,10 +157,11 @@ def resolved_probability(probability: Floats, after: Floats) -> float:
     Examples
     --------
     >>> even = np.array([0.5, 0.5])
-    >>> resolved_probability(even, np.array([[0.95, 0.05], [0.05, 0.95]])), resolved_probability(even, np.eye(2))
-    (0.5, 0.997124)
+    >>> just = np.array([[0.95, 0.05], [0.05, 0.95]])
+    >>> [round(resolved_probability(even, after), 3) for after in (just, np.eye(2))]
+    [0.5, 0.997]
     """
     before = logit(np.clip(probability, SURE, 1.0 - SURE))
     gained = logit(np.clip(np.diag(after), SURE, 1.0 - SURE)) - before
     spread = np.sqrt(2.0 * np.maximum(gained, SURE))
-    return round(float(probability @ ndtr((gained + before - logit(CREDIBLE)) / spread)), 6)
+    return float(probability @ ndtr((gained + before - logit(CREDIBLE)) / spread))

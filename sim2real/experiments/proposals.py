@@ -64,9 +64,14 @@ class Proposal:
         return self.resolved_probability >= RESOLVING
 
     @property
-    def rank(self) -> tuple[bool, float, float]:
-        """Least of the best act: those that resolve by their price, the others by how probably they do."""
-        return not self.resolves, 0.0 if self.resolves else -self.resolved_probability, self.price
+    def rank(self) -> tuple[float, ...]:
+        """Least of the best act: those that resolve by their price, the others by how probably they do.
+
+        Acts that hardly can resolve anything are as good as each other by that, and follow by what they tell.
+        """
+        if self.resolves:
+            return 0.0, self.price
+        return 1.0, -round(self.resolved_probability, 2), -round(self.information_bits, 2), self.price
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,7 +47,9 @@ def test_who_is_sure_comes_first_and_the_cheapest_of_them(found):
     assert resolves == sorted(resolves, reverse=True)
     prices = [one.price for one in found.best if one.resolves]
     assert prices == sorted(prices)
-    others = [one.resolved_probability for one in found.best if not one.resolves]
+    others = [
+        (round(one.resolved_probability, 2), round(one.information_bits, 2)) for one in found.best if not one.resolves
+    ]
     assert others == sorted(others, reverse=True)
 
 
