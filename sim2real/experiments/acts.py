@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 
 from wetwell.protocols.orders import Step
 from wetwell.sim2real.experiments.act import Act, Site
@@ -10,6 +11,8 @@ REPEATS = 2
 """How often what is quickly over is done: once could be chance."""
 RUN_S = 600.0
 """Longest run that is asked for. [s]"""
+LONG_S = 3600.0
+"""Longest run of a pump that is left to run for long. [s]"""
 IDLE_S = 3600.0
 SHUT_S = 60.0
 """How long a station is left standing, and a pump held against a shut valve. [s]"""
@@ -39,24 +42,67 @@ def at_speeds(site: Site) -> Iterator[Act]:
 
 
 def tour(site: Site) -> Iterator[Act]:
-    """One session of many duties: ever lower speeds, two pumps where there are two, and a low stop."""
-    for i in site.apart:
-        together = tuple(dict.fromkeys((i, *site.ready)))[:2]
-        low = replace(_run(site, 1.0, i), low_m=site.low_m)
-        others = [_run(site, 1.0, *together), low] if len(together) > 1 else [low]
-        for lowest in RATIOS[1:]:
-            ratios = [ratio for ratio in RATIOS if ratio >= lowest]
-            if lowest <= site.least_ratio:
-                continue
-            runs = [*(_run(site, ratio, i) for ratio in ratios), *others]
-            said = f"at {', '.join(f'{100 * ratio:g}' for ratio in ratios)} % of its speed"
-            pair = f", with pump {together[1] + 1}" if len(together) > 1 else ""
-            yield Act(
-                name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}",
-                sentence=f"Let the wet well fill before each run, and run pump {i + 1} {said}{pair}, and at last "
-                f"down to {site.low_m:.2f} m, under the stop level.",
-                steps=tuple(step for run in runs for step in (site.fill(site.brim_m), run)),
-            )
+    """One session of many duties, each down to a low stop: ever lower speeds, and two pumps where there are two."""
+    for i, lowest in product(site.apart, _lowest(site)):
+        yield Act(
+            name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}",
+            sentence=f"{_said(site, i, lowest)}.",
+            steps=_duties(site, i, lowest),
+        )
+
+
+def tour_and_rest(site: Site) -> Iterator[Act]:
+    """All that can be done at the screens in one session: a tour, rests of an hour, and a long run after each."""
+    for i, lowest in product(site.apart, _lowest(site)):
+        pair = _together(site, i)
+        slow_pair = (site.fill(site.brim_m), _low_run(site, lowest, *pair)) if len(pair) > 1 else ()
+        long_runs = (replace(_low_run(site, ratio, i), longest_s=LONG_S) for ratio in (lowest, 1.0))
+        said = f" and with it at {100 * lowest:g} %" if slow_pair else ""
+        yield Act(
+            name=f"tour_and_rest_pump_{i + 1}_to_{round(100 * lowest)}",
+            sentence=f"{_said(site, i, lowest)}{said}. Then let all pumps stand for an hour or until the wet well is "
+            f"full, and run pump {i + 1} at {100 * lowest:g} % down to that level, for an hour at most; do so again "
+            "at full speed.",
+            steps=(
+                *_duties(site, i, lowest),
+                *slow_pair,
+                *(step for run in long_runs for step in (_stand(site), run)),
+            ),
+        )
+
+
+def _lowest(site: Site) -> list[float]:
+    """Speeds down to which a tour goes, as shares of nominal. [1]."""
+    return [ratio for ratio in RATIOS[1:] if ratio > site.least_ratio]
+
+
+def _together(site: Site, i: int) -> tuple[int, ...]:
+    """A pump, and another one where there is one."""
+    return tuple(dict.fromkeys((i, *site.ready)))[:2]
+
+
+def _low_run(site: Site, ratio: float, *pumps: int) -> Step:
+    """Some pumps run down to under the stop level."""
+    return replace(_run(site, ratio, *pumps), low_m=site.low_m)
+
+
+def _duties(site: Site, i: int, lowest: float) -> tuple[Step, ...]:
+    """Runs of a pump at ever lower speeds, at full speed, and with another one."""
+    pair = _together(site, i)
+    runs = [_low_run(site, ratio, i) for ratio in (*RATIOS, 1.0) if ratio >= lowest]
+    pairs = [_low_run(site, 1.0, *pair)] if len(pair) > 1 else []
+    return tuple(step for run in (*runs, *pairs) for step in (site.fill(site.brim_m), run))
+
+
+def _said(site: Site, i: int, lowest: float) -> str:
+    """What asks for these runs."""
+    pair = _together(site, i)
+    ratios = ", ".join(f"{100 * ratio:g}" for ratio in (*RATIOS, 1.0) if ratio >= lowest)
+    with_it = f", then with pump {pair[1] + 1}" if len(pair) > 1 else ""
+    return (
+        f"Let the wet well fill before each run, and run pump {i + 1} down to {site.low_m:.2f} m, under the stop "
+        f"level, at {ratios} % of its speed{with_it}"
+    )
 
 
 def two_together(site: Site) -> Iterator[Act]:
@@ -73,19 +119,18 @@ def two_together(site: Site) -> Iterator[Act]:
 def idle(site: Site) -> Iterator[Act]:
     """An hour in which nothing runs, and a long run after it."""
     i = site.ready[0]
-    stand = Step(longest_s=IDLE_S, speed_ratio=site.speeds(0.0), high_m=site.brim_m)
     yield Act(
         name="idle_hour",
         sentence="Empty the wet well, let all pumps stand for an hour or until it is full, then pump it down with "
         f"pump {i + 1}.",
-        steps=(_run(site, 1.0, i), stand, _run(site, 1.0, i)),
+        steps=(_run(site, 1.0, i), _stand(site), _run(site, 1.0, i)),
     )
 
 
 def pumped_low(site: Site) -> Iterator[Act]:
     """From the highest to the lowest level in one run."""
     for i in site.apart:
-        run = replace(_run(site, 1.0, i), low_m=site.low_m)
+        run = _low_run(site, 1.0, i)
         yield Act(
             name=f"pump_{i + 1}_low",
             sentence=f"Let the wet well fill, then run pump {i + 1} down to {site.low_m:.2f} m, "
@@ -134,9 +179,15 @@ def _run(site: Site, ratio: float, *pumps: int) -> Step:
     return Step(longest_s=RUN_S, speed_ratio=site.speeds(ratio, *pumps), low_m=site.stop_m, high_m=site.high_m)
 
 
+def _stand(site: Site) -> Step:
+    """Nothing runs for an hour, or until the wet well is full."""
+    return Step(longest_s=IDLE_S, speed_ratio=site.speeds(0.0), high_m=site.brim_m)
+
+
 ACTS: tuple[Callable[[Site], Iterator[Act]], ...] = (
     at_speeds,
     tour,
+    tour_and_rest,
     two_together,
     idle,
     pumped_low,

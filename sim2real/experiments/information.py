@@ -1,10 +1,11 @@
 """What an act is expected to tell of the truth, by the diagnosis' likelihood."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import solve
-from scipy.special import logsumexp, rel_entr
+from scipy.special import logit, logsumexp, ndtr, rel_entr
 
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.recordings.recording import Recording
@@ -13,6 +14,8 @@ from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.covariance import Form
 from wetwell.sim2real.likelihood.evidence import weighed
+from wetwell.sim2real.likelihood.posterior import CREDIBLE
+from wetwell.sim2real.likelihood.ways import KNOWN
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
@@ -21,14 +24,32 @@ from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
 
+SURE = 1e-9
+"""Probability that is as good as none. [1]"""
+POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
+"""What may be wrong where an act is weighed: a poor model in what pumps and cycles share."""
 
-def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet]) -> Floats:
+
+def evidences(
+    recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet], truth: PossibleSet
+) -> Floats:
     r"""(sets,) logarithm of how probable recordings are together under each set, as far as it is known by now.
 
     $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
 
-    with the residuals r at the fit, the covariance C of the cells, in each block the likelier of that of a good and
-    of a poor model, and changes d of the residuals along the directions of the set's spread.
+    with the residuals r at the fit, less those of the truth: noise, and what the observer does not follow, tell of no
+    set. C is the covariance of the cells, d the changes of the residuals along the directions of the set's spread.
+    What pumps and cycles share is that of a poor model: what is simulated fits its own set too well to show how wrong
+    the simulator is at a plant.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        As they are simulated under the truth.
+    station : Station
+    sets : sequence of PossibleSet
+    truth : PossibleSet
+        One of them.
 
     Raises
     ------
@@ -49,14 +70,14 @@ def evidences(recordings: Sequence[Recording], station: Station, sets: Sequence[
     def means(effects: Sequence[object]) -> Floats:
         return cells.means(residuals.of(replay.run(effects)))  # type: ignore[arg-type]
 
-    without = means(())
+    without, shown = means(()), means(truth.effects)
     found = []
     for one in sets:
         best = means(one.effects)
         moved = [means(effects) - best for effects in one.spread]
         signature = np.abs(without - best)
         form = Form(signature=signature, swinging=np.zeros(signature.size), late=np.zeros(signature.size))
-        found.append(_log_probability(cells, best, np.array([*moved]).reshape(len(moved), best.size).T, form))
+        found.append(_log_probability(cells, best - shown, np.array([*moved]).reshape(len(moved), best.size).T, form))
     return np.array(found)
 
 
@@ -64,7 +85,8 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form)
     columns = np.column_stack([residuals, moved])
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
-        likelier, products, _ = weighed(block, columns[block.rows], residuals[block.rows], form.chosen(block.rows))
+        rows = block.rows
+        likelier, products, _ = weighed(block, columns[rows], residuals[rows], form.chosen(rows), POOR_ALIKE)
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]
@@ -115,3 +137,31 @@ def information_bits(probability: Floats, after: Floats) -> float:
     -2.33
     """
     return float(0.0 - rel_entr(probability, np.diag(after)).sum() / np.log(2.0))
+
+
+def resolved_probability(probability: Floats, after: Floats) -> float:
+    r"""Probability that the true set has `CREDIBLE` after an act.
+
+    $$\sum_T P(T)\, \Phi\left(\frac{g_T - n_T}{\sqrt{2 g_T}}\right), \quad
+    g_T = \operatorname{logit} P'(T \mid T) - \operatorname{logit} P(T), \quad
+    n_T = \operatorname{logit} P_c - \operatorname{logit} P(T)$$
+
+    What Gaussian data tell of two sets, the logarithm of their odds, has twice its mean as variance.
+
+    Parameters
+    ----------
+    probability : (sets,) array
+    after : (truths, sets) array
+        As `told` makes it, of what is shown without noise.
+
+    Examples
+    --------
+    >>> even = np.array([0.5, 0.5])
+    >>> just = np.array([[0.95, 0.05], [0.05, 0.95]])
+    >>> [round(resolved_probability(even, after), 3) for after in (just, np.eye(2))]
+    [0.5, 0.997]
+    """
+    before = logit(np.clip(probability, SURE, 1.0 - SURE))
+    gained = logit(np.clip(np.diag(after), SURE, 1.0 - SURE)) - before
+    spread = np.sqrt(2.0 * np.maximum(gained, SURE))
+    return float(probability @ ndtr((gained + before - logit(CREDIBLE)) / spread))

@@ -14,12 +14,14 @@ from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.experiments.act import Act, Site, site_of
 from wetwell.sim2real.experiments.acts import acts_of
 from wetwell.sim2real.experiments.conditions import Conditions
-from wetwell.sim2real.experiments.information import evidences, information_bits, told
+from wetwell.sim2real.experiments.information import evidences, information_bits, resolved_probability, told
 from wetwell.sim2real.experiments.playing import Played, play, simulated
 from wetwell.sim2real.likelihood.posterior import CREDIBLE
 
 LEAST_BITS = 0.01
 """Information under which an act tells nothing: a hundredth of a question that is answered by yes or no. [bit]"""
+RESOLVING = 0.9
+"""Probability of leaving nothing open from which the cheapest act is taken. [1]"""
 USUAL_S, USUAL_ROWS = 7200, 200
 """Least time, and least rows, of what an act is compared with. [s, 1]"""
 
@@ -35,8 +37,8 @@ class Proposal:
         What it is expected to tell of the truth. [bit]
     truth_probability : float
         Expected probability of the true set afterwards.
-    resolves : bool
-        Whether the truth has `CREDIBLE` afterwards, but for sets that are together less probable than the rest of it.
+    resolved_probability : float
+        Probability that the true set has `CREDIBLE` afterwards.
     separates : tuple of tuple of str
         Sets that it tells from one another or from the rest, the most probable first.
     moved_m3, extra_kwh, crew_h, length_h : float
@@ -48,13 +50,28 @@ class Proposal:
     act: Act
     information_bits: float
     truth_probability: float
-    resolves: bool
+    resolved_probability: float
     separates: tuple[tuple[str, ...], ...]
     moved_m3: float
     extra_kwh: float
     crew_h: float
     length_h: float
     price: float
+
+    @property
+    def resolves(self) -> bool:
+        """Whether it most probably leaves nothing open."""
+        return self.resolved_probability >= RESOLVING
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """Least of the best act: those that resolve by their price, the others by how probably they do.
+
+        Acts that hardly can resolve anything are as good as each other by that, and follow by what they tell.
+        """
+        if self.resolves:
+            return 0.0, self.price
+        return 1.0, -round(self.resolved_probability, 2), -round(self.information_bits, 2), self.price
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +95,7 @@ def proposals_of(
 ) -> Proposals:
     """Weigh all acts that can be done at a station.
 
-    First come those that resolve what is left, the cheapest first; then the others, by what they tell.
+    First come those that resolve what is left, the cheapest first; then the others, the likeliest to do so first.
 
     Parameters
     ----------
@@ -97,15 +114,13 @@ def proposals_of(
     singled_out = {getattr(effect, "pump", 0) for one in sets for effect in one.effects}
     site = site_of(station, singled_out)
     usual = _usual(site, station, sets, conditions, seed)
-    known = np.array([evidences([one], station, sets) for one in usual])
+    known = np.array([evidences([one], station, sets, truth) for one, truth in zip(usual, sets, strict=True)])
     weighed = list(
         each(lambda act: _weighed(act, site, station, sets, conditions, seed, usual, known), acts_of(site))
     )
     useful = [one for one in weighed if isinstance(one, Proposal) and one.information_bits >= LEAST_BITS]
     return Proposals(
-        best=tuple(
-            sorted(useful, key=lambda one: (not one.resolves, one.price if one.resolves else -one.information_bits))
-        ),
+        best=tuple(sorted(useful, key=lambda one: one.rank)),
         refused=tuple(one for one in weighed if isinstance(one, Refused)),
     )
 
@@ -137,7 +152,7 @@ def _weighed(
             if passage.broken:
                 return Refused(act=act, reason=passage.broken)
             during = conditions.recorded(passage.recording, site.pumps)
-            logs.append(evidences([before, during], station, sets))
+            logs.append(evidences([before, during], station, sets, one))
         except ValueError as error:
             return Refused(act=act, reason=str(error))
         played.append(passage)
@@ -164,7 +179,7 @@ def _proposal(
         act=act,
         information_bits=information_bits(probability, after),
         truth_probability=float(probability @ np.diag(after)),
-        resolves=bool(probability @ (np.diag(after) >= CREDIBLE) >= CREDIBLE),
+        resolved_probability=resolved_probability(probability, after),
         separates=tuple(sets[k].names for k in _separated(after)),
         moved_m3=moved_m3,
         extra_kwh=extra_kwh,

@@ -12,7 +12,7 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
 from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
-from wetwell.sim2real.likelihood.ways import likeliest
+from wetwell.sim2real.likelihood.ways import KNOWN, Ways, likeliest
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -201,7 +201,9 @@ def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
 
 
-def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tuple[float, Floats, Stirred]:
+def weighed(
+    block: Block, columns: Floats, residuals: Floats, form: Form, ways: Ways = KNOWN
+) -> tuple[float, Floats, Stirred]:
     """A block under what is likeliest to be wrong in it.
 
     Parameters
@@ -213,6 +215,8 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
         By which it is seen what is wrong.
     form : Form
         Of the block's cells.
+    ways : Ways
+        What may be wrong.
 
     Returns
     -------
@@ -224,7 +228,7 @@ def weighed(block: Block, columns: Floats, residuals: Floats, form: Form) -> tup
     rained = [_rained_on(replace(block, surge=surge), residuals) for surge in block.surges]
     for still, swing in product(rained, SWINGS if np.any(form.swinging) else SWINGS[:1]):
         one = replace(still, swing=swing)
-        log_prior, allowance = likeliest(one.block, residuals, form, swing)
+        log_prior, allowance = likeliest(one.block, residuals, form, swing, ways)
         products, log_det = projected(one.block, columns, form, allowance)
         tried.append((one.log_rain + log_prior - 0.5 * log_det, products, one))
     totals = np.array([log - 0.5 * float(products[0, 0]) for log, products, _ in tried])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.sim2real.experiments.information import information_bits, told
+from wetwell.sim2real.experiments.information import information_bits, resolved_probability, told
 
 
 @st.composite
@@ -44,3 +44,28 @@ def test_an_act_that_makes_sure_of_a_wrong_set_tells_nothing():
 def test_the_likelihood_counts_by_its_power():
     after = told(np.array([0.5, 0.5]), np.array([[0.0, -10.0], [-10.0, 0.0]]))
     assert after[0, 0] / after[0, 1] == pytest.approx(np.exp(10.0))
+
+
+@given(st.integers(2, 5), st.floats(0.0, 20.0))
+def test_more_of_the_same_makes_it_likelier_that_nothing_is_left_open(count, strength):
+    probability = np.full(count, 1.0 / count)
+    weaker, stronger = (
+        resolved_probability(probability, told(probability, -scale * (1.0 - np.eye(probability.size))))
+        for scale in (strength, strength + 1.0)
+    )
+    assert 0.0 <= weaker <= stronger + 1e-6 <= 1.0 + 1e-6
+
+
+def test_odds_that_just_suffice_on_average_do_so_every_second_time():
+    just = np.array([[0.95, 0.05], [0.05, 0.95]])
+    assert resolved_probability(np.array([0.5, 0.5]), just) == pytest.approx(0.5)
+
+
+def test_odds_scatter_as_gaussian_data_make_them():
+    """Two sets whose means are so many standard deviations apart: what is drawn resolves as often as is said."""
+    apart = 2.5
+    drawn = np.random.default_rng(1).normal(size=200_000)
+    odds = 0.5 * apart**2 + apart * drawn
+    mean = 0.5 * apart**2 * (1.0 - np.eye(2))
+    resolved = resolved_probability(np.array([0.5, 0.5]), told(np.array([0.5, 0.5]), -mean))
+    assert resolved == pytest.approx(float(np.mean(odds >= np.log(19.0))), abs=0.005)

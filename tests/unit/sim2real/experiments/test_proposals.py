@@ -43,8 +43,30 @@ def test_wear_is_told_from_slip_where_the_torque_differs_and_not_by_more_of_the_
 
 
 def test_who_is_sure_comes_first_and_the_cheapest_of_them(found):
-    keys = [(not one.resolves, one.price if one.resolves else -one.information_bits) for one in found.best]
-    assert keys == sorted(keys)
+    resolves = [one.resolves for one in found.best]
+    assert resolves == sorted(resolves, reverse=True)
+    prices = [one.price for one in found.best if one.resolves]
+    assert prices == sorted(prices)
+    others = [
+        (round(one.resolved_probability, 2), round(one.information_bits, 2)) for one in found.best if not one.resolves
+    ]
+    assert others == sorted(others, reverse=True)
+
+
+def test_a_tour_with_rests_does_all_that_a_tour_does_and_more(alpha):
+    acts = {act.name: act for act in acts_of(site_of(alpha, set()))}
+    tour, more = acts["tour_pump_1_to_70"].steps, acts["tour_and_rest_pump_1_to_70"].steps
+    assert more[: len(tour)] == tour
+    assert {step.low_m for step in tour if math.isfinite(step.low_m)} == {site_of(alpha, set()).low_m}
+    assert any(step.longest_s >= 3600.0 and sum(step.speed_ratio) > 0.0 for step in more[len(tour) :])
+
+
+def test_one_pump_has_no_pair(alpha):
+    control = alpha.control.model_copy(update={"out_of_service": (2, 3)})
+    site = site_of(alpha.model_copy(update={"control": control}), set())
+    (act,) = [act for act in acts_of(site) if act.name == "tour_and_rest_pump_1_to_70"]
+    assert all(sum(ratio > 0.0 for ratio in step.speed_ratio) <= 1 for step in act.steps)
+    assert "with" not in act.sentence
 
 
 def test_two_names_for_the_same_are_told_apart_by_nothing(alpha):
