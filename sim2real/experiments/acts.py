@@ -42,7 +42,7 @@ def at_speeds(site: Site) -> Iterator[Act]:
 
 
 def tour(site: Site) -> Iterator[Act]:
-    """One session of many duties, each down to a low stop: ever lower speeds, and two pumps where there are two."""
+    """One session of many duties: ever lower speeds, each down to a low stop, and two pumps where there are two."""
     for i, lowest in product(site.apart, _lowest(site)):
         yield Act(
             name=f"tour_pump_{i + 1}_to_{round(100 * lowest)}",
@@ -55,7 +55,7 @@ def tour_and_rest(site: Site) -> Iterator[Act]:
     """All that can be done at the screens in one session: a tour, rests of an hour, and a long run after each."""
     for i, lowest in product(site.apart, _lowest(site)):
         pair = _together(site, i)
-        slow_pair = (site.fill(site.brim_m), _low_run(site, lowest, *pair)) if len(pair) > 1 else ()
+        slow_pair = (site.fill(site.brim_m), _run(site, lowest, *pair)) if len(pair) > 1 else ()
         long_runs = (replace(_low_run(site, ratio, i), longest_s=LONG_S) for ratio in (lowest, 1.0))
         said = f" and with it at {100 * lowest:g} %" if slow_pair else ""
         yield Act(
@@ -82,7 +82,7 @@ def _together(site: Site, i: int) -> tuple[int, ...]:
 
 
 def _low_run(site: Site, ratio: float, *pumps: int) -> Step:
-    """Some pumps run down to under the stop level."""
+    """Pumps run down to under the stop level: two would be below what is allowed before they stand."""
     return replace(_run(site, ratio, *pumps), low_m=site.low_m)
 
 
@@ -90,7 +90,7 @@ def _duties(site: Site, i: int, lowest: float) -> tuple[Step, ...]:
     """Runs of a pump at ever lower speeds, at full speed, and with another one."""
     pair = _together(site, i)
     runs = [_low_run(site, ratio, i) for ratio in (*RATIOS, 1.0) if ratio >= lowest]
-    pairs = [_low_run(site, 1.0, *pair)] if len(pair) > 1 else []
+    pairs = [_run(site, 1.0, *pair)] if len(pair) > 1 else []
     return tuple(step for run in (*runs, *pairs) for step in (site.fill(site.brim_m), run))
 
 
@@ -98,7 +98,7 @@ def _said(site: Site, i: int, lowest: float) -> str:
     """What asks for these runs."""
     pair = _together(site, i)
     ratios = ", ".join(f"{100 * ratio:g}" for ratio in (*RATIOS, 1.0) if ratio >= lowest)
-    with_it = f", then with pump {pair[1] + 1}" if len(pair) > 1 else ""
+    with_it = f", then with pump {pair[1] + 1} down to the stop level" if len(pair) > 1 else ""
     return (
         f"Let the wet well fill before each run, and run pump {i + 1} down to {site.low_m:.2f} m, under the stop "
         f"level, at {ratios} % of its speed{with_it}"

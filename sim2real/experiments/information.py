@@ -15,7 +15,7 @@ from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.covariance import Form
 from wetwell.sim2real.likelihood.evidence import weighed
 from wetwell.sim2real.likelihood.posterior import CREDIBLE
-from wetwell.sim2real.likelihood.ways import KNOWN
+from wetwell.sim2real.likelihood.ways import KNOWN, Ways
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
@@ -27,20 +27,20 @@ from wetwell.simulator.effects import effects_of
 SURE = 1e-9
 """Probability that is as good as none. [1]"""
 POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
-"""What may be wrong where an act is weighed: a poor model in what pumps and cycles share."""
+"""What is wrong of a model that is poor in what pumps and cycles share."""
 
 
 def evidences(
     recordings: Sequence[Recording], station: Station, sets: Sequence[PossibleSet], truth: PossibleSet
 ) -> Floats:
-    r"""(sets,) logarithm of how probable recordings are together under each set, as far as it is known by now.
+    r"""(2, sets) logarithm of how probable recordings are together under each set, as far as it is known by now.
 
     $$\ln p(z \mid S) = -\tfrac12 \left(r^T K^{-1} r + \ln\det K\right), \qquad K = C + \sum_k d_k d_k^T$$
 
     with the residuals r at the fit, less those of the truth: noise, and what the observer does not follow, tell of no
     set. C is the covariance of the cells, d the changes of the residuals along the directions of the set's spread.
-    What pumps and cycles share is that of a poor model: what is simulated fits its own set too well to show how wrong
-    the simulator is at a plant.
+    What pumps and cycles share is in the first row that of a model as good as what is simulated shows, which fits its
+    own set too well to show how wrong the simulator is at a plant; in the second row that of a poor one.
 
     Parameters
     ----------
@@ -77,16 +77,17 @@ def evidences(
         moved = [means(effects) - best for effects in one.spread]
         signature = np.abs(without - best)
         form = Form(signature=signature, swinging=np.zeros(signature.size), late=np.zeros(signature.size))
-        found.append(_log_probability(cells, best - shown, np.array([*moved]).reshape(len(moved), best.size).T, form))
-    return np.array(found)
+        moved_by = np.array([*moved]).reshape(len(moved), best.size).T
+        found.append([_log_probability(cells, best - shown, moved_by, form, ways) for ways in (KNOWN, POOR_ALIKE)])
+    return np.array(found).T
 
 
-def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form) -> float:
+def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form, ways: Ways) -> float:
     columns = np.column_stack([residuals, moved])
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
         rows = block.rows
-        likelier, products, _ = weighed(block, columns[rows], residuals[rows], form.chosen(rows), POOR_ALIKE)
+        likelier, products, _ = weighed(block, columns[rows], residuals[rows], form.chosen(rows), ways)
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]

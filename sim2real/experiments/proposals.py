@@ -34,11 +34,11 @@ class Proposal:
     ----------
     act : Act
     information_bits : float
-        What it is expected to tell of the truth. [bit]
+        What it is expected to tell of the truth, where the model is as good as it seems. [bit]
     truth_probability : float
-        Expected probability of the true set afterwards.
+        Expected probability of the true set afterwards, though the model is poor.
     resolved_probability : float
-        Probability that the true set has `CREDIBLE` afterwards.
+        Probability that the true set has `CREDIBLE` afterwards, though the model is poor.
     separates : tuple of tuple of str
         Sets that it tells from one another or from the rest, the most probable first.
     moved_m3, extra_kwh, crew_h, length_h : float
@@ -65,13 +65,8 @@ class Proposal:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """Least of the best act: those that resolve by their price, the others by how probably they do.
-
-        Acts that hardly can resolve anything are as good as each other by that, and follow by what they tell.
-        """
-        if self.resolves:
-            return 0.0, self.price
-        return 1.0, -round(self.resolved_probability, 2), -round(self.information_bits, 2), self.price
+        """Least of the best act: what resolves, by its price; else what tells most, to a tenth of a bit."""
+        return (0.0, self.price) if self.resolves else (1.0, -round(self.information_bits, 1), self.price)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +90,8 @@ def proposals_of(
 ) -> Proposals:
     """Weigh all acts that can be done at a station.
 
-    First come those that resolve what is left, the cheapest first; then the others, the likeliest to do so first.
+    First come those that resolve what is left though the model is poor, the cheapest first; then the others, by what
+    they tell where it is good.
 
     Parameters
     ----------
@@ -158,15 +154,17 @@ def _weighed(
         played.append(passage)
     probability = np.array([one.probability for one in sets])
     probability /= probability.sum()
-    after = told(probability, np.array(logs) - known)
-    return _proposal(act, sets, probability, after, played, station.costs or Costs())
+    gained = np.array(logs) - known
+    good, poor = told(probability, gained[:, 0]), told(probability, gained[:, 1])
+    return _proposal(act, sets, probability, good, poor, played, station.costs or Costs())
 
 
 def _proposal(
     act: Act,
     sets: Sequence[PossibleSet],
     probability: Floats,
-    after: Floats,
+    good: Floats,
+    poor: Floats,
     played: Sequence[Played],
     costs: Costs,
 ) -> Proposal:
@@ -177,10 +175,10 @@ def _proposal(
     crew_h = act.people * (length_h + act.travel_h)
     return Proposal(
         act=act,
-        information_bits=information_bits(probability, after),
-        truth_probability=float(probability @ np.diag(after)),
-        resolved_probability=resolved_probability(probability, after),
-        separates=tuple(sets[k].names for k in _separated(after)),
+        information_bits=information_bits(probability, good),
+        truth_probability=float(probability @ np.diag(poor)),
+        resolved_probability=resolved_probability(probability, poor),
+        separates=tuple(sets[k].names for k in _separated(poor)),
         moved_m3=moved_m3,
         extra_kwh=extra_kwh,
         crew_h=crew_h,
