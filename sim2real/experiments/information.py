@@ -24,7 +24,7 @@ from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
 
-SURE = 1e-9
+NO_CHANCE = 1e-9
 """Probability that is as good as none. [1]"""
 POOR_ALIKE = replace(KNOWN, span=tuple(way for way in KNOWN.span if way.is_poor))
 """What is wrong of a model that is poor in what pumps and cycles share."""
@@ -162,7 +162,7 @@ def resolved_probability(probability: Floats, after: Floats) -> float:
     >>> [round(resolved_probability(even, after), 3) for after in (just, np.eye(2))]
     [0.5, 0.997]
     """
-    before = logit(np.clip(probability, SURE, 1.0 - SURE))
-    gained = logit(np.clip(np.diag(after), SURE, 1.0 - SURE)) - before
-    spread = np.sqrt(2.0 * np.maximum(gained, SURE))
+    before = logit(np.clip(probability, NO_CHANCE, 1.0 - NO_CHANCE))
+    gained = logit(np.clip(np.diag(after), NO_CHANCE, 1.0 - NO_CHANCE)) - before
+    spread = np.sqrt(2.0 * np.maximum(gained, NO_CHANCE))
     return float(probability @ ndtr((gained + before - logit(CREDIBLE)) / spread))
