@@ -33,6 +33,8 @@ VARIABLES = [one for board in BOARDS for one in board.get("templating", {}).get(
 CHOSEN = [{"station": station, "pump": pump} for station, pump in product((".*", "alpha"), (".*", "2", "(1|2|3)"))]
 """What Grafana puts in place of its variables: for all, for one, and for several that are chosen."""
 MAX_SPAN_S = 60
+SPEED = "1200"
+"""Times life: half a minute to the fault, and slow enough that a loaded machine loses no sample."""
 
 
 def scrape_config(ports):
@@ -67,7 +69,7 @@ def prometheus(tmp_path_factory):
     scenario.write_text(CLOGGING)
     site, health, port = Site(f"tcp/127.0.0.1:{free_port()}", free_port(), folder), free_port(), free_port()
     config.write_text(yaml.safe_dump(scrape_config({9100: health, 8080: site.port})))
-    up = [sys.executable, "-m", "wetwell.services", "up", "--scenario", str(scenario), "--speed", "6000", "--steady"]
+    up = [sys.executable, "-m", "wetwell.services", "up", "--scenario", str(scenario), "--speed", SPEED, "--steady"]
     up += ["--zenoh", site.endpoint, "--modbus", f"127.0.0.1:{free_port()}", "--page", f"127.0.0.1:{site.port}"]
     watcher = ["prometheus", f"--config.file={config}", f"--storage.tsdb.path={folder / 'data'}"]
     watcher += [f"--web.listen-address=127.0.0.1:{port}"]
