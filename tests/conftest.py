@@ -22,7 +22,7 @@ LONGEST = (
     *("test_processes.py", "test_blocks.py", "test_restart.py", "test_fleet.py", "test_watching.py", "test_start.py"),
     *("test_experiments.py", "test_simulated_site.py", "test_prometheus.py", "test_historian.py", "test_failover.py"),
 )
-"""Files that take longest: each is run by one process, which makes its fixtures once."""
+"""Files that take longest."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

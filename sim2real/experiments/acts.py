@@ -81,9 +81,9 @@ def _together(site: Site, i: int) -> tuple[int, ...]:
     return tuple(dict.fromkeys((i, *site.ready)))[:2]
 
 
-def _low_run(site: Site, ratio: float, *pumps: int) -> Step:
-    """Pumps run down to under the stop level: two would be below what is allowed before they stand."""
-    return replace(_run(site, ratio, *pumps), low_m=site.low_m)
+def _low_run(site: Site, ratio: float, pump: int) -> Step:
+    """A pump runs down to under the stop level: two would be below what is allowed before they stand."""
+    return replace(_run(site, ratio, pump), low_m=site.low_m)
 
 
 def _duties(site: Site, i: int, lowest: float) -> tuple[Step, ...]:

@@ -52,10 +52,10 @@ def test_who_is_sure_comes_first_and_the_cheapest_of_them(found):
 
 
 def test_a_tour_with_rests_does_all_that_a_tour_does_and_more(alpha):
-    acts = {act.name: act for act in acts_of(site_of(alpha, set()))}
+    site = site_of(alpha, set())
+    acts = {act.name: act for act in acts_of(site)}
     tour, more = acts["tour_pump_1_to_70"].steps, acts["tour_and_rest_pump_1_to_70"].steps
     assert more[: len(tour)] == tour
-    site = site_of(alpha, set())
     for step in tour:
         pumps = sum(ratio > 0.0 for ratio in step.speed_ratio)
         assert pumps == 0 or step.low_m == (site.low_m if pumps == 1 else site.stop_m)
