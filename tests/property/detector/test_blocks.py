@@ -74,7 +74,7 @@ def cut(block, rng):
         first = last
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 12))])
 @pytest.mark.parametrize("kind", ["paper", "blocked"])
 @pytest.mark.parametrize("layout", ["alpha", "common"])
 def test_blocks_give_the_verdicts_and_the_state_of_single_samples(recordings, layout, kind, seed):

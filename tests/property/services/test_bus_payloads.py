@@ -27,7 +27,7 @@ from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.runtime.settings import AlarmSettings
 
-EXAMPLES = int(os.environ.get("WETWELL_FUZZ_EXAMPLES", "1500"))
+EXAMPLES = int(os.environ.get("WETWELL_FUZZ_EXAMPLES", "500"))
 
 STAMP = "2025-01-01T00:00:00Z"
 SAMPLE = Sample(station="alpha", seq=0, time=0, level_m=1.0, pumps=(PumpReading(flow_m3h=1.0, running=True),) * 3)

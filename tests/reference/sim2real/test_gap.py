@@ -24,6 +24,9 @@ MODERATE = {
     "water_inertia": {"inertia_s2_m2": 1200.0},
 }
 
+QUICK = ("friction_bias", "threshold_shift", "flow_meter_gain")
+"""Of the pump side, the controller and a meter: the others are of `make long`."""
+
 
 def record(station, effects=(), seconds=LENGTH_S, seed=11):
     tables = tuple(EffectTable.model_validate(effect) for effect in effects)
@@ -42,7 +45,9 @@ def test_without_a_gap_it_is_silent(alpha, plain):
     assert told.gap.before < 1.1
 
 
-@pytest.mark.parametrize("name", MODERATE)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in MODERATE]
+)
 def test_a_single_effect_is_named_with_its_size(alpha, name):
     diagnosis = diagnose(record(alpha, [{"name": name, **MODERATE[name]}]), alpha)
     report = diagnosis.report()
@@ -56,6 +61,7 @@ def test_a_single_effect_is_named_with_its_size(alpha, name):
     assert GapReport.model_validate_json(report.model_dump_json(by_alias=True)) == report
 
 
+@pytest.mark.long
 def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
     ragging = {"name": "ragging", "speed_loss": 0.1, "growth_s": 200.0}
     cutoff = {"name": "flow_low_cutoff", "cutoff_m3h": 60.0}
@@ -103,6 +109,7 @@ def held(values, deadband, report_s):
     return sent
 
 
+@pytest.mark.long
 def test_a_bench_in_the_sump_is_found(alpha):
     """Its edge is within a few centimetres, unlike a cone's wall."""
     bench = {"name": "sump_area_profile", "bottom_factor": 0.5, "height_m": 1.2, "exponent": 10.0}
@@ -139,6 +146,7 @@ def test_a_late_controller_is_not_taken_for_other_thresholds(alpha):
     assert told.where[0].component == "controller"
 
 
+@pytest.mark.long
 def test_a_late_frequency_is_no_late_controller(alpha):
     """What was switched, was switched before its record: at the configured levels."""
     recording = record(alpha, [{"name": "channel_delay", "channel": "frequency_hz", "delay_s": 12.0}])
@@ -150,7 +158,7 @@ def test_a_late_frequency_is_no_late_controller(alpha):
 
 @pytest.mark.parametrize(
     "missing",
-    [*(pytest.param(name, marks=pytest.mark.long) for name in ("inflow_m3h", "power_kw")), "head_m"],
+    [pytest.param(name, marks=pytest.mark.long) for name in ("inflow_m3h", "power_kw", "head_m")],
 )
 def test_it_works_without_a_channel(alpha, missing):
     recording = record(alpha, [{"name": "friction_bias", "factor": 1.3}])

@@ -78,12 +78,12 @@ def test_the_true_model_is_off_by_about_what_it_may_be(alpha, plain, every, valu
     ("every", "value", "without"),
     [
         pytest.param(10, "instant", (), marks=pytest.mark.long),
-        (10, "instant", ("inflow", "head")),
+        pytest.param(10, "instant", ("inflow", "head"), marks=pytest.mark.long),
         pytest.param(60, "instant", ("inflow",), marks=pytest.mark.long),
         pytest.param(60, "instant", ("flow_m3h", "head"), marks=pytest.mark.long),
         (60, "mean", ("inflow",)),
         pytest.param(900, "mean", ("inflow",), marks=pytest.mark.long),
-        (10, "held", ("inflow",)),
+        pytest.param(10, "held", ("inflow",), marks=pytest.mark.long),
     ],
 )
 def test_without_a_gap_nobody_is_blamed(alpha, plain, every, value, without):
@@ -95,8 +95,8 @@ def test_without_a_gap_nobody_is_blamed(alpha, plain, every, value, without):
 @pytest.mark.parametrize(
     ("every", "value", "without"),
     [
-        (10, "instant", ("inflow",)),
-        (60, "instant", ()),
+        pytest.param(10, "instant", ("inflow",), marks=pytest.mark.long),
+        pytest.param(60, "instant", (), marks=pytest.mark.long),
         pytest.param(60, "mean", ("inflow",), marks=pytest.mark.long),
         (900, "mean", ()),
         pytest.param(10, "held", (), marks=pytest.mark.long),
@@ -113,7 +113,8 @@ def test_friction_is_told_at_every_rate(alpha, every, value, without):
         assert any("friction_bias" in effect.equivalent for effect in told.effects)
 
 
-@pytest.mark.parametrize("lag_s", [pytest.param(12.0, marks=pytest.mark.long), 29.0])
+@pytest.mark.long
+@pytest.mark.parametrize("lag_s", [12.0, 29.0])
 def test_a_lag_of_the_level_is_no_other_effect_where_nobody_measures_the_inflow(alpha, lag_s):
     recording = stored(record(alpha, [{"name": "level_sensor_lag", "lag_s": lag_s}]), 1, without=("inflow",))
     (told,) = diagnose(recording, alpha).effects
@@ -130,7 +131,8 @@ def test_what_cannot_be_shown_is_listed_with_the_reason(alpha, plain):
     assert {one.name for one in report.candidates}.isdisjoint(reasons)
 
 
-@pytest.mark.parametrize(("every", "value"), [pytest.param(1, "instant", marks=pytest.mark.long), (900, "mean")])
+@pytest.mark.long
+@pytest.mark.parametrize(("every", "value"), [(1, "instant"), (900, "mean")])
 def test_an_inflow_beside_a_meter_is_not_tested_where_there_is_no_meter(alpha, plain, every, value):
     report = diagnose(stored(plain, every, value, ("inflow",)), alpha).report()
     reasons = {one.effect: one.reason for one in report.not_tested}

@@ -152,6 +152,7 @@ def test_what_needs_the_truth_later_gets_the_published_attempt(tmp_path, monkeyp
         assert case.truth().station == load_station(tmp_path / "published" / case.name / "station.toml")
 
 
+@pytest.mark.long
 def test_a_case_that_matters_in_no_attempt_fails_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("FAKE_MODE", "none")
     monkeypatch.setenv("FAKE_FOLDER", str(tmp_path))

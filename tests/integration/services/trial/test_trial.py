@@ -76,7 +76,7 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     assert len(json.loads((folder / "trial.json").read_text())["cases"]) == COUNT
 
 
-@pytest.mark.check
+@pytest.mark.long
 def test_the_real_diagnosis_names_a_sealed_effect_and_is_silent_without_one(tmp_path):
     plan = TrialPlan(seed=26, count=2, kinds=("single", "none"), seconds=14_400)
     result = run_trial(plan, tmp_path, workers=1)

@@ -23,7 +23,7 @@ from wetwell.protocols.modbus.client import (
 )
 from wetwell.protocols.modbus.device_signal import Signal
 
-EXAMPLES = int(os.environ.get("WETWELL_FUZZ_EXAMPLES", "1500"))
+EXAMPLES = int(os.environ.get("WETWELL_FUZZ_EXAMPLES", "500"))
 FUNCTIONS = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
 
 questions = st.builds(

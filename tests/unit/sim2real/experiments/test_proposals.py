@@ -70,6 +70,7 @@ def test_one_pump_has_no_pair(alpha):
     assert "with" not in act.sentence
 
 
+@pytest.mark.long
 def test_two_names_for_the_same_are_told_apart_by_nothing(alpha):
     one = possible(0.5, "friction_bias", factor=1.3)
     same = proposals_of(alpha, (one, replace(one, probability=0.5)), CONDITIONS)
@@ -80,6 +81,7 @@ def test_one_set_needs_no_act(alpha):
     assert proposals_of(alpha, ALIKE[:1], CONDITIONS).best == ()
 
 
+@pytest.mark.long
 def test_the_price_is_that_of_energy_and_work(alpha, found):
     costs = Costs(energy_per_kwh=2.0, crew_per_hour=10.0)
     dear = proposals_of(alpha.model_copy(update={"costs": costs}), ALIKE, CONDITIONS)

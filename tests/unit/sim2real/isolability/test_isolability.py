@@ -32,6 +32,7 @@ def at(frequency_hz, level_m=1.0, cycle=0):
     return DutyPoint(frequency_hz=frequency_hz, level_m=level_m, inflow_m3h=90.0, cycle=cycle)
 
 
+@pytest.mark.long
 def test_without_head_at_one_duty_point_lift_friction_wear_and_slip_are_one(alpha):
     found = told(alpha, "flow", points=[at((50.0, 0.0, 0.0))])
     assert set(found["static_head_bias"].same_as) >= {"friction_bias", "pump_wear", "motor_slip", "flow_meter_gain"}

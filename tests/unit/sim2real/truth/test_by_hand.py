@@ -15,7 +15,7 @@ from wetwell.sim2real.truth.truth_plant import run
 PLANTS = {"fine": (sampling.case_of, run), "elastic": (stations.case_of, run_elastic)}
 
 
-@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("plant", ["fine", pytest.param("elastic", marks=pytest.mark.long)])
 def test_both_plants_obey_and_tell_it(plant):
     case_of, run_case = PLANTS[plant]
     case = case_of((), "s", np.random.default_rng(3), seconds=2400)
