@@ -107,7 +107,7 @@ class Fleet:
     async def run(self) -> None:
         """Send for ever, a tenth of the stations each tenth of a second."""
         seq = 0
-        async for elapsed_s in ticks(0.1, asyncio.Event()):
+        async for elapsed_s in ticks(0.1):
             pump = PumpReading(
                 frequency_hz=50.0, flow_m3h=200.0 + elapsed_s % 7, head_m=26.0, power_kw=18.0, running=True
             )

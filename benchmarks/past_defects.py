@@ -104,8 +104,8 @@ PAST_DEFECTS = (
         "alarms of the site itself are refused by the historian",
         "a828930",
         "services/historian/service.py",
-        "is_name = station == SITE or re.match(NAME_PATTERN, station) is not None",
-        "is_name = re.match(NAME_PATTERN, station) is not None",
+        "is_name = station == SITE or _NAME.match(station) is not None",
+        "is_name = _NAME.match(station) is not None",
     ),
     PastDefect(
         "old verdicts from caches are news to alarms that start",

@@ -11,7 +11,6 @@ MAX_STAMP_NS = 2**63 - 1
 """In the year 2262; the first stamp is as far before 1970."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_MICROSECOND = timedelta(microseconds=1)
 _BELOW_MICROSECOND = re.compile(r"[.,]\d{6}(\d{1,3})")
 
 
@@ -26,7 +25,7 @@ def to_iso(stamp_ns: int) -> str:
     '1970-01-01T00:00:01.500Z'
     """
     second, rest_ns = divmod(stamp_ns, NS_PER_S)
-    whole = (_EPOCH + timedelta(seconds=second)).strftime("%Y-%m-%dT%H:%M:%S")
+    whole = (_EPOCH + timedelta(seconds=second)).isoformat()[:19]
     if rest_ns == 0:
         return f"{whole}Z"
     return f"{whole}.{rest_ns // 1_000_000:03}Z" if rest_ns % 1_000_000 == 0 else f"{whole}.{rest_ns:09}Z"
@@ -50,9 +49,9 @@ def from_iso(text: str) -> int:
     moment = datetime.fromisoformat(text)
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=UTC)
-    stamp_ns = (moment - _EPOCH) // _MICROSECOND * 1000
-    digits = _BELOW_MICROSECOND.search(text)
-    if digits:
+    since = moment - _EPOCH
+    stamp_ns = (since.days * 86_400 + since.seconds) * NS_PER_S + since.microseconds * 1000
+    if ("." in text or "," in text) and (digits := _BELOW_MICROSECOND.search(text)):
         stamp_ns += int(digits[1].ljust(3, "0"))
     if abs(stamp_ns) > MAX_STAMP_NS:
         raise ValueError(f"time must lie in the years 1678 to 2262, got {text!r}")

@@ -7,11 +7,13 @@ import math
 import re
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
-from types import NoneType, UnionType
+from functools import cache, partial
+from types import NoneType
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic_core import to_json
 
 from wetwell.detector.baseline.healthy_reference import Check, HealthyReference
 from wetwell.detector.baseline.learning import Learning
@@ -91,14 +93,14 @@ def encode_snapshot(
     stored["rows"] = stored["rows"].view(np.float64).reshape(-1, len(STEADY_SAMPLE.descr))
     system = systems[0] if len(systems) == 1 else list(systems)
     state = {"arrays": stored, "system": system, "pumps": list(pumps)}
-    text = json.dumps(_encoded(state), separators=(",", ":"), allow_nan=False)
+    text = to_json(_encoded(state))
     header = {
         "schema": SCHEMA,
         "station": station,
         "datasheet": _fingerprint(datasheet),
-        "sha256": hashlib.sha256(text.encode()).hexdigest(),
+        "sha256": hashlib.sha256(text).hexdigest(),
     }
-    return f"{json.dumps(header)}\n{text}\n".encode()
+    return b"%b\n%b\n" % (json.dumps(header).encode(), text)
 
 
 def decode_snapshot(
@@ -151,6 +153,7 @@ def _check_counts(systems: Sequence[SystemPrior], pumps: Sequence[PumpMemory], d
             raise ValueError(f"{held} {name}, the station has {wanted}")
 
 
+@cache
 def _fingerprint(datasheet: Datasheet) -> str:
     """Hash of a datasheet; of one main with a fixed lift under the names that were there when form 2 was made."""
     text = repr(datasheet)
@@ -164,20 +167,25 @@ def _fingerprint(datasheet: Datasheet) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _attributes(value: object) -> list[str]:
-    slots = [name for cls in type(value).__mro__ for name in getattr(cls, "__slots__", ())]
-    return slots or list(vars(value))
-
-
 def _encoded(value: Any) -> Any:
-    for kinds, encode in _ENCODERS:
-        if isinstance(value, kinds):
-            return encode(value)
-    name = _STORED_CLASSES.get(type(value))
-    if name is None:
-        raise TypeError(f"a {type(value).__name__} cannot be part of a snapshot")
-    stored = _STORED_FIELDS.get(name, {})
-    fields = {stored.get(field, field): _encoded(getattr(value, field)) for field in _attributes(value)}
+    return _encoder_of(value.__class__)(value)
+
+
+@cache
+def _encoder_of(kind: type) -> Callable[[Any], Any]:
+    """What encodes values of a class: that of the class or of what it is a kind of, or field by field."""
+    for base in kind.__mro__:
+        if base in _ENCODERS:
+            return _ENCODERS[base]
+    if kind not in _STORED_CLASSES:
+        raise TypeError(f"a {kind.__name__} cannot be part of a snapshot")
+    name = _STORED_CLASSES[kind]
+    slots = [slot for base in kind.__mro__ for slot in getattr(base, "__slots__", ())]
+    return partial(_encoded_object, name, slots, _STORED_FIELDS.get(name, {}))
+
+
+def _encoded_object(name: str, slots: Sequence[str], stored: Mapping[str, str], value: object) -> Any:
+    fields = {stored.get(field, field): _encoded(getattr(value, field)) for field in slots or vars(value)}
     return {"object": [name, fields]}
 
 
@@ -187,27 +195,36 @@ def _encoded_float(value: float) -> Any:
 
 def _encoded_array(value: npt.NDArray[Any]) -> Any:
     order: Literal["C", "F"] = "C" if value.flags.c_contiguous else "F"
-    dtype = value.dtype.str if value.dtype.names is None else value.dtype.descr
-    return {"array": [dtype, list(value.shape), order, base64.b64encode(value.tobytes(order)).decode()]}
+    data = base64.b64encode(value.tobytes(order)).decode()
+    return {"array": [_written_dtype(value.dtype), list(value.shape), order, data]}
+
+
+@cache
+def _written_dtype(dtype: np.dtype[Any]) -> Any:
+    return dtype.str if dtype.names is None else dtype.descr
 
 
 def _encoded_pairs(value: Mapping[Any, Any]) -> list[Any]:
     return [[_encoded(key), _encoded(item)] for key, item in value.items()]
 
 
-_ENCODERS: tuple[tuple[type | UnionType, Callable[[Any], Any]], ...] = (
-    (NoneType | bool | int | str, lambda value: value),
-    (float, _encoded_float),
-    (np.ndarray, _encoded_array),
-    (list, lambda value: [_encoded(item) for item in value]),
-    (tuple, lambda value: {"tuple": [_encoded(item) for item in value]}),
-    (frozenset, lambda value: {"frozenset": sorted(value)}),
-    (set, lambda value: {"set": sorted(value)}),
-    (deque, lambda value: {"deque": [value.maxlen, [_encoded(item) for item in value]]}),
-    (Counter, lambda value: {"counter": _encoded_pairs(value)}),
-    (dict, lambda value: {"dict": _encoded_pairs(value)}),
-    (Datasheet, lambda _: {"nominal": None}),
-)
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+_ENCODERS: Mapping[type, Callable[[Any], Any]] = {
+    **dict.fromkeys((NoneType, bool, int, str), _as_it_is),
+    float: _encoded_float,
+    np.ndarray: _encoded_array,
+    list: lambda value: [_encoded(item) for item in value],
+    tuple: lambda value: {"tuple": [_encoded(item) for item in value]},
+    frozenset: lambda value: {"frozenset": sorted(value)},
+    set: lambda value: {"set": sorted(value)},
+    deque: lambda value: {"deque": [value.maxlen, [_encoded(item) for item in value]]},
+    Counter: lambda value: {"counter": _encoded_pairs(value)},
+    dict: lambda value: {"dict": _encoded_pairs(value)},
+    Datasheet: lambda _: {"nominal": None},
+}
 
 
 def _decoded(value: Any, datasheet: Datasheet) -> Any:

@@ -168,7 +168,7 @@ async def _feed(subscription: Subscription[T], handle: Callable[[T], None], serv
 
 async def _look(service: AlarmService) -> None:
     saved_s = 0.0
-    async for elapsed_s in ticks(LOOK_S, asyncio.Event()):
+    async for elapsed_s in ticks(LOOK_S):
         service.look()
         if elapsed_s - saved_s >= SAVE_S:
             service.save()

@@ -93,7 +93,7 @@ class Feed:
     async def _send(self, group: asyncio.TaskGroup) -> None:
         number = 0
         loop = asyncio.get_running_loop()
-        async for _ in ticks(FRAME_S, asyncio.Event()):
+        async for _ in ticks(FRAME_S):
             for name, frame in self._view.advance(loop.time()).items():
                 self._streams.send(name, frame)
             for name in self._backfill.wanted(loop.time()):

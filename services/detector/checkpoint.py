@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic_core import to_json
+
 from wetwell.detector.detector import Detector
 from wetwell.detector.snapshot.codec import SnapshotError
 from wetwell.protocols.errors import RecordingError
@@ -95,7 +97,7 @@ class Checkpoint:
         }
         snapshot = detector.snapshot()
         checked = head | {_CHECKSUM: _checksum(head, snapshot)}
-        return self._encoded, json.dumps(checked).encode() + b"\n" + snapshot
+        return self._encoded, to_json(checked) + b"\n" + snapshot
 
     def write(self, number: int, content: bytes) -> None:
         """Write what `encode` gave, in any thread; what is older than the file is left out."""

@@ -151,7 +151,7 @@ async def judge_all(
 async def _show_left_out(bus: Bus, station: str, period_s: float) -> None:
     """Say on the bus that a station is not judged, for ever."""
     publisher = bus.publisher(status_key(station, "detector"))
-    async for _ in ticks(period_s, asyncio.Event()):
+    async for _ in ticks(period_s):
         status = Status(
             time=now_ns(), station=station, service="detector", state="stopping", figures={"left_out": 1.0}
         )

@@ -106,7 +106,7 @@ class Fleet:
                 report_health(self._bus, SITE, "fleet", self._settings.health.period_s, self._figures),
                 name="fleet.health",
             )
-            async for _ in ticks(self._settings.fleet.period_s, asyncio.Event()):
+            async for _ in ticks(self._settings.fleet.period_s):
                 await self._step()
 
     async def end(self) -> None:

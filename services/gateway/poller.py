@@ -79,7 +79,7 @@ class PlcPoller:
         device = self.plc.device
         blocks = plan_blocks(self.plc.signals, device.max_gap, device.max_words)
         last = -1
-        async for elapsed_s in ticks(device.period_s, asyncio.Event()):
+        async for elapsed_s in ticks(device.period_s):
             tick = int(elapsed_s / device.period_s + 1e-6)
             self._feed.due(max(0.0, elapsed_s - tick * device.period_s), tick - last - 1)
             last = tick

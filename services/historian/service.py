@@ -27,6 +27,7 @@ from wetwell.services.historian.store.interface import Batch, EventRow, Store, S
 log = logging.getLogger(__name__)
 
 MAX_NAME = 64
+_NAME = re.compile(NAME_PATTERN)
 SCRUBBED_AT_ONCE = 10
 """Days of a station that are looked through in each pause; a year of 1,000 stations takes a month."""
 MAX_BATCH = 20_000
@@ -212,7 +213,7 @@ def _of_samples(kind: PayloadKind, payload: bytes) -> Sequence[Row]:
 
 
 def _check(station: str, time_ns: int) -> None:
-    is_name = station == SITE or re.match(NAME_PATTERN, station) is not None
+    is_name = station == SITE or _NAME.match(station) is not None
     if len(station) > MAX_NAME or not is_name:
         raise MessageError(f"station: got {station[:MAX_NAME]!r}, must be a name of letters, digits and ._-")
     if abs(time_ns) > LONGEST_NS:

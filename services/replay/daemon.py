@@ -53,8 +53,7 @@ async def _publish(
     )
     log.info("station '%s': %d rows at speed %g", station, len(recording), speed)
     samples = recording.samples(station)
-    never = asyncio.Event()
-    async for elapsed_s in ticks(tick_period_s(speed), never):
+    async for elapsed_s in ticks(tick_period_s(speed)):
         while published < len(due_s) and due_s[published] <= elapsed_s * speed:
             sender.put(next(samples))
             published += 1

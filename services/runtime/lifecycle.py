@@ -54,19 +54,17 @@ async def stop_event() -> AsyncIterator[asyncio.Event]:
             loop.remove_reader(sys.stdin.fileno())
 
 
-async def ticks(period_s: float, stop: asyncio.Event, lead_s: float = 0.0) -> AsyncIterator[float]:
-    """Yield the time since the start, in s, on each multiple of the period until stopped; late ticks are skipped.
+async def ticks(period_s: float, lead_s: float = 0.0) -> AsyncIterator[float]:
+    """Yield the time since the start, in s, on each multiple of the period for ever; late ticks are skipped.
 
     With a lead the start was so long ago: many that begin together tick apart from their second tick on.
     """
     loop = asyncio.get_running_loop()
     start, n = loop.time() - lead_s, 0
-    while not stop.is_set():
+    while True:
         yield loop.time() - start
         n = max(n + 1, int((loop.time() - start) // period_s) + 1)
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout_at(start + n * period_s):
-                await stop.wait()
+        await asyncio.sleep(start + n * period_s - loop.time())
 
 
 async def until(stop: asyncio.Event, task: asyncio.Task[None]) -> None:
@@ -108,7 +106,6 @@ async def report_health(
     """
     bus.announce(alive_key(station, service))
     publisher = bus.publisher(status_key(station, service))
-    never = asyncio.Event()
 
     def tell() -> None:
         state, reason = condition()
@@ -121,7 +118,7 @@ async def report_health(
     async with asyncio.TaskGroup() as group:
         if news is not None:
             group.create_task(_at_news(news, tell), name=f"{service}.news")
-        async for _ in ticks(period_s, never, lead_s):
+        async for _ in ticks(period_s, lead_s):
             tell()
 
 

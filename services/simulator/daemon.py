@@ -132,8 +132,8 @@ async def _live(simulation: Simulation, pace: Pace, sinks: list[Sink], end_s: in
     """Let the plant live for ever; where it passes its end it stands once, and sets `changed`."""
     station, scenario = simulation.station.name, simulation.scenario.name
     log.info("station '%s', scenario '%s', speed %g", station, scenario, pace.full_speed)
-    never, clock = asyncio.Event(), asyncio.get_running_loop().time
-    async for _ in ticks(tick_period_s(pace.full_speed), never):
+    clock = asyncio.get_running_loop().time
+    async for _ in ticks(tick_period_s(pace.full_speed)):
         due = pace.take_due(clock())
         if simulation.seconds < end_s <= simulation.seconds + due:
             due = end_s - simulation.seconds

@@ -74,7 +74,7 @@ async def watch_all(
             report_health(bus, SITE, "watch", health_period_s, service.figures, service.condition),
             name="watch.health",
         )
-        async for _ in ticks(kept.ask_s, asyncio.Event()):
+        async for _ in ticks(kept.ask_s):
             await service.look(kept.threads)
 
 

@@ -10,7 +10,7 @@ from wetwell.services.runtime.lifecycle import ticks
 
 async def times_of(count: int, lead_s: float, busy_s: float = 0.0) -> list[float]:
     loop, times = asyncio.get_running_loop(), []
-    async for _ in ticks(10.0, asyncio.Event(), lead_s):
+    async for _ in ticks(10.0, lead_s):
         times.append(loop.time())
         if len(times) == count:
             return times
