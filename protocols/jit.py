@@ -1,8 +1,11 @@
 """Compilation of the kernels, with types that mypy can follow; numba is loaded when the first of them is called."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property, update_wrapper
 from importlib import import_module
+from threading import get_ident
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 P = ParamSpec("P")
@@ -102,9 +105,39 @@ def _code_for(function: Callable[P, R], args: tuple[Any, ...]) -> Callable[P, R]
 @cache
 def _numba() -> Any:
     """The compiler, which knows that a kernel stands for its machine code; loading it takes longest of all."""
-    numba, extending = import_module("numba"), import_module("numba.extending")
+    with _without("scipy", "yaml", "cffi"):
+        numba, extending = import_module("numba"), import_module("numba.extending")
+        for later in ("numba.np.arraymath", "numba.core.typing.cffi_utils"):  # the first kernel would load them
+            import_module(later)
     extending.typeof_impl.register(Kernel, lambda kernel, _: numba.typeof(kernel.dispatcher))
     return numba
+
+
+@contextmanager
+def _without(*packages: str) -> Iterator[None]:
+    """Hide packages from what this thread imports meanwhile.
+
+    Numba looks for them as it loads, a fifth of a command's start-up, and does without where they are missing: for
+    products of matrices, a file of settings and functions of C, none of which a kernel here uses.
+    """
+    finder = _Hidden(frozenset(packages), get_ident())
+    sys.meta_path.insert(0, finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)
+
+
+class _Hidden:
+    """Says of packages, to one thread, that they are not installed."""
+
+    def __init__(self, packages: frozenset[str], thread: int) -> None:
+        self._packages, self._thread = packages, thread
+
+    def find_spec(self, name: str, *_: object) -> None:
+        """Raise ModuleNotFoundError for what is hidden; leave all else to Python."""
+        if name in self._packages and get_ident() == self._thread:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
 _ALLOCATING: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -1,5 +1,7 @@
 """The command `wetwell`: its groups, and what it says when a user errs."""
 
+import atexit
+import gc
 import os
 import sys
 from typing import Annotated, NoReturn
@@ -63,6 +65,8 @@ def wetwell(
 def main() -> NoReturn:
     """Run the command; an error of the user's is one line on standard error and exit code 2."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
+    gc.set_threshold(_NEW_OBJECTS)
+    atexit.register(gc.freeze)  # a search for cycles at the very end takes a quarter of a short command
     try:
         app(standalone_mode=True)
     except WetwellError as error:
@@ -73,6 +77,10 @@ def main() -> NoReturn:
             raise
         typer.echo(f"wetwell: {_first(matched)}", err=True)
     sys.exit(2)
+
+
+_NEW_OBJECTS = 50_000
+"""Count of new objects from search to search for cycles: what loads and what streams makes none worth a look."""
 
 
 def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:

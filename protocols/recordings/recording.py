@@ -43,7 +43,7 @@ from wetwell.protocols.quantities import (
 from wetwell.protocols.recordings.covariates import covariate_of
 from wetwell.protocols.recordings.layout import STAMP, arrow_of, parquet_table, parquet_writer, texts_of
 from wetwell.protocols.recordings.origin import MARK, Origin, StoredValue
-from wetwell.protocols.recordings.stamp_texts import to_iso_array
+from wetwell.protocols.recordings.stamp_texts import iso_texts
 from wetwell.protocols.timestamps import from_iso, has_zone
 
 TRUTH_PREFIX = "truth_"
@@ -394,7 +394,7 @@ def _block_writer(file: io.BufferedIOBase, suffix: str, stack: contextlib.ExitSt
             parquet.write_table(table)
         else:
             texts = {name: texts_of(values) for name, values in _columns(block).items()}
-            table = pa.table({"time": to_iso_array(block.time_ns), **texts})
+            table = pa.table({"time": iso_texts(block.time_ns), **texts})
             if not is_begun:
                 file.write(_origin(block).mark.encode())
                 file.write(",".join(table.column_names).encode() + b"\n")

@@ -1,18 +1,20 @@
 """Time stamps of a recording as text."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
+import pyarrow as pa
 
 from wetwell.protocols.arrays import Integers
 from wetwell.protocols.timestamps import NS_PER_S
 
 
-def to_iso_array(stamps_ns: Integers) -> npt.NDArray[np.str_]:
-    """ISO 8601 texts of (n,) stamps, all with the same number of decimals."""
+def iso_texts(stamps_ns: Integers) -> Any:
+    """Arrow array of ISO 8601 texts of (n,) stamps, all with the same number of decimals, and so of one length."""
     unit: Literal["s", "ms", "ns"] = (
         "s" if not np.any(stamps_ns % NS_PER_S) else "ms" if not np.any(stamps_ns % 1_000_000) else "ns"
     )
-    texts = np.datetime_as_string(stamps_ns.astype("datetime64[ns]"), unit=unit)
-    return np.char.add(texts, "Z")
+    texts = np.datetime_as_string(stamps_ns.astype("datetime64[ns]"), unit=unit, timezone="UTC")
+    length = len(texts[0]) if texts.size else 0
+    ends = np.arange(texts.size + 1, dtype=np.int32) * np.int32(length)
+    return pa.StringArray.from_buffers(texts.size, pa.py_buffer(ends), pa.py_buffer(texts.astype(f"S{length}")))

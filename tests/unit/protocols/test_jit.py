@@ -3,10 +3,14 @@
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from importlib.util import find_spec
 
 import numpy as np
+import pytest
 
-from wetwell.protocols.jit import SameTypes, compiled, plain
+from wetwell.protocols.jit import SameTypes, _without, compiled, plain
 from wetwell.simulator.power import hydraulic_power_kw
 
 
@@ -46,3 +50,22 @@ def test_a_station_is_checked_without_the_compiler():
     loaded = set(done.stdout.split())
     assert "wetwell.simulator.hydraulics" in loaded
     assert loaded.isdisjoint({"numba", "scipy", "pyarrow", "asyncio"})
+
+
+def test_a_kernel_is_compiled_without_what_none_needs():
+    code = (
+        "import sys; from wetwell.simulator.power import hydraulic_power_kw; hydraulic_power_kw(9.0, 9.0);"
+        "print(*sys.modules); import scipy, yaml, cffi; print(*sys.meta_path)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules, finders = done.stdout.splitlines()
+    assert "numba" in modules.split()
+    assert set(modules.split()).isdisjoint({"scipy", "yaml", "cffi"})
+    assert "_Hidden" not in finders
+
+
+def test_what_is_hidden_from_one_thread_is_seen_by_another():
+    with _without("this"), ThreadPoolExecutor(1) as pool:
+        with pytest.raises(ModuleNotFoundError, match="'this'"):
+            import_module("this")
+        assert pool.submit(find_spec, "this").result() is not None

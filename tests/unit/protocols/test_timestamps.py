@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wetwell.protocols.recordings.stamp_texts import to_iso_array
+from wetwell.protocols.recordings.stamp_texts import iso_texts
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S, from_iso, to_iso
 
 STAMPS = st.integers(-MAX_STAMP_NS, MAX_STAMP_NS)
@@ -19,9 +19,9 @@ def test_round_trip_loses_nothing(stamp_ns):
 @given(st.lists(STAMPS, max_size=5), st.sampled_from([1, 1_000_000, NS_PER_S]))
 def test_array_round_trip(stamps_ns, unit_ns):
     stamps_ns = [stamp_ns // unit_ns // 2 * unit_ns for stamp_ns in stamps_ns]
-    texts = to_iso_array(np.array(stamps_ns, dtype=np.int64))
-    assert [from_iso(text) for text in texts.tolist()] == stamps_ns
-    assert len({len(text) for text in texts.tolist()}) <= 1
+    texts = iso_texts(np.array(stamps_ns, dtype=np.int64))
+    assert [from_iso(text) for text in texts.to_pylist()] == stamps_ns
+    assert len({len(text) for text in texts.to_pylist()}) <= 1
 
 
 @pytest.mark.parametrize(
