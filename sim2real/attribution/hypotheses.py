@@ -177,7 +177,7 @@ class Hypotheses:
             form=form,
             is_there=None not in fewer
             and are_there(found, [len(one.neutral) for one in members])
-            and self._are_apart(of_member, told, signatures, slopes),
+            and self._are_apart(fit.position, of_member, told, signatures, slopes),
             told=tuple(sorted(fit.names[member] for member in told)),
         )
 
@@ -199,13 +199,13 @@ class Hypotheses:
         return np.asarray(time_s * self._cells.means(rate_of(self._fitter.bins, explained)), dtype=np.float64)
 
     def _are_apart(
-        self, of_member: Integers, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats
+        self, position: Floats, of_member: Integers, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats
     ) -> bool:
         """Whether each effect that is told does more than is allowed that the others that are told cannot do."""
         least = self._cells.group_squares(self._cells.allowed)
         for member in told:
-            others = slopes[:, np.isin(of_member, told) & (of_member != member)]
-            own = own_signature(signatures[member], others, self._cells.allowed)
+            is_other = np.isin(of_member, told) & (of_member != member)
+            own = own_signature(signatures[member], slopes[:, is_other], self._cells.allowed, position[is_other])
             if not np.any(self._cells.group_squares(own) > least):
                 return False
         return True

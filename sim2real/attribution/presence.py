@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.special import gammaincinv
 
 from wetwell.protocols.arrays import Floats
@@ -48,12 +49,14 @@ def strengths_of(fit: Fit) -> list[dict[int, float]]:
     return found
 
 
-def own_signature(signature: Floats, others: Floats, allowed: Floats) -> Floats:
+def own_signature(signature: Floats, others: Floats, allowed: Floats, positions: Floats) -> Floats:
     r"""What of an effect's signature is left once the others of its set are fitted in its place.
 
-    $$f - J \hat x, \qquad \hat x = \arg\min_x \sum_i \left(\frac{f_i - (J x)_i}{a_i}\right)^2$$
+    $$f + J \hat x, \qquad \hat x = \arg\min_x \sum_i \left(\frac{f_i + (J x)_i}{a_i}\right)^2,
+    \qquad 0 \le x_0 + x \le 1$$
 
-    A friction that is too high beside a lift that is too low may do next to nothing, though each does much.
+    A friction that is too high beside a lift that is too low may do next to nothing, though each does much. No other
+    goes beyond its range: a leak that would have to flow backwards does nobody's work.
 
     Parameters
     ----------
@@ -63,9 +66,14 @@ def own_signature(signature: Floats, others: Floats, allowed: Floats) -> Floats:
         J, change of the residuals with each parameter of the others.
     allowed : (cells,) array
         a, size under which a difference is none.
+    positions : (parameters,) array
+        x₀, where the others stand in their ranges.
     """
-    change = np.linalg.lstsq(others / allowed[:, None], signature / allowed, rcond=None)[0]
-    return np.asarray(signature - others @ change, dtype=np.float64)
+    if positions.size == 0:
+        return signature
+    directions, inner = np.linalg.qr(others / allowed[:, None])
+    change = lsq_linear(inner, -directions.T @ (signature / allowed), (-positions, 1.0 - positions)).x
+    return np.asarray(signature + others @ change, dtype=np.float64)
 
 
 def unshifted(cells: Cells, signature: Floats, late: Floats) -> Floats:

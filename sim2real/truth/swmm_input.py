@@ -51,7 +51,8 @@ ROUTING_STEP_S = 0.5
 MAIN_SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
 """Inertance of the mains, times rated flow over head: with more or less, pumps stick or surge in ramps. [s]"""
 FASTEST_M_S = 14.0
-"""Beyond, the solver loses friction: a fifth of it at 18 m/s."""
+"""Where all pumps run. From 15.24 m/s on, its bound of 50 ft/s, the solver has friction grow like the flow only: a fifth
+of it is lost at 18 m/s, and a wet well that is full drives the water a little faster than at the beginning."""
 ROUGHNESS_MM = 0.1
 GRAVITY = 9.81
 WATER_NU_M2_S = 1.1e-6
@@ -73,11 +74,9 @@ def swmm_input(spec: Spec, level_m: float) -> str:
     total = spec.own_loss + spec.shared_loss
     settling_s = HEADER_SETTLING_S if spec.shared_loss > 0 else MAIN_SETTLING_S
     inertance = settling_s * (spec.lift_m + total * spec.rated_flow**2) / spec.rated_flow
-    own = _main(spec.own_loss, inertance * spec.own_loss / total, spec.rated_flow) if spec.own_loss > 0 else None
-    shared = (
-        _main(spec.shared_loss, inertance * spec.shared_loss / total, spec.rated_flow)
-        if spec.shared_loss > 0
-        else None
+    own, shared = (
+        _main(loss, inertance * loss / total, spec.rated_flow, _most_flow(spec, pumps)) if loss > 0 else None
+        for loss, pumps in ((spec.own_loss, 1), (spec.shared_loss, spec.shutoff_m.size))
     )
     junctions, outfalls, conduits, sections, pumps, curves = [], [], [], [], [], []
     for i in numbers:
@@ -141,7 +140,14 @@ def _junction(name: str, diameter_m: float, lift_m: float) -> str:
     return f"{name} 0 {diameter_m:.9g} {lift_m:.9g} 200 0"
 
 
-def _main(loss: float, inertance: float, rated_flow: float) -> tuple[float, float]:
+def _most_flow(spec: Spec, pumps: int) -> float:
+    """Flow of so many pumps at full speed, each as strong as the strongest of them. [m³/s]."""
+    square = spec.square.min() + spec.own_loss + spec.shared_loss * pumps**2
+    linear, head_m = spec.linear.min(), spec.shutoff_m.max() - spec.lift_m
+    return float(pumps * (math.sqrt(linear**2 + 4.0 * square * head_m) - linear) / (2.0 * square))
+
+
+def _main(loss: float, inertance: float, rated_flow: float, most_flow: float) -> tuple[float, float]:
     r"""Length and diameter of a pipe of given loss, at the rated flow, and inertance. [m, m].
 
     $$K = \frac{8 f \ell}{\pi^2 g D^5}, \qquad I = \frac{4 \ell}{\pi g D^2} \quad\Rightarrow\quad
@@ -151,7 +157,7 @@ def _main(loss: float, inertance: float, rated_flow: float) -> tuple[float, floa
     than SWMM's solver bears.
     """
     diameter_m, friction = 0.1, 0.02
-    least_m = math.sqrt(4.0 * rated_flow / (math.pi * FASTEST_M_S))
+    least_m = math.sqrt(4.0 * most_flow / (math.pi * FASTEST_M_S))
     for _ in range(50):
         friction = _friction_factor(diameter_m, rated_flow)
         diameter_m = max((2.0 * friction * inertance / (math.pi * loss)) ** (1.0 / 3.0), least_m)

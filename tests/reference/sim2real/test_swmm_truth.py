@@ -92,6 +92,16 @@ def test_the_area_at_the_floor_speeds_up_the_level(quiet_alpha):
         np.testing.assert_allclose((rises * area_m2)[~before][5:], 1.0, atol=0.02)
 
 
+def test_no_friction_is_lost_where_two_pumps_drive_the_water_fastest(quiet_alpha):
+    pump = quiet_alpha.pump[0].model_copy(update={"curve": (43.61, -0.00918, -7.845e-05)})
+    main = quiet_alpha.rising_main.model_copy(
+        update={"static_head_m": 3.05, "friction_h2_m5": 0.0001801, "layout": "common"}
+    )
+    fast = quiet_alpha.model_copy(update={"pump": (pump,) * 3, "rising_main": main})
+    swmm, fine = both(fast, mean_m3h=415.0, seconds=3600)
+    assert duty(swmm, 2) == pytest.approx(duty(fine, 2), rel=5e-3)
+
+
 def test_all_deviations_for_swmm_exist():
     assert {"friction_bias", "static_head_bias", "sump_area_profile", "common_header"} <= set(SWMM_LIBRARY)
     assert set(SWMM_LIBRARY) <= set(truth_plant.DEVIATIONS)
