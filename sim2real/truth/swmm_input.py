@@ -51,8 +51,8 @@ ROUTING_STEP_S = 0.5
 MAIN_SETTLING_S, HEADER_SETTLING_S = 0.4, 0.65
 """Inertance of the mains, times rated flow over head: with more or less, pumps stick or surge in ramps. [s]"""
 FASTEST_M_S = 14.0
-"""Where all pumps run. From 15.24 m/s on, its bound of 50 ft/s, the solver has friction grow like the flow only: a fifth
-of it is lost at 18 m/s, and a wet well that is full drives the water a little faster than at the beginning."""
+"""Where all pumps run. From 15.24 m/s on, its bound of 50 ft/s, the solver has friction grow like the flow only: a
+fifth of it is lost at 18 m/s. A wet well that is full drives the water a little faster than at the beginning."""
 ROUGHNESS_MM = 0.1
 GRAVITY = 9.81
 WATER_NU_M2_S = 1.1e-6
