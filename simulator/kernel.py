@@ -27,10 +27,9 @@ from wetwell.simulator.power import electrical_power_kw, loaded_power_kw, shaft_
 from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_channel, read_pumps, silence
 from wetwell.simulator.telemetry.sensors import delayed
+from wetwell.simulator.waves import STEPS, coming, pass_on, still_water
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR, level_at_volume_m, next_volume_m3, overflow_m3h
 
-INERTIA_STEPS = 3
-"""Steps within a second in which the column of water is accelerated."""
 STAGE = 1.0 - math.sqrt(0.5)
 """γ of the two-stage implicit step of second order that damps every stiffness (R. Alexander 1977)."""
 
@@ -199,23 +198,75 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         for i in pumps:
             mean_m3h[i] = flow_m3h[i]
         return
-    inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * INERTIA_STEPS / STAGE
-    is_moving = False
+    is_moving = was_moving = False
     for i in pumps:
-        mean_m3h[i] = 0.0
+        was_moving = was_moving or mean_m3h[i] > 0.0 or flow_m3h[i] > 0.0
         is_moving = is_moving or state.speed_ratio[i] > 0.0 or flow_m3h[i] > 0.0
+        mean_m3h[i] = 0.0
     if not is_moving:
         return
-    for _ in range(INERTIA_STEPS):
+    if plant.mains[m].wave_s * STEPS >= 2.0:
+        _move_waves(plant, state, m, static_head_m, friction_h2_m5, was_moving)
+        return
+    inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * STEPS / STAGE
+    for _ in range(STEPS):
         for i in pumps:
             before_m3h[i] = flow_m3h[i]
         _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
         for i in pumps:
-            mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / INERTIA_STEPS
+            mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / STEPS
             flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
         _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
         for i in pumps:
-            mean_m3h[i] += STAGE * flow_m3h[i] / INERTIA_STEPS
+            mean_m3h[i] += STAGE * flow_m3h[i] / STEPS
+
+
+@inlined
+def _move_waves(
+    plant: PlantRecords, state: PlantState, m: int, static_head_m: float, friction_h2_m5: float, was_moving: bool
+) -> None:
+    """Set the flows of main m, in which waves run, in the middles of steps; water at rest has forgotten its waves."""
+    main, flow_m3h = plant.mains[m], state.flow_m3h
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    way, s_m3h = 0.5 * main.wave_s * STEPS, main.linear_flow_m3h
+    b = 2.0 * main.inertia_s2_m2 / (main.wave_s * SECONDS_PER_HOUR)
+    share = main.shared_friction if main.is_common_header else 1.0
+    for step in range(STEPS):
+        for at in pumps[:1] if main.is_common_header else pumps:
+            water = state.water[at]
+            lift_m = lift_at_m(state, at, static_head_m)
+            loss_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, at])
+            if step == 0 and not was_moving:
+                still_water(water, lift_m)
+            came_m, steepness = coming(water, way, b, loss_h2_m5 * share, s_m3h)
+            if main.is_common_header:
+                common_flows(
+                    pumps,
+                    state.curves,
+                    state.speed_ratio,
+                    came_m + steepness * sum_of(flow_m3h, pumps),
+                    loss_h2_m5 * (1.0 - share),
+                    0.0,
+                    s_m3h,
+                    steepness,
+                    flow_m3h,
+                )
+                total_m3h = sum_of(flow_m3h, pumps)
+            else:
+                total_m3h = flow_m3h[at] = individual_flow_m3h(
+                    state.curves[at], state.speed_ratio[at], came_m, 0.0, 0.0, steepness, 0.0
+                )
+            head_m = came_m + steepness * total_m3h
+            pass_on(water, way, b, loss_h2_m5 * share, s_m3h, lift_m, head_m, total_m3h)
+        for i in pumps:
+            state.mean_flow_m3h[i] += flow_m3h[i] / STEPS
+
+
+@inlined
+def lift_at_m(state: PlantState, i: int, static_head_m: float) -> float:
+    """Static head with the air at a pump, and what a correction adds; never negative. [m]."""
+    lift_m: float = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
+    return lift_m
 
 
 @inlined
@@ -232,7 +283,7 @@ def _solve_flows(
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     if main.is_common_header:
         at = pumps[0]
-        lift_m = max(static_head_m + state.pumps[at].air_m + state.correction[STATIC_HEAD, at], 0.0)
+        lift_m = lift_at_m(state, at, static_head_m)
         friction_h2_m5 *= 1.0 + state.correction[HEAD_LOSS, at]
         common_flows(
             pumps,
@@ -247,7 +298,7 @@ def _solve_flows(
         )
         return
     for i in pumps:
-        lift_m = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
+        lift_m = lift_at_m(state, i, static_head_m)
         own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
         flow_m3h[i] = individual_flow_m3h(
             curves[i], state.speed_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
@@ -279,7 +330,7 @@ def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, seco
         if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
             m = plant.pumps[i].main
             static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
-            head_m = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
+            head_m = lift_at_m(state, i, static_head_m)
             if plant.mains[m].is_common_header:
                 pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
                 friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]

@@ -63,8 +63,9 @@ class MainParameters:
     Its static head is that at level 0 of the wet well and falls by `level_slope` for each metre of level, and by
     `lift_slope` for each metre above `lift_reference_m`. It loses k Q (Q + s) with s = `linear_flow_m3h`: 0 where it
     is rough. On a common header, the share `shared_friction` of k acts on the total flow, the rest on that of each
-    pump. `inertia_s2_m2` = length / (g area). Air grows idle and purges running: in a common header for all pumps,
-    else for each by itself or, where `is_air_shared`, at one high point.
+    pump. `inertia_s2_m2` = length / (g area); a wave takes `wave_s` there and back, 0 where the water is rigid. Air
+    grows idle and purges running: in a common header for all pumps, else for each by itself or, where
+    `is_air_shared`, at one high point.
     """
 
     static_head_m: float
@@ -76,6 +77,7 @@ class MainParameters:
     lift_slope: float = 0.0
     lift_reference_m: float = 0.0
     inertia_s2_m2: float = 0.0
+    wave_s: float = 0.0
     air_head_m: float = 0.0
     air_growth_s: float = math.inf
     air_purge_s: float = math.inf

@@ -12,6 +12,7 @@ from wetwell.simulator.corrections.parts import TERMS
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import channels
+from wetwell.simulator.waves import NODES
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR, volume_at_level_m3
 
 MAX_DELAY_S = 119
@@ -76,7 +77,8 @@ class PlantState(NamedTuple):
     """State of a plant; of the station there is one record.
 
     The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
-    now and before a step, and their means over the second. `correction` (terms, pumps) is what learnt corrections add
+    now and before a step, and their means over the second. `water` (pumps, 2, nodes + 1) is that in the main of each,
+    where waves run; that of a header is its first pump's. `correction` (terms, pumps) is what learnt corrections add
     to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past` (channels, m) and
     `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the order of their
     starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first. `place` is that in
@@ -91,6 +93,7 @@ class PlantState(NamedTuple):
     flow_m3h: Floats
     flow_before_m3h: Floats
     mean_flow_m3h: Floats
+    water: Floats
     correction: Floats
     past: Floats
     level_history: Floats
@@ -125,6 +128,7 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         flow_m3h=np.zeros(pumps),
         flow_before_m3h=np.zeros(pumps),
         mean_flow_m3h=np.zeros(pumps),
+        water=np.zeros((pumps, 2, NODES + 1)),
         correction=np.zeros((len(TERMS), pumps)),
         past=np.full((channels(pumps), PAST_S), np.nan),
         level_history=np.full(PAST_S, np.nan),

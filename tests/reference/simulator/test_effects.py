@@ -164,6 +164,43 @@ def test_water_inertia(quiet_alpha, inertia_s2_m2, worst_m3h):
         np.testing.assert_allclose(rows["pump1_flow_m3h"][first_run(rows)][100:-20], duty_m3h(), atol=1e-3)
 
 
+def water_column(frequencies_hz, inertia_s2_m2, wave_s, cells=80):
+    """Mean flows of each second of a pump on an elastic column of as many cells, by the method of lines."""
+    inertia, elasticity = inertia_s2_m2 / 3600.0 / cells, wave_s**2 * 3600.0 / (4.0 * inertia_s2_m2 * cells)
+    masses = inertia * np.array([0.5, *[1.0] * (cells - 1), 0.5])
+    losses = FRICTION / cells * np.array([0.5, *[1.0] * (cells - 1), 0.5])
+
+    def slope(_t, y, n):
+        flows, heads = y[: cells + 1].copy(), np.array([0.0, *y[cells + 1 : -1], STATIC_M])
+        flows[0] = max(flows[0], 0.0)
+        heads[0] = head_m(n, flows[0])
+        rises = (heads[:-1] - heads[1:] - losses * flows * abs(flows)) / masses
+        rises[0] = rises[0] if y[0] > 0.0 or rises[0] > 0.0 else 0.0
+        return [*rises, *(flows[:-1] - flows[1:]) / elasticity, flows[0]]
+
+    state, means_m3h = np.array([*np.zeros(cells + 1), *np.full(cells, STATIC_M), 0.0]), []
+    for frequency_hz in frequencies_hz:
+        state[-1] = 0.0
+        state = solve_ivp(slope, (0.0, 1.0), state, args=(frequency_hz / NOMINAL_HZ,), rtol=1e-5, atol=1e-5).y[:, -1]
+        means_m3h.append(state[-1])
+    return np.array(means_m3h)
+
+
+@pytest.mark.parametrize(("wave_s", "rigid_off_m3h"), [(0.8, 0.3), (3.3, 5.0), (9.0, 20.0)])
+def test_waves_in_a_long_main(quiet_alpha, wave_s, rigid_off_m3h):
+    """Start, run and stop of a pump; a front comes within a third of a second, and over one of 80 cells."""
+    small = quiet_alpha.model_copy(update={"sump": quiet_alpha.sump.model_copy(update={"area_m2": 3.0})})
+    effect = {"name": "water_inertia", "inertia_s2_m2": 3000.0, "wave_s": wave_s}
+    rows = run(small, effect, inflow_m3h=20.0, seconds=180, pumps=1)
+    expected_m3h = water_column(rows["pump1_frequency_hz"], 3000.0, wave_s)
+    assert 60 < np.sum(expected_m3h > 1.0) < 150
+    assert expected_m3h[-1] == 0.0
+    off_m3h = rows["pump1_flow_m3h"] - expected_m3h
+    assert np.max(np.abs(off_m3h)) < 1.5
+    rigid = run(small, effect | {"wave_s": 0.0}, inflow_m3h=20.0, seconds=180, pumps=1)
+    assert np.max(np.abs(rigid["pump1_flow_m3h"] - rows["pump1_flow_m3h"])) > rigid_off_m3h
+
+
 @pytest.mark.parametrize("header", [(), ({"name": "common_header"},)], ids=["individual", "common"])
 def test_air_pocket_grows_and_is_purged_in_each_main(quiet_alpha, header):
     """What head and flow tell of the air, H - H_s - k Q², against the two exponentials; full at the beginning."""
