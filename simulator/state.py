@@ -11,8 +11,8 @@ from wetwell.protocols.orders import AUTOMATIC, first_place
 from wetwell.simulator.corrections.parts import TERMS
 from wetwell.simulator.parameters import PlantParameters
 from wetwell.simulator.records import Records, records_of
+from wetwell.simulator.rising_main.waves import NODES
 from wetwell.simulator.telemetry.channels import channels
-from wetwell.simulator.waves import NODES
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR, volume_at_level_m3
 
 MAX_DELAY_S = 119

@@ -8,7 +8,8 @@ from scipy.optimize import minimize
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, Uncertain, level_filter, step_of
-from wetwell.simulator.parameters import SensorParameters, damped_by
+from wetwell.simulator.parameters import SensorParameters
+from wetwell.simulator.telemetry.damping import damped_by
 
 DRIFT = 2.0 * 0.05**2 / 900.0
 """Growth of the variance of an inflow that changes by a twentieth of what a pump carries in a quarter of an hour.

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, MainNumber, limits
 from wetwell.simulator.parameters import PlantParameters
-from wetwell.simulator.waves import MOST_WAVE_S
+from wetwell.simulator.rising_main.waves import MOST_WAVE_S
 
 
 class WaterInertia(Effect):

@@ -3,7 +3,8 @@
 from typing import Annotated, ClassVar, Literal
 
 from wetwell.simulator.effects.effect import Component, Effect, limits
-from wetwell.simulator.parameters import PlantParameters, damped_by
+from wetwell.simulator.parameters import PlantParameters
+from wetwell.simulator.telemetry.damping import damped_by
 
 
 class FlowMeterLag(Effect):

@@ -7,7 +7,8 @@ import pytest
 from scipy import linalg
 
 from wetwell.sim2real.replay.level_filter import Uncertain, level_filter
-from wetwell.simulator.parameters import SensorParameters, damped_by
+from wetwell.simulator.parameters import SensorParameters
+from wetwell.simulator.telemetry.damping import damped_by
 
 SENSOR = SensorParameters(correlation=0.0)
 SECONDS = 4000

@@ -1,0 +1,187 @@
+"""Water of the mains: what flows in a second, by duty point, inertia or waves; air and leaks that go with it."""
+
+import math
+
+from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.jit import inlined
+from wetwell.simulator.corrections.parts import HEAD_LOSS, STATIC_HEAD
+from wetwell.simulator.forcing import Forcing
+from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h
+from wetwell.simulator.parameters import MainParameters, PlantRecords
+from wetwell.simulator.rising_main.waves import STEPS, coming, pass_on, still_water
+from wetwell.simulator.state import PlantState
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR
+
+STAGE = 1.0 - math.sqrt(0.5)
+"""γ of the two-stage implicit step of second order that damps every stiffness (R. Alexander 1977)."""
+
+
+@inlined
+def static_head_at_m(main: MainParameters, level_m: float, rise_m: float) -> float:
+    """Static head of a main with the wet well at a level, and what a fault adds; may be negative. [m]."""
+    static_head_m = main.static_head_m - main.level_slope * level_m
+    return static_head_m - main.lift_slope * (level_m - main.lift_reference_m) + rise_m
+
+
+@inlined
+def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, m: int, level_m: float) -> None:
+    """Set the flows of main m after the second and their means over it."""
+    static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
+    friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    inertia_s2_m2 = plant.mains[m].inertia_s2_m2
+    flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
+    if inertia_s2_m2 <= 0.0:
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, 0.0)
+        for i in pumps:
+            mean_m3h[i] = flow_m3h[i]
+        return
+    is_moving = was_moving = False
+    for i in pumps:
+        was_moving = was_moving or mean_m3h[i] > 0.0 or flow_m3h[i] > 0.0
+        is_moving = is_moving or state.speed_ratio[i] > 0.0 or flow_m3h[i] > 0.0
+        mean_m3h[i] = 0.0
+    if not is_moving:
+        return
+    if plant.mains[m].wave_s * STEPS >= 2.0:
+        _move_waves(plant, state, m, static_head_m, friction_h2_m5, was_moving)
+        return
+    inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * STEPS / STAGE
+    for _ in range(STEPS):
+        for i in pumps:
+            before_m3h[i] = flow_m3h[i]
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
+        for i in pumps:
+            mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / STEPS
+            flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
+        for i in pumps:
+            mean_m3h[i] += STAGE * flow_m3h[i] / STEPS
+
+
+@inlined
+def _move_waves(
+    plant: PlantRecords, state: PlantState, m: int, static_head_m: float, friction_h2_m5: float, was_moving: bool
+) -> None:
+    """Set the flows of main m, in which waves run, in the middles of steps; water at rest has forgotten its waves."""
+    main, flow_m3h = plant.mains[m], state.flow_m3h
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    way, s_m3h = 0.5 * main.wave_s * STEPS, main.linear_flow_m3h
+    b = 2.0 * main.inertia_s2_m2 / (main.wave_s * SECONDS_PER_HOUR)
+    share = main.shared_friction if main.is_common_header else 1.0
+    for step in range(STEPS):
+        for at in pumps[:1] if main.is_common_header else pumps:
+            water = state.water[at]
+            lift_m = lift_at_m(state, at, static_head_m)
+            loss_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, at])
+            if step == 0 and not was_moving:
+                still_water(water, lift_m)
+            came_m, steepness = coming(water, way, b, loss_h2_m5 * share, s_m3h)
+            if main.is_common_header:
+                common_flows(
+                    pumps,
+                    state.curves,
+                    state.speed_ratio,
+                    came_m + steepness * sum_of(flow_m3h, pumps),
+                    loss_h2_m5 * (1.0 - share),
+                    0.0,
+                    s_m3h,
+                    steepness,
+                    flow_m3h,
+                )
+                total_m3h = sum_of(flow_m3h, pumps)
+            else:
+                total_m3h = flow_m3h[at] = individual_flow_m3h(
+                    state.curves[at], state.speed_ratio[at], came_m, 0.0, 0.0, steepness, 0.0
+                )
+            head_m = came_m + steepness * total_m3h
+            pass_on(water, way, b, loss_h2_m5 * share, s_m3h, lift_m, head_m, total_m3h)
+        for i in pumps:
+            state.mean_flow_m3h[i] += flow_m3h[i] / STEPS
+
+
+@inlined
+def lift_at_m(state: PlantState, i: int, static_head_m: float) -> float:
+    """Static head with the air at a pump, and what a correction adds; never negative. [m]."""
+    lift_m: float = max(static_head_m + state.pumps[i].air_m + state.correction[STATIC_HEAD, i], 0.0)
+    return lift_m
+
+
+@inlined
+def _solve_flows(
+    plant: PlantRecords,
+    state: PlantState,
+    m: int,
+    static_head_m: float,
+    friction_h2_m5: float,
+    inertia_m_m3h: float,
+) -> None:
+    """Set the flows of main m by its layout; pipes of their own have air of their own."""
+    main, curves, flow_m3h = plant.mains[m], state.curves, state.flow_m3h
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    if main.is_common_header:
+        at = pumps[0]
+        lift_m = lift_at_m(state, at, static_head_m)
+        friction_h2_m5 *= 1.0 + state.correction[HEAD_LOSS, at]
+        common_flows(
+            pumps,
+            curves,
+            state.speed_ratio,
+            lift_m,
+            friction_h2_m5 * (1.0 - main.shared_friction),
+            friction_h2_m5 * main.shared_friction,
+            main.linear_flow_m3h,
+            inertia_m_m3h,
+            flow_m3h,
+        )
+        return
+    for i in pumps:
+        lift_m = lift_at_m(state, i, static_head_m)
+        own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
+        flow_m3h[i] = individual_flow_m3h(
+            curves[i], state.speed_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
+        )
+
+
+@inlined
+def gather_air(plant: PlantRecords, state: PlantState, m: int) -> None:
+    """Let the air of main m grow while no water moves in it, and be purged while some does."""
+    main = plant.mains[m]
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    is_one = main.is_common_header or main.is_air_shared
+    total_m3h = sum_of(state.mean_flow_m3h, pumps)
+    for i in pumps:
+        pump = state.pumps[i]
+        flow_m3h = total_m3h if is_one else state.mean_flow_m3h[i]
+        if flow_m3h > 0.0:
+            pump.air_m -= pump.air_m / main.air_purge_s
+        else:
+            pump.air_m += (main.air_head_m - pump.air_m) / main.air_growth_s
+
+
+@inlined
+def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, level_m: float) -> float:
+    """Flow back into the wet well through the check valves of standing pumps: K sqrt(H), H the head behind."""
+    back_m3h = 0.0
+    for i in range(state.pumps.size):
+        leak_m3h = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
+        if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
+            m = plant.pumps[i].main
+            static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
+            head_m = lift_at_m(state, i, static_head_m)
+            if plant.mains[m].is_common_header:
+                pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+                friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
+                total_m3h = sum_of(state.mean_flow_m3h, pumps)
+                head_m += friction_h2_m5 * total_m3h * (total_m3h + plant.mains[m].linear_flow_m3h)
+            back_m3h += leak_m3h * math.sqrt(head_m)
+    return back_m3h
+
+
+@inlined
+def sum_of(flow_m3h: Floats, pumps: Integers) -> float:
+    """Sum of the flows of some pumps, in their order. [m³/h]."""
+    total_m3h = 0.0
+    for i in pumps:
+        total_m3h += flow_m3h[i]
+    return total_m3h
