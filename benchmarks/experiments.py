@@ -149,8 +149,11 @@ def tried(case: TrialCase) -> dict[str, object]:
     asked, steps = fixed_steps(first, site)
     for name, orders, act in (("proposed", best.act.steps, best.act.name), ("fixed", steps, asked)):
         during = played(truth, case.plant, orders, seconds)
-        again = diagnose([before, during], station)
-        told[name] = {"act": act, "bits": round(best.information_bits, 3)} | answer(again, case)
+        try:
+            again = answer(diagnose([before, during], station), case)
+        except ValueError as error:
+            again = {"refused": str(error), "resolved": False, "right": False}
+        told[name] = {"act": act, "bits": round(best.information_bits, 3)} | again
     return told
 
 

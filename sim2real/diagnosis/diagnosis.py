@@ -232,7 +232,7 @@ def _taken(recordings: Sequence[Recording], station: Station) -> Traces:
     are_left_alone = sum(not traces.by_hand.is_commanding.any() for traces in each)
     most_s = (MOST_DIAGNOSED_S if each[0].is_each_second else MOST_OF_ROWS_S) // max(are_left_alone, 1)
     traces = joined([one if one.by_hand.is_commanding.any() else excerpt(one, most_s) for one in each])
-    check_starts(traces.frequency_hz, MIN_STARTS)
+    check_starts(traces.frequency_hz, MIN_STARTS, "the recordings have, without runs that one begins or ends with,")
     return traces
 
 

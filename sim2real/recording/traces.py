@@ -151,7 +151,7 @@ def traces_of(recording: Recording, station: Station, least_starts: int = MIN_ST
     )
 
 
-def check_starts(frequency_hz: Floats, least: int) -> None:
+def check_starts(frequency_hz: Floats, least: int, of: str = "the recording has") -> None:
     """Refuse what has too few starts of pumps to tell anything.
 
     Raises
@@ -162,7 +162,7 @@ def check_starts(frequency_hz: Floats, least: int) -> None:
     running = frequency_hz > 0.0
     starts = int(np.sum(running[:, 1:] & ~running[:, :-1]))
     if starts < least:
-        raise ValueError(f"the recording has {starts} starts of pumps, a diagnosis needs at least {least}")
+        raise ValueError(f"{of} {starts} starts of pumps, a diagnosis needs at least {least}")
 
 
 def _drives_of(rows: Rows, station: Station) -> Drives:

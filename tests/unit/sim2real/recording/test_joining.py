@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.orders import Step
+from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.recording.excerpt import BLANK_S
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.traces import BETWEEN, traces_of
@@ -78,3 +79,9 @@ def test_a_signal_that_one_lacks_has_no_values_there_and_an_inflow_counts_where_
 def test_what_does_not_fit_together_is_refused(parts, changes, told):
     with pytest.raises(ValueError, match=told):
         joined([parts[0], replace(parts[1], **changes)])
+
+
+def test_what_is_left_of_several_recordings_must_show_enough_starts(alpha):
+    few = [recorded(alpha, hour * HOUR_NS, 1801) for hour in (0, 5)]
+    with pytest.raises(ValueError, match=r"^the recordings have, without runs that one .* with, \d starts of pumps"):
+        diagnose(few, alpha)
