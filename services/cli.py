@@ -66,7 +66,7 @@ def main() -> NoReturn:
     """Run the command; an error of the user's is one line on standard error and exit code 2."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
     gc.set_threshold(_NEW_OBJECTS)
-    atexit.register(gc.freeze)  # a search for cycles at the very end takes a quarter of a short command
+    atexit.register(_leave_cycles)
     try:
         app(standalone_mode=True)
     except WetwellError as error:
@@ -77,6 +77,12 @@ def main() -> NoReturn:
             raise
         typer.echo(f"wetwell: {_first(matched)}", err=True)
     sys.exit(2)
+
+
+def _leave_cycles() -> None:
+    """Let Python end without a last search for cycles, a quarter of a short command; DuckDB would complain of it."""
+    if "duckdb" not in sys.modules:
+        gc.freeze()
 
 
 _NEW_OBJECTS = 50_000
