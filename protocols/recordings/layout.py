@@ -31,9 +31,14 @@ def arrow_of(values: npt.NDArray[Any], kind: Any = None) -> Any:
         return pa.Array.from_buffers(kind, size, [None, pa.py_buffer(np.ascontiguousarray(values))])
     if _is_one_text(values):
         text = str(values[0]).encode()
-        ends = np.arange(size + 1, dtype=np.int32) * len(text)
-        return pa.StringArray.from_buffers(size, pa.py_buffer(ends), pa.py_buffer(text * size))
+        return texts_of_a_length(text * size, size, len(text))
     return pa.array(values)
+
+
+def texts_of_a_length(data: Any, size: int, length: int) -> Any:
+    """Arrow array of so many texts of one length, which lie in a buffer one after the other."""
+    ends = np.arange(size + 1, dtype=np.int32) * np.int32(length)
+    return pa.StringArray.from_buffers(size, pa.py_buffer(ends), pa.py_buffer(data))
 
 
 def texts_of(values: npt.NDArray[Any]) -> Any:

@@ -3,9 +3,9 @@
 from typing import Any, Literal
 
 import numpy as np
-import pyarrow as pa
 
 from wetwell.protocols.arrays import Integers
+from wetwell.protocols.recordings.layout import texts_of_a_length
 from wetwell.protocols.timestamps import NS_PER_S
 
 
@@ -16,5 +16,4 @@ def iso_texts(stamps_ns: Integers) -> Any:
     )
     texts = np.datetime_as_string(stamps_ns.astype("datetime64[ns]"), unit=unit, timezone="UTC")
     length = len(texts[0]) if texts.size else 0
-    ends = np.arange(texts.size + 1, dtype=np.int32) * np.int32(length)
-    return pa.StringArray.from_buffers(texts.size, pa.py_buffer(ends), pa.py_buffer(texts.astype(f"S{length}")))
+    return texts_of_a_length(texts.astype(f"S{length}"), texts.size, length)

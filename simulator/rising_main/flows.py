@@ -76,13 +76,14 @@ def _move_waves(
             loss_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, at])
             if step == 0 and not was_moving:
                 still_water(water, lift_m)
-            came_m, steepness = coming(water, way, b, loss_h2_m5 * share, s_m3h)
+            main_h2_m5 = loss_h2_m5 * share
+            came_m, steepness = coming(water, way, b, main_h2_m5, s_m3h)
             if main.is_common_header:
                 common_flows(
                     pumps,
                     state.curves,
                     state.speed_ratio,
-                    came_m + steepness * sum_of(flow_m3h, pumps),
+                    came_m + steepness * sum_of(flow_m3h, pumps),  # it takes off what flowed before
                     loss_h2_m5 * (1.0 - share),
                     0.0,
                     s_m3h,
@@ -95,7 +96,7 @@ def _move_waves(
                     state.curves[at], state.speed_ratio[at], came_m, 0.0, 0.0, steepness, 0.0
                 )
             head_m = came_m + steepness * total_m3h
-            pass_on(water, way, b, loss_h2_m5 * share, s_m3h, lift_m, head_m, total_m3h)
+            pass_on(water, way, b, main_h2_m5, s_m3h, lift_m, head_m, total_m3h)
         for i in pumps:
             state.mean_flow_m3h[i] += flow_m3h[i] / STEPS
 
