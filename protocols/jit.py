@@ -3,7 +3,9 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import EnumType
 from functools import cache, cached_property, update_wrapper
+from hashlib import sha256
 from importlib import import_module
 from threading import get_ident
 from typing import Any, Generic, ParamSpec, TypeVar, cast
@@ -21,6 +23,8 @@ class Kernel(Generic[P, R]):
         The plain Python function.
     dispatcher : numba's dispatcher
         Finds the machine code for the types of arguments, and compiles what there is none of.
+    made_of : str
+        Digest of all that goes into the machine code.
     """
 
     def __init__(self, py_func: Callable[P, R], options: dict[str, Any]) -> None:
@@ -40,7 +44,23 @@ class Kernel(Generic[P, R]):
     @cached_property
     def dispatcher(self) -> Any:
         """Numba's, made at the first use."""
-        return _numba().njit(**self._options)(self.py_func)
+        made = _numba().njit(**self._options)(self.py_func)
+        if hasattr(made, "overloads"):  # not with NUMBA_DISABLE_JIT
+            _stamp(made, self.made_of)
+        return made
+
+    @cached_property
+    def made_of(self) -> str:
+        """Digest of its place and code, of the constants and types in it, and of the kernels that it calls."""
+        function, code = cast("Any", self.py_func), cast("Any", self.py_func).__code__
+        names = [name for name in code.co_names if name in function.__globals__]
+        parts = [
+            *(function.__module__, function.__qualname__, code.co_firstlineno, code.co_code, code.co_consts),
+            *(code.co_names, code.co_varnames, function.__defaults__, sorted(self._options.items())),
+            *(_made_of(function.__globals__[name]) for name in names if function.__globals__[name] is not self),
+            *map(_made_of, function.__annotations__.values()),
+        ]
+        return sha256(repr(parts).encode()).hexdigest()
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -49,8 +69,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     References are not counted (`_nrt=False`): such a function may look into arrays and change them, but not make any.
     Where one compiled function calls another, its code is put in the place of the call (`forceinline`), so that
     the arrays are not handed over number by number. Together this makes a second more than 20 times as quick.
-    Numba takes the code on disk for new while the file of the function that is called from Python is unchanged:
-    after a change in a function that it calls, touch it. The plain Python function is its attribute `py_func`.
+    The plain Python function is its attribute `py_func`.
     """
     return Kernel(function, _OPTIONS)
 
@@ -100,6 +119,29 @@ def _code_for(function: Callable[P, R], args: tuple[Any, ...]) -> Callable[P, R]
     if signature not in dispatcher.overloads:
         dispatcher.compile(signature)
     return cast("Callable[P, R]", dispatcher.overloads[signature].entry_point)
+
+
+def _made_of(value: Any) -> str:
+    """What a global name of a kernel, or the type of an argument, puts into its machine code."""
+    if isinstance(value, Kernel):
+        return value.made_of
+    if isinstance(value, EnumType):
+        return repr(list(value))
+    fields = getattr(value, "_fields", ()) if isinstance(value, type) else ()
+    return repr((value, [(name, _made_of(value.__annotations__[name])) for name in fields]))
+
+
+def _stamp(dispatcher: Any, made_of: str) -> None:
+    """Take machine code on disk for new only if it is made of the same.
+
+    Numba asks for the time of the kernel's own file, whatever became of the kernels that it calls.
+    """
+    index = dispatcher._cache._cache_file  # noqa: SLF001 - there is no public way
+    index._source_stamp = made_of  # noqa: SLF001
+    try:
+        index._load_index()  # noqa: SLF001
+    except (AttributeError, ImportError):  # written for types that have moved since
+        index.flush()
 
 
 @cache
