@@ -41,17 +41,24 @@ def commands_of(folder: Path) -> dict[str, list[str]]:
     }
 
 
-async def observe(endpoint: str, folder: Path, load: list[Played], accelerate: float, period_s: float) -> Site:
+async def observe(folder: Path, load: list[Played], given: argparse.Namespace) -> Site:
     """Run the load against the daemons."""
-    kept_in = {"detector": {"state_dir": str(folder / "state")}, "alarms": {"state_dir": str(folder / "alarms")}}
-    with started(commands_of(folder), endpoint, **kept_in) as running, await connect_client(endpoint) as bus:
+    tables = {
+        "detector": {"state_dir": str(folder / "state")},
+        "alarms": {"state_dir": str(folder / "alarms")},
+        "health": {"period_s": given.health_s},
+    }
+    endpoint, period_s = free_endpoint(), max(given.seconds / given.accelerate / 180.0, 1.0)
+    with started(commands_of(folder), endpoint, **tables) as running, await connect_client(endpoint) as bus:
         site = Site(bus, {name: process.pid for name, process in running.items()})
         hearing = [asyncio.create_task(site.hear_verdicts()), asyncio.create_task(site.hear_statuses())]
         begun_s = time.monotonic()
         await site.wait_for(len(load), services=2)
         print(f"all daemons up after {time.monotonic() - begun_s:.1f} s", file=sys.stderr)
         context = multiprocessing.get_context("spawn")
-        player = context.Process(target=play, args=(endpoint, load, accelerate, folder / "sent.npz"), daemon=True)
+        player = context.Process(
+            target=play, args=(endpoint, load, given.accelerate, folder / "sent.npz", given.gather), daemon=True
+        )
         player.start()
         await asyncio.sleep(SETTLE_S)
         hearing.append(asyncio.create_task(site.look(period_s)))
@@ -62,20 +69,20 @@ async def observe(endpoint: str, folder: Path, load: list[Played], accelerate: f
             await asyncio.sleep(0.5)
         hearing.pop().cancel()
         site.look_once()
-        await asyncio.sleep(10.0 + SETTLE_S)  # the last health figures
+        await asyncio.sleep(given.health_s + SETTLE_S)  # the last health figures
         for task in hearing:
             task.cancel()
         await asyncio.gather(*hearing, return_exceptions=True)
     return site
 
 
-def latencies_ms(site: Site, load: list[Played], sent_s: np.ndarray) -> np.ndarray:
-    """From the put of the sample that a verdict stands on to the arrival of the verdict."""
+def latencies_ms(site: Site, load: list[Played], sent_s: np.ndarray, gather: int) -> np.ndarray:
+    """From the put of the message that a verdict stands on to the arrival of the verdict."""
     place = {each.name: (column, int(each.recording.time_ns[0])) for column, each in enumerate(load)}
     found = []
     for arrived_s, verdict in site.arrivals:
         column, first_ns = place[verdict.station]
-        row = (verdict.time - first_ns) // NS_PER_S
+        row = (verdict.time - first_ns) // NS_PER_S // gather
         if 0 <= row < len(sent_s):  # else one that was told again after the start
             found.append(1e3 * (arrived_s - sent_s[row, column]))
     return np.array(found)
@@ -135,6 +142,8 @@ def main() -> None:
     parser.add_argument("--stations", type=int, default=100)
     parser.add_argument("--seconds", type=int, default=60, help="of each station")
     parser.add_argument("--accelerate", type=float, default=1.0, help="samples a second of each station")
+    parser.add_argument("--gather", type=int, default=1, help="samples in a message")
+    parser.add_argument("--health-s", type=float, default=10.0, help="between health messages of a service")
     parser.add_argument("--plots", type=Path, help="folder for soak.svg and soak-cpu.svg")
     parser.add_argument("--week", type=int, metavar="DAYS", help="so many days in one process instead")
     arguments = parser.parse_args()
@@ -142,19 +151,18 @@ def main() -> None:
         with tempfile.TemporaryDirectory(prefix="wetwell-week-") as week_folder:
             print(json.dumps(memory_of_a_week(Path(week_folder), arguments.stations, arguments.week), indent=2))
         return
-    stations, period_s = arguments.stations, max(arguments.seconds / arguments.accelerate / 180.0, 1.0)
-    endpoint = free_endpoint()
+    stations = arguments.stations
     load_before = os.getloadavg()[0]
     folder = Path(tempfile.mkdtemp(prefix="wetwell-site-"))
     try:
         load = prepare(folder, stations, arguments.seconds)
-        site = asyncio.run(observe(endpoint, folder, load, arguments.accelerate, period_s))
+        site = asyncio.run(observe(folder, load, arguments))
         with np.load(folder / "sent.npz") as sent:
             sent_s, late_s = sent["sent_s"], float(sent["late_s"])
         in_database = kept(folder)
     finally:
         shutil.rmtree(folder)
-    latency_ms, judged = latencies_ms(site, load, sent_s), site.summed("detector")
+    latency_ms, judged = latencies_ms(site, load, sent_s, arguments.gather), site.summed("detector")
     judged["samples"] -= sum(each.begin_s for each in load)
     if arguments.plots is not None:
         plots(site.curve, arguments.plots)
@@ -162,7 +170,8 @@ def main() -> None:
         "stations": stations,
         "seconds": arguments.seconds,
         "samples_per_s": stations * arguments.accelerate,
-        "sent": sent_s.size,
+        "samples_a_message": arguments.gather,
+        "sent": sum(each.seconds for each in load),
         "bytes_a_sample": len(next(load[0].recording.samples(load[0].name)).encode()),
         "sent_late_at_most_s": round(late_s, 3),
         "verdicts": len(latency_ms),

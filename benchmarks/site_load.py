@@ -21,9 +21,11 @@ from wetwell.simulator.simulation import Simulation
 
 LEARNT_S = 28_800
 """So much of each recording is judged beforehand; the faults of scenario `demo` begin then."""
-SHIFT_S = 97
-"""Two stations that share a recording are so far apart in it."""
+SHIFT_S = 120
+"""Two stations that share a recording are so far apart in it: whole messages of up to a minute."""
 RECORDINGS = 16
+MOST_SHARES = 250
+"""Most stations that share a recording: none ends a day."""
 SCENARIOS = ("nominal", "demo")
 SUMP_AREA_M2 = 2.0
 """A small wet well: about 130 runs a pump and day."""
@@ -37,8 +39,14 @@ class Played:
     """A station of the load: a stretch of a recording."""
 
     name: str
-    recording: Recording
+    source: Recording
     begin_s: int
+    seconds: int
+
+    @property
+    def recording(self) -> Recording:
+        """The stretch."""
+        return part_of(self.source, self.begin_s, self.begin_s + self.seconds)
 
 
 def part_of(recording: Recording, begin: int, end: int) -> Recording:
@@ -55,14 +63,15 @@ def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
     for name in ("stations", "state"):
         (folder / name).mkdir()
     played: list[Played] = []
-    shares = -(-stations // RECORDINGS)
-    for number in range(min(RECORDINGS, stations)):
+    recordings = min(max(RECORDINGS, -(-stations // MOST_SHARES)), stations)
+    shares = -(-stations // recordings)
+    for number in range(recordings):
         length_s = LEARNT_S + SHIFT_S * shares + seconds
         simulation = Simulation(small, find_scenario(SCENARIOS[number % 2]), seed=number + 1)
         recording = simulation.advance(length_s, truth=False)
         detector, begin_s = Detector("", datasheet_of(small)), 0
         for share in range(shares):
-            if (index := share * RECORDINGS + number) >= stations:
+            if (index := share * recordings + number) >= stations:
                 break
             until_s = LEARNT_S + share * SHIFT_S
             for block in blocks(part_of(recording, begin_s, until_s), len(small.pump)):
@@ -72,7 +81,7 @@ def prepare(folder: Path, stations: int, seconds: int) -> list[Played]:
             head, _, body = detector.snapshot().partition(b"\n")
             head = json.dumps(json.loads(head) | {"station": name}).encode()
             (folder / "state" / f"{name}.detector.json").write_bytes(head + b"\n" + body)
-            played.append(Played(name, part_of(recording, begin_s, begin_s + seconds), begin_s))
+            played.append(Played(name, recording, begin_s, seconds))
     return sorted(played, key=lambda each: each.name)
 
 
@@ -84,6 +93,32 @@ def messages_of(each: Played, gather: int) -> list[bytes]:
     return [SampleBlock.of(samples[at : at + gather]).encode() for at in range(0, len(samples), gather)]
 
 
+class Said:
+    """Messages of stations that share recordings: each is encoded once, and told under the name of any of them.
+
+    Parameters
+    ----------
+    played : list of Played
+    gather : int
+        Samples in a message; `SHIFT_S` is a multiple of it where stations share a recording.
+    """
+
+    def __init__(self, played: list[Played], gather: int) -> None:
+        self._gather = gather
+        self._encoded: dict[int, tuple[Played, list[bytes]]] = {}
+        for source in {id(each.source): each.source for each in played}.values():
+            its = [each for each in played if each.source is source]
+            begin_s, end_s = min(each.begin_s for each in its), max(each.begin_s + each.seconds for each in its)
+            whole = replace(its[0], begin_s=begin_s, seconds=end_s - begin_s)
+            self._encoded[id(source)] = whole, messages_of(whole, gather)
+
+    def message(self, each: Played, number: int) -> bytes:
+        """What a station says in its message of a number from 0."""
+        whole, encoded = self._encoded[id(each.source)]
+        told = encoded[(each.begin_s - whole.begin_s) // self._gather + number]
+        return told.replace(f'"{whole.name}"'.encode(), f'"{each.name}"'.encode(), 1)
+
+
 def play(endpoint: str, played: list[Played], accelerate: float, out: Path, gather: int = 1) -> None:
     """Publish each station at so many samples a second, `gather` in a message, spread over it; keep when."""
 
@@ -91,17 +126,18 @@ def play(endpoint: str, played: list[Played], accelerate: float, out: Path, gath
         with await connect_client(endpoint) as bus:
             key = sample_key if gather == 1 else sample_block_key
             publishers = [bus.publisher(key(each.name), history=HISTORY // gather) for each in played]
-            messages = [messages_of(each, gather) for each in played]
-            sent_s = np.full((len(messages[0]), len(played)), np.nan)
+            said = Said(played, gather)
+            sent_s = np.full((-(-played[0].seconds // gather), len(played)), np.nan)
             messages_a_second = accelerate / gather * len(played)
             await asyncio.sleep(SETTLE_S)
             start_s, count, late_s = time.monotonic(), 0, 0.0
             while count < sent_s.size:
                 due = min(int((time.monotonic() - start_s) * messages_a_second) + 1, sent_s.size)
                 while count < due:
-                    second, station = divmod(count, len(played))
-                    sent_s[second, station] = now_s = time.monotonic()
-                    publishers[station].put(messages[station][second])
+                    number, station = divmod(count, len(played))
+                    message = said.message(played[station], number)
+                    sent_s[number, station] = now_s = time.monotonic()
+                    publishers[station].put(message)
                     late_s = max(late_s, now_s - start_s - count / messages_a_second)
                     count += 1
                 await asyncio.sleep(TICK_S)
