@@ -7,6 +7,7 @@ import logging
 import random
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Self
 
 import zenoh
@@ -15,9 +16,9 @@ from wetwell.protocols.bus.interface import PACE_S, KeptStream, Keyed, Presence,
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
-from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
-from wetwell.protocols.bus.zenoh.publisher import ZenohPublisher, at_once
-from wetwell.protocols.bus.zenoh.session import open_client_session, open_router_session, refusal
+from wetwell.protocols.bus.zenoh.publisher import DECLARATIONS, ZenohPublisher
+from wetwell.protocols.bus.zenoh.session import at_once, open_client_session, open_router_session, refusal
+from wetwell.protocols.bus.zenoh.sessions import Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import ZenohWorker
 from wetwell.protocols.errors import LinkError
@@ -45,7 +46,7 @@ class ZenohRequest:
 
 
 class ZenohBus:
-    """A `Bus` over a Zenoh session. Close it, or use it in a `with`: else the process never ends.
+    """A `Bus` over Zenoh sessions. Close it, or use it in a `with`: else the process never ends.
 
     Characteristics: buffered: in each subscription, and in each publisher its last `history` messages, both with a
     bound in bytes · when full: a subscription that recovers lets messages go, as a slow way to it does, and asks for
@@ -62,10 +63,10 @@ class ZenohBus:
 
     Parameters
     ----------
-    session : zenoh.Session
-        Open session; the bus closes it.
+    sessions : Sessions
+        Open ones; the bus closes them.
     is_router : bool
-        Whether others connect to this session.
+        Whether others connect to them.
 
     Raises
     ------
@@ -73,15 +74,11 @@ class ZenohBus:
         By every method that has a key, if that is not a key expression or the bus is closed.
     """
 
-    def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
-        self._session = session
+    def __init__(self, sessions: Sessions, *, is_router: bool) -> None:
+        self._sessions = sessions
         self._is_router = is_router
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
-        self._names = DeclaredNames(session)
-        self._worker = ZenohWorker(session, is_router=is_router)
-        self._exit = contextlib.ExitStack()
-        self._exit.enter_context(session)
-        self._exit.callback(self._worker.stop)
+        self._worker = ZenohWorker(sessions, is_router=is_router)
         self._lock = threading.Lock()  # zenoh refuses to be asked while another thread closes the session
 
     def __enter__(self) -> Self:
@@ -93,7 +90,8 @@ class ZenohBus:
     def close(self) -> None:
         """Leave the network; twice is fine."""
         with self._lock:
-            self._exit.close()
+            self._worker.stop()
+            self._sessions.close()
 
     def publisher(self, key: str, *, history: int = 1, goes_on: KeptStream | None = None) -> ZenohPublisher:
         """Publisher on a key that keeps the last `history` messages for late joiners and for recovery of loss.
@@ -109,7 +107,8 @@ class ZenohBus:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
             cache = PublisherCache(history, goes_on)
-            publisher = ZenohPublisher(self._session, key, cache, self._worker.queries, self._names)
+            line = self._sessions.with_room(DECLARATIONS)
+            publisher = ZenohPublisher(line, key, cache, self._worker.queries)
         self._worker.add_publisher(publisher)
         return publisher
 
@@ -154,7 +153,7 @@ class ZenohBus:
     ) -> None:
         with refusal("subscribe to", ", ".join(keys[:3])):
             subscription = ZenohSubscription(
-                self._session, self._names, keys, history, mailbox, deliver, recover=recover, pace_s=pace_s
+                self._sessions, keys, history, mailbox, deliver, recover=recover, pace_s=pace_s
             )
             self._worker.add_subscription(subscription)
 
@@ -166,7 +165,8 @@ class ZenohBus:
             mailbox.put(ZenohRequest(query, str(query.key_expr) if "*" in key else key))
 
         with refusal("answer", key):
-            self._declared.append(self._session.declare_queryable(key, at_once(deliver)))
+            line = self._sessions.first if "*" in key else self._sessions.with_room(1)
+            self._declared.append(line.session.declare_queryable(key, at_once(deliver)))
         return mailbox
 
     async def ask(self, key: str, payload: bytes = b"", *, timeout_s: float = 5.0) -> list[bytes]:
@@ -182,7 +182,7 @@ class ZenohBus:
                 loop.call_soon_threadsafe(ended.set)
 
         with refusal("ask", key):
-            self._session.get(
+            self._sessions.first.session.get(
                 key,
                 zenoh.handlers.Callback(handle_reply, end, indirect=False),
                 payload=payload,
@@ -201,21 +201,21 @@ class ZenohBus:
             mailbox.put(Presence(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT))
 
         with refusal("watch", key):
-            self._declared.append(self._session.liveliness().declare_subscriber(key, at_once(deliver), history=True))
+            session = self._sessions.apart()
+            self._declared.append(session.liveliness().declare_subscriber(key, at_once(deliver), history=True))
         return mailbox
 
     def announce(self, key: str) -> None:
         """Show under a key that this service lives, by a liveliness token that goes with the connection."""
         with refusal("announce", key):
-            self._declared.append(self._session.liveliness().declare_token(key))
+            session = self._sessions.with_room(1).session
+            self._declared.append(session.liveliness().declare_token(key))
 
     @property
     def is_connected(self) -> bool:
         """Whether messages can reach others now: a router always, a client while it has its router."""
         with self._lock:
-            if self._session.is_closed():
-                return False
-            return self._is_router or bool(self._session.info.routers_zid())
+            return not self._sessions.is_closed and (self._is_router or self._sessions.is_connected)
 
 
 def _size_bytes(message: Keyed) -> int:
@@ -241,7 +241,7 @@ def open_router(endpoint: str, access: ZenohAccess = OPEN, upstream: Sequence[st
     LinkError
         If the endpoint cannot be listened on, most often because another program does.
     """
-    return ZenohBus(open_router_session(endpoint, access, upstream), is_router=True)
+    return ZenohBus(Sessions(open_router_session(endpoint, access, upstream)), is_router=True)
 
 
 def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float = 2.0) -> ZenohBus:
@@ -254,7 +254,8 @@ def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float =
     LinkError
         If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
     """
-    return ZenohBus(open_client_session(endpoint, access, timeout_s), is_router=False)
+    further = partial(open_client_session, endpoint, access, timeout_s)
+    return ZenohBus(Sessions(further(), further), is_router=False)
 
 
 async def connect_client(

@@ -3,15 +3,13 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from typing import Any
 
 import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
-from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
-from wetwell.protocols.bus.zenoh.session import reason
+from wetwell.protocols.bus.zenoh.session import at_once, reason
+from wetwell.protocols.bus.zenoh.sessions import Line
 from wetwell.protocols.errors import LinkError
 from wetwell.protocols.messages.message import JSON_ENCODING
 
@@ -21,6 +19,9 @@ LONGEST_SILENCE_S = 60.0
 """So long at most until it says so again."""
 SAME_PAUSE = 0.2
 """Share by which one pause may differ from the one before in a rhythm."""
+DROP = zenoh.CongestionControl.DROP
+DECLARATIONS = 4
+"""Of a publisher: its key, what answers on it, the key on which it says what was its last message, and its token."""
 
 
 def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0.0) -> bool:
@@ -62,17 +63,18 @@ class ZenohPublisher:
 
     Attributes
     ----------
+    line : Line
+        Where it was declared.
     rests_until_s : float
         Until then `settle` need not be asked, whatever is sent meanwhile. [s]
     """
 
     def __init__(
         self,
-        session: zenoh.Session,
+        line: Line,
         key: str,
         cache: PublisherCache,
         queries: "deque[tuple[ZenohPublisher, zenoh.Query]]",
-        names: DeclaredNames,
     ) -> None:
         self.key = key
         self.cache = cache
@@ -81,16 +83,14 @@ class ZenohPublisher:
         self._told_s = 0.0
         self._pause_s = 0.0
         self._rhythm_s = 0.0
-        self._session = session
-        self._names = names
-        names.take()
-        self._tail: zenoh.Publisher | None = None
+        self.line = line
+        self._tail: zenoh.KeyExpr | None = None
+        self._token: zenoh.LivelinessToken | None = None
         self._queries = queries
         self._lock = threading.Lock()
-        self._publisher = session.declare_publisher(
-            key, encoding=JSON_ENCODING, congestion_control=zenoh.CongestionControl.DROP
-        )
-        self._queryable = session.declare_queryable(key, at_once(self._ask))
+        self._put = line.session.put
+        self._numbered = line.numbered(key)
+        self._queryable = line.session.declare_queryable(key, at_once(self._ask))
 
     def put(self, payload: bytes, weight: int = 1) -> None:
         """Send a message, which counts as `weight` kept ones; without a router it is kept for the time after.
@@ -103,7 +103,7 @@ class ZenohPublisher:
         with self._lock:  # what is numbered first is sent first
             header = self.cache.add(payload, weight)
             try:  # not `refusal`: this is once a message
-                self._publisher.put(payload, attachment=header)
+                self._put(self._numbered, payload, encoding=JSON_ENCODING, attachment=header, congestion_control=DROP)
             except zenoh.ZError as error:
                 raise LinkError(f"cannot publish on '{self.key}': {reason(error)}") from error
         now_s = time.monotonic()
@@ -141,15 +141,8 @@ class ZenohPublisher:
         return True
 
     def _tell_end(self) -> None:
-        drop, key = zenoh.CongestionControl.DROP, tail_key(self.key)
-        if self._tail is None and self._names.take():
-            self._tail = self._session.declare_publisher(key, congestion_control=drop)
         if self._tail is None:
-            self._session.put(key, b"", attachment=self.cache.next_header, congestion_control=drop)
-        else:
-            self._tail.put(b"", attachment=self.cache.next_header)
-
-
-def at_once(handle: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":
-    """A callback in the thread of the session, for what is rare and takes no time. By default each has a thread."""
-    return zenoh.handlers.Callback(handle, indirect=False)
+            key = tail_key(self.key)
+            self._tail = self.line.numbered(key)
+            self._token = self.line.session.liveliness().declare_token(key)  # else no router knows the key
+        self._put(self._tail, b"", attachment=self.cache.next_header, congestion_control=DROP)

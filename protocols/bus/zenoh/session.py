@@ -3,7 +3,7 @@
 import contextlib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
 import zenoh
@@ -13,6 +13,8 @@ from wetwell.protocols.errors import ConfigError, LinkError
 
 RECONNECT = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 """How a client looks for a lost router. Zenoh's own 1 to 4 s would leave a gap of that length."""
+MOST_SESSIONS = 10_000
+"""Of all processes at a router. Zenoh's own 1,000 are few where one process of 10,000 stations has some 200."""
 
 
 def open_router_session(endpoint: str, access: ZenohAccess, upstream: Sequence[str]) -> zenoh.Session:
@@ -60,6 +62,7 @@ def _config(mode: Literal["router", "client"], endpoint: str, access: ZenohAcces
         "connect/endpoints": [endpoint] if mode == "client" else [],
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "transport/unicast/max_sessions": MOST_SESSIONS,
         "transport/shared_memory/enabled": False,  # a process that is killed would leave 16 MB of it behind
     }
     try:
@@ -90,3 +93,8 @@ def reason(error: zenoh.ZError) -> str:
     if system:
         return system.group().strip().lower()
     return " ".join(re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).split())
+
+
+def at_once(handle: Callable[[Any], None]) -> "zenoh.handlers.Callback[Any]":
+    """A callback in the thread of the session, for what is rare and takes no time. By default each has a thread."""
+    return zenoh.handlers.Callback(handle, indirect=False)

@@ -13,8 +13,8 @@ from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import Page
 from wetwell.protocols.bus.sequencer import Sequencer, SourceStream
 from wetwell.protocols.bus.zenoh.channels import Channels, Receive
-from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
-from wetwell.protocols.bus.zenoh.publisher import at_once
+from wetwell.protocols.bus.zenoh.session import at_once
+from wetwell.protocols.bus.zenoh.sessions import Line, Sessions
 
 logger = logging.getLogger(__name__)
 
@@ -25,17 +25,24 @@ LEAST_CHANNEL = 64
 """Of each of many channels: a minute of samples."""
 MANY = CHANNEL // 4
 """After so many at once the channels are looked into again without a pause, before they are full."""
+DECLARATIONS = 2
+"""For a key: its messages, and word of which was the last."""
 MOST_READY = 100_000
 """Messages that wait for room; beyond them the oldest go, as of publishers that keep nothing."""
 
 
 class ZenohSubscription:
-    """A subscription: its channels, the order of what comes from them, and where it goes."""
+    """A subscription: its channels, the order of what comes from them, and where it goes.
+
+    Attributes
+    ----------
+    keys : dict of Line, list of str
+        Its keys, by where they were declared.
+    """
 
     def __init__(
         self,
-        session: zenoh.Session,
-        names: DeclaredNames,
+        sessions: Sessions,
         keys: Sequence[str],
         history: int,
         mailbox: Mailbox[Any],
@@ -46,8 +53,7 @@ class ZenohSubscription:
     ) -> None:
         self.pace_s = pace_s
         self.due_s = 0.0
-        self.keys = keys
-        self._names = names
+        self.keys: dict[Line, list[str]] = {}
         self.history = history
         self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
@@ -58,7 +64,9 @@ class ZenohSubscription:
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         receivers: list[Receive] = []
         for key in keys:
-            names.note(key)
+            line = sessions.first if "*" in key else sessions.with_room(DECLARATIONS)
+            self.keys.setdefault(line, []).append(key)
+            session = line.session
             room = max(CHANNEL // len(keys), LEAST_CHANNEL)
             subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
             self._declared.append(subscriber)
@@ -94,7 +102,6 @@ class ZenohSubscription:
                 continue
             attached = sample.attachment if self.recovers else None
             key, header = str(sample.key_expr), None if attached is None else attached.to_bytes()
-            self._names.add(key)
             is_crowded = is_crowded or len(sequencer.ready) >= self._mailbox.half
             if is_crowded and header is not None and sequencer.let_go(key, header):
                 continue

@@ -17,7 +17,8 @@ import zenoh
 
 from wetwell.protocols.bus.publisher_cache import CacheQuery, Page
 from wetwell.protocols.bus.sequencer import SourceStream
-from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher, at_once
+from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher
+from wetwell.protocols.bus.zenoh.sessions import Line, Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.messages.message import JSON_ENCODING
 
@@ -63,19 +64,19 @@ class RecoveryQuery:
 
 
 class ZenohWorker(threading.Thread):
-    """Serves all subscriptions and publishers of a session until it is stopped.
+    """Serves all subscriptions and publishers of a bus until it is stopped.
 
     Parameters
     ----------
-    session : zenoh.Session
+    sessions : Sessions
     is_router : bool
-        Whether others connect to this session.
+        Whether others connect to them.
     """
 
-    def __init__(self, session: zenoh.Session, *, is_router: bool) -> None:
+    def __init__(self, sessions: Sessions, *, is_router: bool) -> None:
         super().__init__(name="zenoh-worker")
         self.queries: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
-        self._session = session
+        self._sessions = sessions
         self._is_router = is_router
         self._subscriptions: list[ZenohSubscription] = []
         self._publishers: list[ZenohPublisher] = []
@@ -83,9 +84,7 @@ class ZenohWorker(threading.Thread):
         self._due: deque[RecoveryQuery] = deque()
         self._asked: list[RecoveryQuery] = []
         self._stopping = threading.Event()
-        self._has_reconnected = threading.Event()
         self._lock = threading.Lock()
-        self._listener: object = None
 
     def add_publisher(self, publisher: ZenohPublisher) -> None:
         """Serve a publisher from now on."""
@@ -95,7 +94,7 @@ class ZenohWorker(threading.Thread):
     def add_subscription(self, subscription: ZenohSubscription) -> None:
         """Serve a subscription from now on, beginning with what is kept of it."""
         if subscription.history:
-            self._plan(RecoveryQuery(subscription, key) for key in subscription.keys)
+            self._plan(RecoveryQuery(subscription, key) for keys in subscription.keys.values() for key in keys)
         self._subscriptions.append(subscription)
         self._begin()
 
@@ -108,14 +107,7 @@ class ZenohWorker(threading.Thread):
     def _begin(self) -> None:
         with self._lock:
             if self.ident is None:
-                self._listener = self._session.info.declare_transport_events_listener(
-                    at_once(self._handle_transport), history=False
-                )
                 self.start()
-
-    def _handle_transport(self, event: zenoh.TransportEvent) -> None:
-        if event.kind == zenoh.SampleKind.PUT:
-            self._has_reconnected.set()
 
     def run(self) -> None:
         """Serve until stopped."""
@@ -133,7 +125,7 @@ class ZenohWorker(threading.Thread):
                     self._handle_answers(now_s)
                     self._ask(now_s)
             except Exception:  # one odd message must not make the process deaf
-                if self._session.is_closed():
+                if self._sessions.is_closed:
                     return
                 logger.exception("bus")
             next_s = min([due_s, *(subscription.due_s for subscription in self._subscriptions)])
@@ -146,17 +138,10 @@ class ZenohWorker(threading.Thread):
 
     def _settle(self, now_s: float) -> None:
         """Say of each publisher that has fallen silent, or whose link was away, which message was its last."""
-        if self._has_reconnected.is_set():
-            self._has_reconnected.clear()
-            for publisher in self._publishers:
-                publisher.stir(now_s)
-            due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
-            self._plan(
-                RecoveryQuery(subscription, key, due_s=due_s)
-                for subscription in self._subscriptions
-                if subscription.recovers
-                for key in subscription.keys
-            )
+        for line in self._sessions.lines:
+            if line.has_come_back.is_set():
+                line.has_come_back.clear()
+                self._stir(line, now_s)
         told = 0
         for _ in range(-(-len(self._publishers) // ROUNDS)):
             self._turn = (self._turn + 1) % len(self._publishers)
@@ -164,6 +149,18 @@ class ZenohWorker(threading.Thread):
             told += publisher.rests_until_s <= now_s and publisher.settle(now_s)
             if told == TOLD_AT_ONCE:
                 break
+
+    def _stir(self, line: Line, now_s: float) -> None:
+        for publisher in self._publishers:
+            if publisher.line is line:
+                publisher.stir(now_s)
+        due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
+        self._plan(
+            RecoveryQuery(subscription, key, due_s=due_s)
+            for subscription in self._subscriptions
+            if subscription.recovers
+            for key in subscription.keys.get(line, ())
+        )
 
     def _plan(self, queries: Iterable[RecoveryQuery]) -> None:
         for query in queries:
@@ -233,7 +230,7 @@ class ZenohWorker(threading.Thread):
                 stream.is_asked = True
                 self._plan([RecoveryQuery(subscription, stream.key, stream)])
             subscription.sequencer.wanted.clear()
-        if not self._due or not (self._is_router or self._session.info.routers_zid()):
+        if not self._due or not (self._is_router or self._sessions.first.session.info.routers_zid()):
             return
         for _ in range(len(self._due)):
             if len(self._asked) >= ASKED:
@@ -252,7 +249,7 @@ class ZenohWorker(threading.Thread):
             payload = CacheQuery(source=stream.source.hex(), begin=stream.next).encode()
             manners = zenoh.CongestionControl.DROP  # the answer is large: rather ask again than block a router
         query.is_refused = False
-        query.replies = self._session.get(
+        query.replies = self._sessions.first.session.get(
             query.key,
             zenoh.handlers.FifoChannel(REPLIES),
             payload=payload,

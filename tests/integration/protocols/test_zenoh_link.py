@@ -120,6 +120,13 @@ def test_liveliness_token_comes_and_goes_with_the_bus(endpoint):
         assert list(plain.liveliness().get(watch.key_expr)) == []
 
 
+@pytest.mark.usefixtures("router")
+def test_a_router_knows_the_key_on_which_a_publisher_tells_its_last_message(endpoint):
+    with plain_client(endpoint) as plain, open_client(endpoint) as bus:
+        bus.publisher("wetwell/alpha/verdict/1").put(b"{}")
+        wait_until(lambda: list(plain.liveliness().get("wetwell/alpha/verdict/1/@tail")) != [])
+
+
 def test_router_that_comes_back_loses_nothing(endpoint):
     async def stream() -> list[bytes]:
         with open_router(endpoint) as router, open_client(endpoint) as sender, open_client(endpoint) as reader:

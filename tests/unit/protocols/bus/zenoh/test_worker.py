@@ -7,7 +7,7 @@ import zenoh
 
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
-from wetwell.protocols.bus.zenoh.declared_names import DeclaredNames
+from wetwell.protocols.bus.zenoh.sessions import Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
 from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
 
@@ -32,7 +32,7 @@ class Replies:
 class Session:
     """A network with publishers that are on the way, or behind a link that is away."""
 
-    info = SimpleNamespace(routers_zid=lambda: ["a router"])
+    info = SimpleNamespace(routers_zid=lambda: ["a router"], declare_transport_events_listener=lambda *_, **__: None)
 
     def __init__(self):
         self.reached: list[PublisherCache] = []
@@ -67,16 +67,16 @@ class Bench:
     def __init__(self):
         self.session = Session()
         self.got: list[bytes] = []
+        sessions = Sessions(self.session)
         self.subscription = ZenohSubscription(
-            self.session,
-            DeclaredNames(self.session),
+            sessions,
             [KEY],
             0,
             Mailbox(100),
             lambda ready: self.got.extend(each for _, each in ready),
             recover=True,
         )
-        self.worker = ZenohWorker(self.session, is_router=False)
+        self.worker = ZenohWorker(sessions, is_router=False)
         self.worker._subscriptions.append(self.subscription)
         self.now_s = 100.0
 

@@ -1,0 +1,59 @@
+"""Sessions of a bus: a further one when the last has no room, and what happens where none can be opened."""
+
+from types import SimpleNamespace
+
+import pytest
+import zenoh
+
+from wetwell.protocols.bus.zenoh import sessions as module
+from wetwell.protocols.bus.zenoh.sessions import FEW, MANY, Line, Sessions
+from wetwell.protocols.errors import LinkError
+
+
+class Session:
+    def __init__(self):
+        self.declared: list[str] = []
+        self.info = SimpleNamespace(declare_transport_events_listener=lambda *_, **__: None)
+
+    def declare_keyexpr(self, key):
+        self.declared.append(key)
+        return zenoh.KeyExpr(key)
+
+
+def away():
+    raise LinkError("the router is away")
+
+
+def test_a_full_session_has_a_further_one_beside_it():
+    sessions = Sessions(Session(), Session)
+    first = {sessions.with_room(1) for _ in range(FEW)}
+    second = {sessions.with_room(1) for _ in range(MANY)}
+    assert first == {sessions.first}
+    assert len(second) == 1
+    assert sessions.with_room(1) not in first | second
+
+
+def test_what_belongs_together_is_in_one_session():
+    sessions = Sessions(Session(), Session)
+    sessions.with_room(FEW - 1)
+    assert sessions.with_room(3) is not sessions.first
+
+
+@pytest.mark.parametrize("further", [None, away])
+def test_where_there_can_be_no_other_the_first_takes_all(further):
+    sessions = Sessions(Session(), further)
+    assert {sessions.with_room(1) for _ in range(FEW + 1)} == {sessions.first}
+    assert sessions.apart() is sessions.first.session
+
+
+def test_who_lives_is_asked_in_a_session_apart():
+    sessions = Sessions(Session(), Session)
+    assert sessions.apart() not in [line.session for line in sessions.lines]
+
+
+def test_no_more_keys_are_declared_than_zenoh_can_tell_apart(monkeypatch):
+    monkeypatch.setattr(module, "MOST_NUMBERS", 2)
+    line = Line(Session(), FEW)
+    keys = [f"wetwell/s{number}/sample" for number in range(3)]
+    assert [str(line.numbered(key)) for key in keys] == keys
+    assert line.session.declared == keys[:2]
