@@ -17,7 +17,7 @@ from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.lifecycle import PARENT_VARIABLE
 
-PATIENCE_S = 300.0
+PATIENCE_S = 1_200.0
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
