@@ -23,10 +23,11 @@ Stamp = tuple[int, int]
 
 
 class Room:
-    """Bytes that all stations that catch up may hold together."""
+    """Bytes that all stations that catch up may hold together, and how many messages had none."""
 
     def __init__(self, most_bytes: int = BEHIND_BYTES) -> None:
         self.free_bytes = most_bytes
+        self.dropped = 0
 
 
 class Waiting:
@@ -40,7 +41,7 @@ class Waiting:
 
     def __init__(self, room: Room) -> None:
         self.messages: deque[tuple[bytes, type[SampleMessage]]] = deque()
-        self.taken = self.dropped = 0
+        self.taken = 0
         self._room = room
 
     def extend(self, payloads: Sequence[bytes], kind: type[SampleMessage]) -> None:
@@ -50,7 +51,7 @@ class Waiting:
             self._room.free_bytes -= len(payload)
         while self._room.free_bytes < 0 and len(self.messages) > 1:
             self.pop()
-            self.dropped += 1
+            self._room.dropped += 1
 
     def pop(self) -> tuple[bytes, type[SampleMessage]]:
         """Take the oldest message."""
@@ -114,8 +115,8 @@ class Follower:
     """
 
     def __init__(self, bus: Bus, stations: Sequence[str], kept_s: float = float("inf")) -> None:
-        room = Room()
-        self.waiting = {station: Waiting(room) for station in stations}
+        self.room = Room()
+        self.waiting = {station: Waiting(self.room) for station in stations}
         self._keys: dict[str, tuple[Waiting, type[SampleMessage]]] = {
             key(station): (self.waiting[station], kind)
             for station in stations

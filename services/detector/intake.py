@@ -57,14 +57,14 @@ class Intake:
             self._behind = {judge: follower.waiting[judge.station] for judge in judges if judge.is_restored}
         else:
             self._behind = {judge: follower.waiting[judge.station] for judge in judges}
-        self._passed_over = 0
+        self._room = follower.room
         self._samples = follower.samples
         self._orders = bus.collect(list(self._obeying), pace_s=ORDERS_PACE_S)
 
     @property
     def dropped(self) -> int:
         """Messages for which there was no room."""
-        return self._samples.dropped + self._passed_over + sum(one.dropped for one in self._behind.values())
+        return self._samples.dropped + self._room.dropped
 
     def is_behind(self, judge: StationDetector) -> bool:
         """Whether a judge has yet to take what it has missed."""
@@ -112,7 +112,7 @@ class Intake:
         has_heard = judge.is_restored and judge.detector.seen_until_ns > 0  # else it has missed nothing
         judged = await self._reached(judge, waiting, turn) if has_heard else set()
         await _drain(judge, waiting, judged)
-        self._passed_over += self._behind.pop(judge).dropped
+        del self._behind[judge]
 
     async def _reached(self, judge: StationDetector, waiting: Waiting, turn: asyncio.Semaphore) -> set[Stamp]:
         """Judge what lies before the samples that wait; which ones of those are judged already."""

@@ -118,10 +118,11 @@ def test_a_historian_takes_all_that_a_source_of_small_blocks_has_kept(samples, t
 
 def test_what_waits_while_a_station_catches_up_is_bounded_and_what_goes_is_counted(samples):
     singles, blocks = [sample.encode() for sample in samples[:4]], [*payloads(samples[4:24], 10), b"{}"]
-    waiting = Waiting(Room(sum(map(len, [*singles[2:], *blocks]))))
+    room = Room(sum(map(len, [*singles[2:], *blocks])))
+    waiting = Waiting(room)
     waiting.extend(singles, Sample)
     waiting.extend(blocks, SampleBlock)
-    assert waiting.dropped == 2
+    assert room.dropped == 2
     assert [sample.seq for sample in waiting.samples()] == list(range(2, 24))
 
 
