@@ -13,11 +13,16 @@ from wetwell.protocols.errors import LinkError
 class Session:
     def __init__(self):
         self.declared: list[str] = []
+        self.is_open = True
         self.info = SimpleNamespace(declare_transport_events_listener=lambda *_, **__: None)
 
     def declare_keyexpr(self, key):
         self.declared.append(key)
         return zenoh.KeyExpr(key)
+
+    def close(self):
+        self.is_open = False
+        raise zenoh.ZError("close operation timed out!")
 
 
 def away():
@@ -49,6 +54,15 @@ def test_where_there_can_be_no_other_the_first_takes_all(further):
 def test_who_lives_is_asked_in_a_session_apart():
     sessions = Sessions(Session(), Session)
     assert sessions.apart() not in [line.session for line in sessions.lines]
+
+
+def test_a_session_whose_end_nobody_hears_of_keeps_no_other_open():
+    sessions = Sessions(Session(), Session)
+    sessions.with_room(FEW)
+    sessions.with_room(1)
+    opened = [*(line.session for line in sessions.lines), sessions.apart()]
+    sessions.close()
+    assert [session.is_open for session in opened] == [False] * 3
 
 
 def test_no_more_keys_are_declared_than_zenoh_can_tell_apart(monkeypatch):
