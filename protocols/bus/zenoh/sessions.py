@@ -41,6 +41,11 @@ class Line:
         if event.kind == zenoh.SampleKind.PUT:
             self.has_come_back.set()
 
+    @property
+    def is_connected(self) -> bool:
+        """Whether it has its router."""
+        return bool(self.session.info.routers_zid())
+
     def numbered(self, key: str) -> zenoh.KeyExpr:
         """The key, declared as long as there are numbers: then the session knows where its messages go.
 
@@ -103,10 +108,10 @@ class Sessions:
     @property
     def is_connected(self) -> bool:
         """Whether each of them has its router."""
-        return all(line.session.info.routers_zid() for line in self.lines)
+        return all(line.is_connected for line in self.lines)
 
     def close(self) -> None:
         """Close all; twice is fine. A router too busy to hear of it sees that the connection has gone."""
         for session in [*(line.session for line in self.lines), *self._apart]:
-            with contextlib.suppress(zenoh.ZError):
-                session.close()
+            with contextlib.suppress(zenoh.ZError), session:
+                pass

@@ -36,8 +36,8 @@ class ZenohSubscription:
 
     Attributes
     ----------
-    keys : dict of Line, list of str
-        Its keys, by where they were declared.
+    keys : dict of str, Line
+        Where each of its keys was declared.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ZenohSubscription:
     ) -> None:
         self.pace_s = pace_s
         self.due_s = 0.0
-        self.keys: dict[Line, list[str]] = {}
+        self.keys: dict[str, Line] = {}
         self.history = history
         self.sequencer = Sequencer(history)
         self.recovers = recover or history > 0
@@ -64,9 +64,8 @@ class ZenohSubscription:
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         receivers: list[Receive] = []
         for key in keys:
-            line = sessions.first if "*" in key else sessions.with_room(DECLARATIONS)
-            self.keys.setdefault(line, []).append(key)
-            session = line.session
+            self.keys[key] = sessions.first if "*" in key else sessions.with_room(DECLARATIONS)
+            session = self.keys[key].session
             room = max(CHANNEL // len(keys), LEAST_CHANNEL)
             subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))
             self._declared.append(subscriber)

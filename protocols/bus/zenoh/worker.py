@@ -94,7 +94,7 @@ class ZenohWorker(threading.Thread):
     def add_subscription(self, subscription: ZenohSubscription) -> None:
         """Serve a subscription from now on, beginning with what is kept of it."""
         if subscription.history:
-            self._plan(RecoveryQuery(subscription, key) for keys in subscription.keys.values() for key in keys)
+            self._plan(RecoveryQuery(subscription, key) for key in subscription.keys)
         self._subscriptions.append(subscription)
         self._begin()
 
@@ -159,7 +159,8 @@ class ZenohWorker(threading.Thread):
             RecoveryQuery(subscription, key, due_s=due_s)
             for subscription in self._subscriptions
             if subscription.recovers
-            for key in subscription.keys.get(line, ())
+            for key, its in subscription.keys.items()
+            if its is line
         )
 
     def _plan(self, queries: Iterable[RecoveryQuery]) -> None:
@@ -230,26 +231,29 @@ class ZenohWorker(threading.Thread):
                 stream.is_asked = True
                 self._plan([RecoveryQuery(subscription, stream.key, stream)])
             subscription.sequencer.wanted.clear()
-        if not self._due or not (self._is_router or self._sessions.first.session.info.routers_zid()):
+        if not self._due:
             return
+        reaching = {line for line in self._sessions.lines if self._is_router or line.is_connected}
         for _ in range(len(self._due)):
             if len(self._asked) >= ASKED:
                 return
             query = self._due.popleft()
-            if query.due_s > now_s or query.subscription.is_crowded:
+            line = query.subscription.keys.get(query.key, self._sessions.first)
+            if query.due_s > now_s or query.subscription.is_crowded or line not in reaching:
                 self._due.append(query)
                 continue
-            self._send(query)
+            self._send(query, line)
             self._asked.append(query)
 
-    def _send(self, query: RecoveryQuery) -> None:
+    def _send(self, query: RecoveryQuery, line: Line) -> None:
+        """Ask where the key was declared: the router hears of that before, and what comes afterwards comes here."""
         stream, payload, manners = query.stream, LAST_MESSAGE_QUERY, zenoh.CongestionControl.BLOCK
         if stream is not None:
             query.begin = stream.next
             payload = CacheQuery(source=stream.source.hex(), begin=stream.next).encode()
             manners = zenoh.CongestionControl.DROP  # the answer is large: rather ask again than block a router
         query.is_refused = False
-        query.replies = self._sessions.first.session.get(
+        query.replies = line.session.get(
             query.key,
             zenoh.handlers.FifoChannel(REPLIES),
             payload=payload,

@@ -20,7 +20,10 @@ class Session:
         self.declared.append(key)
         return zenoh.KeyExpr(key)
 
-    def close(self):
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
         self.is_open = False
         raise zenoh.ZError("close operation timed out!")
 

@@ -9,7 +9,7 @@ from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
 from wetwell.protocols.bus.zenoh.sessions import Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
-from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, ZenohWorker
+from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, RecoveryQuery, ZenohWorker
 
 KEY = "wetwell/alpha/sample"
 
@@ -37,11 +37,13 @@ class Session:
     def __init__(self):
         self.reached: list[PublisherCache] = []
         self.loses_ends = False
+        self.asked: list[str] = []
 
     def declare_subscriber(self, *_):
         return SimpleNamespace(handler=SimpleNamespace(try_recv=lambda: None))
 
     def get(self, key, _channel, *, payload, **_):
+        self.asked.append(key)
         answers = []
         for publisher in self.reached:
             page = publisher.page(read_query(payload))
@@ -169,3 +171,19 @@ def test_no_period_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forg
         bench.worker._settle(0.0)
         assert len(told) == (number + 1) * TOLD_AT_ONCE
     assert sorted(told) == list(range(1_000))
+
+
+def test_each_key_is_asked_for_in_the_session_that_declared_it():
+    made: list[Session] = [Session()]
+
+    def further():
+        made.append(Session())
+        return made[-1]
+
+    sessions = Sessions(made[0], further)
+    keys = [f"wetwell/s{number}/sample" for number in range(40)]
+    subscription = ZenohSubscription(sessions, [*keys, "wetwell/*/sample"], 1, Mailbox(100), print, recover=True)
+    worker = ZenohWorker(sessions, is_router=False)
+    worker._plan(RecoveryQuery(subscription, key) for key in subscription.keys)
+    worker._ask(0.0)
+    assert [session.asked for session in made] == [[*keys[:32], "wetwell/*/sample"], keys[32:]]
