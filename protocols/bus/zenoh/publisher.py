@@ -1,5 +1,6 @@
 """One key of a Zenoh bus, from the side of who publishes."""
 
+import math
 import threading
 import time
 from collections import deque
@@ -24,8 +25,8 @@ DECLARATIONS = 4
 """Of a publisher: its key, what answers on it, the key on which it says what was its last message, and its token."""
 
 
-def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0.0) -> bool:
-    """Whether a publisher should say, again, which message was its last: 1, 4, 16, 64 s after it, then each 60 s.
+def end_due_s(silent_s: float, told_s: float, rhythm_s: float = 0.0) -> float:
+    """When a publisher should say, again, which message was its last: 1, 4, 16, 64 s after it, then each 60 s.
 
     Once is not enough: where a link between two routers was away, neither the publisher nor who has missed
     something is told of it. As the waits grow, what was lost is known within four times as long as the link was away.
@@ -33,8 +34,6 @@ def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0
 
     Parameters
     ----------
-    now_s : float
-        Time. [s]
     silent_s : float
         Since when it is silent. [s]
     told_s : float
@@ -44,18 +43,14 @@ def is_end_due(now_s: float, silent_s: float, told_s: float, rhythm_s: float = 0
 
     Examples
     --------
-    >>> [is_end_due(now_s, 10.0, 0.0) for now_s in (10.9, 11.1)]
-    [False, True]
-    >>> [is_end_due(now_s, 10.0, 11.0) for now_s in (13.9, 14.1)]
-    [False, True]
-    >>> [is_end_due(now_s, 10.0, 500.0) for now_s in (559.9, 560.1)]
-    [False, True]
-    >>> [is_end_due(now_s, 10.0, 0.0, rhythm_s=10.0) for now_s in (29.9, 30.1)]
-    [False, True]
+    >>> [end_due_s(10.0, told_s) for told_s in (0.0, 11.0, 500.0)]
+    [11.0, 14.0, 560.0]
+    >>> end_due_s(10.0, 0.0, rhythm_s=10.0)
+    30.0
     """
     first_s = max(LAST_LOSS_S, min(2.0 * rhythm_s, LONGEST_SILENCE_S))
     wait_s = min(3.0 * (told_s - silent_s), LONGEST_SILENCE_S) if told_s > silent_s else 0.0
-    return now_s - silent_s > first_s and now_s - told_s > wait_s
+    return max(silent_s + first_s, told_s + wait_s)
 
 
 class ZenohPublisher:
@@ -66,7 +61,7 @@ class ZenohPublisher:
     line : Line
         Where it was declared.
     rests_until_s : float
-        Until then `settle` need not be asked, whatever is sent meanwhile. [s]
+        Until then `settle` need not be asked; what is sent moves it. [s]
     """
 
     def __init__(
@@ -106,10 +101,11 @@ class ZenohPublisher:
                 self._put(self._numbered, payload, encoding=JSON_ENCODING, attachment=header, congestion_control=DROP)
             except zenoh.ZError as error:
                 raise LinkError(f"cannot publish on '{self.key}': {reason(error)}") from error
-        now_s = time.monotonic()
-        pause_s = now_s - self._silent_s
-        self._rhythm_s = pause_s if abs(pause_s - self._pause_s) < SAME_PAUSE * pause_s else 0.0
-        self._pause_s, self._silent_s = pause_s, now_s
+            now_s = time.monotonic()
+            pause_s = now_s - self._silent_s
+            self._rhythm_s = pause_s if abs(pause_s - self._pause_s) < SAME_PAUSE * pause_s else 0.0
+            self._pause_s, self._silent_s = pause_s, now_s
+            self.rests_until_s = end_due_s(now_s, self._told_s, self._rhythm_s)
 
     def _ask(self, query: zenoh.Query) -> None:
         self._queries.append((self, query))
@@ -132,13 +128,14 @@ class ZenohPublisher:
 
     def settle(self, now_s: float) -> bool:
         """Tell those who follow which message was the last, if it is time to; whether it was."""
-        if not self.cache.end or not is_end_due(now_s, self._silent_s, self._told_s, self._rhythm_s):
-            has_spoken = now_s - self._silent_s <= LAST_LOSS_S
-            self.rests_until_s = (self._silent_s if has_spoken else now_s) + LAST_LOSS_S
-            return False
-        self._told_s = now_s
-        self._tell_end()
-        return True
+        with self._lock:
+            due_s = end_due_s(self._silent_s, self._told_s, self._rhythm_s) if self.cache.end else math.inf
+            is_due = due_s < now_s
+            self._told_s = now_s if is_due else self._told_s
+            self.rests_until_s = end_due_s(self._silent_s, now_s) if is_due else due_s
+        if is_due:
+            self._tell_end()
+        return is_due
 
     def _tell_end(self) -> None:
         if self._tail is None:
