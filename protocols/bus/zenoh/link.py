@@ -16,7 +16,7 @@ from wetwell.protocols.bus.interface import PACE_S, KeptStream, Keyed, Presence,
 from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache
 from wetwell.protocols.bus.zenoh.access import OPEN, ZenohAccess
-from wetwell.protocols.bus.zenoh.publisher import DECLARATIONS, ZenohPublisher
+from wetwell.protocols.bus.zenoh.publisher import OF_A_PUBLISHER, ZenohPublisher
 from wetwell.protocols.bus.zenoh.session import at_once, open_client_session, open_router_session, refusal
 from wetwell.protocols.bus.zenoh.sessions import Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
@@ -107,7 +107,7 @@ class ZenohBus:
             raise ValueError(f"history must be at least 1, got {history} (key '{key}')")
         with refusal("publish on", key):
             cache = PublisherCache(history, goes_on)
-            line = self._sessions.with_room(DECLARATIONS)
+            line = self._sessions.with_room(OF_A_PUBLISHER)
             publisher = ZenohPublisher(line, key, cache, self._worker.queries)
         self._worker.add_publisher(publisher)
         return publisher

@@ -21,8 +21,8 @@ LONGEST_SILENCE_S = 60.0
 SAME_PAUSE = 0.2
 """Share by which one pause may differ from the one before in a rhythm."""
 DROP = zenoh.CongestionControl.DROP
-DECLARATIONS = 4
-"""Of a publisher: its key, what answers on it, the key on which it says what was its last message, and its token."""
+OF_A_PUBLISHER = 4
+"""Declarations: its key, what answers on it, the key on which it says what was its last message, and its token."""
 
 
 def end_due_s(silent_s: float, told_s: float, rhythm_s: float = 0.0) -> float:

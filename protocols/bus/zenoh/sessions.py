@@ -9,9 +9,9 @@ import zenoh
 from wetwell.protocols.bus.zenoh.session import at_once
 from wetwell.protocols.errors import LinkError
 
-FEW = 64
+ROOM_OF_FIRST = 64
 """Declarations of the first session, which hears all stations: each message there is held against what it knows."""
-MANY = 2_048
+ROOM_OF_FURTHER = 2_048
 """Declarations of each further one: a declaration costs some .1 µs for each before it."""
 MOST_NUMBERS = 32_768
 """Of the numbers that Zenoh gives to the keys of a session: they have 16 bits, and it does not notice when they run
@@ -69,7 +69,7 @@ class Sessions:
 
     def __init__(self, first: zenoh.Session, further: Callable[[], zenoh.Session] | None = None) -> None:
         self._further = further
-        self.first = Line(first, FEW)
+        self.first = Line(first, ROOM_OF_FIRST)
         self.lines = [self.first]
         self._apart: list[zenoh.Session] = []
 
@@ -79,9 +79,9 @@ class Sessions:
         if line.room < declarations:
             further = self._opened()
             if further is None:
-                line.room += MANY
+                line.room += ROOM_OF_FURTHER
             else:
-                line = Line(further, MANY)
+                line = Line(further, ROOM_OF_FURTHER)
                 self.lines.append(line)
         line.room -= declarations
         return line

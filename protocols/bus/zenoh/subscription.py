@@ -25,8 +25,8 @@ LEAST_CHANNEL = 64
 """Of each of many channels: a minute of samples."""
 MANY = CHANNEL // 4
 """After so many at once the channels are looked into again without a pause, before they are full."""
-DECLARATIONS = 2
-"""For a key: its messages, and word of which was the last."""
+OF_A_KEY = 2
+"""Declarations: its messages, and word of which was the last."""
 MOST_READY = 100_000
 """Messages that wait for room; beyond them the oldest go, as of publishers that keep nothing."""
 
@@ -64,7 +64,7 @@ class ZenohSubscription:
         self._declared: list[object] = []  # zenoh undeclares what nobody holds
         receivers: list[Receive] = []
         for key in keys:
-            self.keys[key] = sessions.first if "*" in key else sessions.with_room(DECLARATIONS)
+            self.keys[key] = sessions.first if "*" in key else sessions.with_room(OF_A_KEY)
             session = self.keys[key].session
             room = max(CHANNEL // len(keys), LEAST_CHANNEL)
             subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(room))

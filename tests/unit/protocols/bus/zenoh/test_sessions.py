@@ -6,7 +6,7 @@ import pytest
 import zenoh
 
 from wetwell.protocols.bus.zenoh import sessions as module
-from wetwell.protocols.bus.zenoh.sessions import FEW, MANY, Line, Sessions
+from wetwell.protocols.bus.zenoh.sessions import ROOM_OF_FIRST, ROOM_OF_FURTHER, Line, Sessions
 from wetwell.protocols.errors import LinkError
 
 
@@ -34,8 +34,8 @@ def away():
 
 def test_a_full_session_has_a_further_one_beside_it():
     sessions = Sessions(Session(), Session)
-    first = {sessions.with_room(1) for _ in range(FEW)}
-    second = {sessions.with_room(1) for _ in range(MANY)}
+    first = {sessions.with_room(1) for _ in range(ROOM_OF_FIRST)}
+    second = {sessions.with_room(1) for _ in range(ROOM_OF_FURTHER)}
     assert first == {sessions.first}
     assert len(second) == 1
     assert sessions.with_room(1) not in first | second
@@ -43,14 +43,14 @@ def test_a_full_session_has_a_further_one_beside_it():
 
 def test_what_belongs_together_is_in_one_session():
     sessions = Sessions(Session(), Session)
-    sessions.with_room(FEW - 1)
+    sessions.with_room(ROOM_OF_FIRST - 1)
     assert sessions.with_room(3) is not sessions.first
 
 
 @pytest.mark.parametrize("further", [None, away])
 def test_where_there_can_be_no_other_the_first_takes_all(further):
     sessions = Sessions(Session(), further)
-    assert {sessions.with_room(1) for _ in range(FEW + 1)} == {sessions.first}
+    assert {sessions.with_room(1) for _ in range(ROOM_OF_FIRST + 1)} == {sessions.first}
     assert sessions.apart() is sessions.first.session
 
 
@@ -61,7 +61,7 @@ def test_who_lives_is_asked_in_a_session_apart():
 
 def test_a_session_whose_end_nobody_hears_of_keeps_no_other_open():
     sessions = Sessions(Session(), Session)
-    sessions.with_room(FEW)
+    sessions.with_room(ROOM_OF_FIRST)
     sessions.with_room(1)
     opened = [*(line.session for line in sessions.lines), sessions.apart()]
     sessions.close()
@@ -70,7 +70,7 @@ def test_a_session_whose_end_nobody_hears_of_keeps_no_other_open():
 
 def test_no_more_keys_are_declared_than_zenoh_can_tell_apart(monkeypatch):
     monkeypatch.setattr(module, "MOST_NUMBERS", 2)
-    line = Line(Session(), FEW)
+    line = Line(Session(), ROOM_OF_FIRST)
     keys = [f"wetwell/s{number}/sample" for number in range(3)]
     assert [str(line.numbered(key)) for key in keys] == keys
     assert line.session.declared == keys[:2]
