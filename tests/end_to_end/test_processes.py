@@ -8,8 +8,10 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from http import HTTPStatus
 from pathlib import Path
 
 import pytest
@@ -148,12 +150,16 @@ def test_up_tells_where_to_look_serves_modbus_and_leaves_no_orphan() -> None:
 
 
 def _told(page_port: int, station: str, key: str) -> dict[str, object]:
-    """What a page says of a station under a key, as soon as it has heard of it."""
+    """What a page says of a station under a key, as soon as it has heard of both."""
     end = time.monotonic() + DEADLINE_S
     while True:
-        with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/stations/{station}", timeout=10) as page:
-            if key in (said := json.load(page)):
-                return said[key]
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/stations/{station}", timeout=10) as page:
+                if key in (said := json.load(page)):
+                    return said[key]
+        except urllib.error.HTTPError as error:
+            if error.code != HTTPStatus.NOT_FOUND:
+                raise
         assert time.monotonic() < end, f"the page says nothing under {key}"
         time.sleep(0.05)  # real processes: there is no virtual time here
 
