@@ -403,7 +403,7 @@ def test_the_sizes_are_those_of_the_page_on_capacity():
     router, historian, alarms, detector = figures(capacity, "cores: router, historian, alarms, detector")[:4]
     router_mb, historian_mb, alarms_mb, _ = figures(capacity, "memory: router, historian, alarms, detector")
     per_router_mb, per_alarms_mb = figures(capacity, "memory of router, and of alarms")
-    per_station_mb = figures(capacity, "memory of the detector beyond the first 264 MB")[0]
+    per_station_mb = figures(capacity, "memory of the detector beyond the first 250 MB")[0]
     live_mb, older_mb = figures(capacity, "disk: the live day")
     state_kb = max(figures("benchmarks/README.md", "snapshot after"))
     lines = (ROOT / "docs" / "kubernetes.md").read_text(encoding="utf-8").splitlines()
@@ -418,9 +418,9 @@ def test_the_sizes_are_those_of_the_page_on_capacity():
             "`historian`: cores, memory": size(historian * times, None if more else historian_mb),
             "`alarms`: cores, memory": size(alarms * times, alarms_mb + per_alarms_mb * more),
             "workers": str(workers),
-            "a worker: cores, memory": size(detector * each / 1000, 264 + per_station_mb * each),
+            "a worker: cores, memory": size(detector * each / 1000, 250 + per_station_mb * each),
             "a worker when another one is away: cores, memory": size(
-                detector * at_worst / 1000, 264 + per_station_mb * at_worst
+                detector * at_worst / 1000, 250 + per_station_mb * at_worst
             ),
             "`detector-states`": f"{state_kb * times:.0f} MB",
             "volume of the historian: first day, a year": f"{live_mb * times:.0f} GB, "
