@@ -26,6 +26,8 @@ class Line:
     session : zenoh.Session
     has_come_back : threading.Event
         Set when its router is there again.
+    room : int
+        Declarations that it may still take.
     """
 
     def __init__(self, session: zenoh.Session, most: int) -> None:
