@@ -13,7 +13,7 @@ from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, INFLOW, LEVEL, 
 from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.station_file import Electrical, Sensors, Station
-from wetwell.simulator.corrections.parts import CorrectionPart
+from wetwell.simulator.corrections.parts import Column, CorrectionPart
 from wetwell.simulator.power import hydraulic_power_kw, power_line, shaft_points
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
@@ -180,7 +180,7 @@ class PlantParameters:
     sensors: tuple[SensorParameters, ...]
 
     corrections: tuple[CorrectionPart, ...] = ()
-    columns: tuple[str, ...] = ()
+    columns: tuple[Column, ...] = ()
 
     @property
     def curves(self) -> Floats:

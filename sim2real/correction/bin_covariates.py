@@ -1,24 +1,36 @@
 """What each bin of a recording could go with: level, flow, speed, times, hours, pumps, columns of a user."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.sim2real.recording.column_noise import course_of, noise_of
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.residuals.bins import NO_PUMP, Bins
 from wetwell.simulator.corrections.acting import DAY_S, FIRST_MONDAY_D
-from wetwell.simulator.corrections.parts import Covariate
+from wetwell.simulator.corrections.parts import Column, Covariate
 from wetwell.simulator.parameters import PlantParameters
 
-Place = tuple[Covariate, str | None]
-"""A covariate; of a user's column its name beside it."""
+LEAST_ERRORS = 0.01
+"""Share of its variance from which a column's errors are worth taking off: slopes are too small by that. [1]"""
+
+
+class Place(NamedTuple):
+    """A covariate; of a user's column its name, and the standard deviation of the errors that are taken off."""
+
+    covariate: Covariate
+    column: str | None = None
+    noise: float = 0.0
 
 
 def bin_covariates(
     traces: Traces, bins: Bins, plant: PlantParameters, level_m: Floats, flow_m3h: Floats
 ) -> dict[Place, Floats]:
     """(bins,) values of each covariate, as the simulator sees it: modelled level and flow carry no noise of a sensor.
+
+    A column of a user that may err is there twice: as it is, and without its errors.
 
     A bin of a pump has its own flow and times, or those of its common header; one of the level those of the station.
 
@@ -35,10 +47,10 @@ def bin_covariates(
     nominal_hz = np.array([pump.nominal_frequency_hz for pump in plant.pumps])
     main = np.array([pump.main for pump in plant.pumps])
     found: dict[Place, Floats] = {
-        ("level_m", None): level_m[second],
-        ("hour_of_day", None): clock_s % DAY_S / 3600.0,
-        ("day_of_week", None): (clock_s / DAY_S - FIRST_MONDAY_D) % 7.0,
-        ("days", None): clock_s / DAY_S,
+        Place("level_m"): level_m[second],
+        Place("hour_of_day"): clock_s % DAY_S / 3600.0,
+        Place("day_of_week"): (clock_s / DAY_S - FIRST_MONDAY_D) % 7.0,
+        Place("days"): clock_s / DAY_S,
     }
     own: Mapping[Covariate, Floats] = {
         name: np.zeros(bins.size)
@@ -57,8 +69,13 @@ def bin_covariates(
         own["since_start_s"][rows], own["idle_before_s"][rows] = since_s[at], idle_s[at]
         beside = running if pump == NO_PUMP else running[main == main[pump]]
         own["pumps_on_main"][rows] = beside.sum(axis=0)[at]
-    found |= {(name, None): values for name, values in own.items()}
-    return found | {("column", name): values[second] for name, values in traces.columns.items()}
+    found |= {Place(name): values for name, values in own.items()}
+    for name, course in traces.columns.items():
+        found[Place("column", name)] = course[second]
+        noise = noise_of(traces, name)
+        if noise**2 > LEAST_ERRORS * np.nanvar(course):
+            found[Place("column", name, noise)] = course_of(traces, Column(name=name, noise=noise))[second]
+    return found
 
 
 def _times(running: Flags) -> tuple[Floats, Floats]:

@@ -59,12 +59,13 @@ class Atom:
         if self.shape == "cosine":
             size = float(np.hypot(*sizes))
             centre = float(np.arctan2(sizes[1], sizes[0]) / (2.0 * np.pi) * self.scale) % self.scale
-            if self.place[0] == "days":  # the first time at which it is highest
+            if self.place.covariate == "days":  # the first time at which it is highest
                 centre += np.ceil((self.low - centre) / self.scale) * self.scale
         known = {} if self.shape == "cosine" else {"low": _short(self.low), "high": _short(self.high)}
         return PartTable(
-            covariate=self.place[0],
-            column=self.place[1],
+            covariate=self.place.covariate,
+            column=self.place.column,
+            noise=_short(self.place.noise),
             shape=self.shape,
             size=float(np.clip(_short(size), -4.0, 4.0)),
             centre=_short(centre),
@@ -89,13 +90,13 @@ def dictionary(covariates: Mapping[Place, Floats], is_running: Floats) -> tuple[
     """
     atoms: list[Atom] = []
     left_out: dict[str, str] = {}
-    columns = {place: values for place, values in covariates.items() if place[0] == "column"}
+    columns = {place: values for place, values in covariates.items() if place.column is not None}
     for place, values in covariates.items():
         known = values[is_running & np.isfinite(values)]
-        if place[1] is not None and (why := _useless(place, known, covariates, columns)):
-            left_out[place[1]] = why
+        if place.column is not None and (why := _useless(place, known, covariates, columns)):
+            left_out[place.column] = why
             continue
-        if known.size and np.unique(known).size >= (2 if place[0] == "pumps_on_main" else LEAST_CYCLES):
+        if known.size and np.unique(known).size >= (2 if place.covariate == "pumps_on_main" else LEAST_CYCLES):
             atoms += _atoms(place, values, known)
     return tuple(atoms), left_out
 
@@ -109,13 +110,13 @@ def _useless(
     if np.ptp(known) == 0.0:
         return f"is constant ({known[0]:g})"
     for other, values in covariates.items():
-        if other == place:
+        if other[:2] == place[:2]:
             break
         both = np.isfinite(values) & np.isfinite(columns[place])
         if both.any() and np.ptp(values[both]) > 0.0 and np.ptp(columns[place][both]) > 0.0:
             alike = np.corrcoef(values[both], columns[place][both])[0, 1]
             if abs(alike) > ALIKE:
-                return f"is a copy of {other[1] or other[0]} (correlation {alike:.4f})"
+                return f"is a copy of {other.column or other.covariate} (correlation {alike:.4f})"
     return None
 
 
@@ -133,7 +134,7 @@ def _atoms(place: Place, values: Floats, known: Floats) -> list[Atom]:
         return _made(place, values, shape, centre, scale, (low, high))
 
     found: list[Atom] = []
-    match place[0]:
+    match place.covariate:
         case "hour_of_day":
             found = [made("cosine", 0.0, period_h) for period_h in HOURS if high - low > 0.5 * period_h]
         case "day_of_week":
@@ -169,7 +170,7 @@ def _made(
 
 def near(atom: Atom, values: Floats) -> list[Atom]:
     """A swing over the days, with periods around its own; any other atom as it is."""
-    if atom.place[0] != "days" or atom.shape != "cosine":
+    if atom.place.covariate != "days" or atom.shape != "cosine":
         return [atom]
     scales = atom.scale * PERIOD_RATIO ** np.linspace(-1.0, 1.0, FINER_PERIODS)
     return [_made(atom.place, values, "cosine", 0.0, float(scale), (atom.low, atom.high)) for scale in scales]

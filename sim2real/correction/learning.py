@@ -202,10 +202,10 @@ def _of_calendar(proposal: Proposal, atoms: Sequence[Atom]) -> Proposal | None:
     """The proposal with the hour of the day in the place of a swing whose period is about that; None without one."""
     found = list(proposal.atoms)
     for place, atom in enumerate(found):
-        if atom.place[0] == "days" and atom.shape == "cosine":
+        if atom.place.covariate == "days" and atom.shape == "cosine":
             for other in atoms:
                 is_near = abs(np.log(24.0 * atom.scale / other.scale)) < np.log(PERIOD_RATIO)
-                if other.place[0] == "hour_of_day" and is_near:
+                if other.place.covariate == "hour_of_day" and is_near:
                     found[place] = other
     return None if found == list(proposal.atoms) else replace(proposal, atoms=tuple(found))
 

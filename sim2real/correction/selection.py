@@ -117,7 +117,7 @@ def proposals(
         Change of the residuals with a constant correction of each term; what a correction that varies does is taken
         to be its product with that.
     """
-    places = [atom.place for atom in atoms]
+    places = [atom.place[:2] for atom in atoms]
     costs = [float(np.log(PART_PRIOR / len(set(places)) / places.count(place))) for place in places]
     found: list[Proposal] = []
     for term, slope in sensitivities.items():

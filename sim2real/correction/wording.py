@@ -126,7 +126,9 @@ def sentence(effect: LearntCorrection, reference: float) -> str:
 
 def _said(part: PartTable, term: Term, reference: float) -> str:
     words, unit, _ = COVARIATES_IN_WORDS[part.covariate]
-    words = f"the column {part.column}" if part.column else words
+    if part.column:
+        errors = f", its own errors of ±{part.noise:.2g} taken off," if part.noise else ""
+        words = f"the column {part.column}{errors}"
     of_unit = f" {unit}" if unit else ""
     if part.shape == "cosine":
         size = amount(abs(part.size), term, reference, signed=False)

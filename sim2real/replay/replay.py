@@ -11,6 +11,7 @@ from wetwell.protocols.orders import SHUT_LOSS
 from wetwell.protocols.quantities import INFLOW, LEVEL, PUMP_METERS, AnalogueQuantity
 from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.station.station_file import Station
+from wetwell.sim2real.recording.column_noise import course_of
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
 from wetwell.sim2real.recording.seconds import repeated, trailing_means
 from wetwell.sim2real.recording.traces import Traces
@@ -25,6 +26,7 @@ from wetwell.sim2real.replay.observer import (
     row_observer,
     uncertain_of,
 )
+from wetwell.simulator.corrections.parts import Column
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, SensorParameters, plant_parameters
@@ -101,6 +103,7 @@ class Replay:
         self.period = traces.period
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
         self._forcing = self._healthy(inflow_m3h, None)
+        self._courses: dict[Column, Floats] = {}
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
         self._lagging: _Lagging | None = None
@@ -311,15 +314,18 @@ class Replay:
             effect.force(forcing, self.traces.time_s)
         return forcing
 
-    def _columns(self, names: Sequence[str]) -> Floats:
+    def _columns(self, columns: Sequence[Column]) -> Floats:
         """(columns, n) columns of the user that corrections go by."""
-        missing = [name for name in names if name not in self.traces.columns]
+        missing = [column.name for column in columns if column.name not in self.traces.columns]
         if missing:
             raise ValueError(
                 f"column '{COVARIATE_PREFIX}{missing[0]}' is missing, or most of its rows are empty: a correction of "
                 "the station file goes by it"
             )
-        return np.array([self.traces.columns[name] for name in names]).reshape(len(names), self.traces.seconds)
+        for column in columns:
+            if column not in self._courses:
+                self._courses[column] = course_of(self.traces, column)
+        return np.array([self._courses[column] for column in columns]).reshape(len(columns), self.traces.seconds)
 
 
 def _settled(regime: Integers) -> Flags:

@@ -55,6 +55,22 @@ SHAPES: tuple[Shape, ...] = get_args(Shape)
 LINEAR, SQUARE, COSINE, DECAY, LOGARITHM, STEP, CONSTANT = range(7)
 """Places of the shapes; the last one is that of an offset."""
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column of a user that a correction goes by.
+
+    Attributes
+    ----------
+    name : str
+    noise : float
+        Standard deviation of its own errors, which are smoothed away; 0 where it has none. [unit of the column]
+    """
+
+    name: str
+    noise: float = 0.0
+
+
 ALL = -1
 """Place of a pump, or a main, that stands for all."""
 

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from wetwell.protocols.recordings.covariates import COVARIATE_PATTERN
 from wetwell.protocols.station.table import Finite, Positive, Table
-from wetwell.simulator.corrections.parts import SHAPES, Covariate, Shape, shape_at
+from wetwell.simulator.corrections.parts import SHAPES, Column, Covariate, Shape, shape_at
 
 Size = Annotated[float, Field(ge=-4.0, le=4.0, allow_inf_nan=False)]
 
@@ -21,6 +21,9 @@ class PartTable(Table):
         What it goes by; "column" is a column of a user.
     column : str, optional
         Name of that column, without its prefix.
+    noise : float
+        Standard deviation of the column's own errors, which have no memory; it is smoothed by that. 0 takes it as it
+        is. [unit of the column]
     shape : str
         How it goes by that.
     size : float
@@ -33,6 +36,7 @@ class PartTable(Table):
 
     covariate: Covariate
     column: Annotated[str, Field(pattern=COVARIATE_PATTERN, examples=["rain_mm_h"])] | None = None
+    noise: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
     shape: Shape
     size: Size
     centre: Finite = 0.0
@@ -44,6 +48,10 @@ class PartTable(Table):
     def _check(self) -> Self:
         if (self.column is None) == (self.covariate == "column"):
             raise ValueError(f"column: is for covariate 'column', and needed there; got covariate '{self.covariate}'")
+        if self.noise and self.column is None:
+            raise ValueError(
+                f"noise: got {self.noise:g}, only a column has errors; the covariate is '{self.covariate}'"
+            )
         if self.shape != "cosine":
             if self.low is None or self.high is None:
                 raise ValueError(f"low, high: missing; shape '{self.shape}' needs the range in which it is known")
@@ -52,6 +60,11 @@ class PartTable(Table):
             if self.shape == "decay" and self.low < self.centre:
                 raise ValueError(f"low: got {self.low:g}, of shape 'decay' it must not lie under {self.centre:g}")
         return self
+
+    @property
+    def source(self) -> Column | None:
+        """The column that it goes by; None where it goes by something of the model."""
+        return None if self.column is None else Column(name=self.column, noise=self.noise)
 
     @property
     def bounds(self) -> tuple[float, float]:

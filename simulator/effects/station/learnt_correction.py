@@ -53,8 +53,8 @@ class LearntCorrection(Effect):
     offset : float
         c_0, the same correction at all times; 0 is none. [1]
     part : sequence of tables
-        At most three: `covariate` (x; `column` names one of a user), `shape` (φ), `size` (a), `centre` (x_0), `scale`
-        (s), and the range from `low` to `high` in which it is known.
+        At most three: `covariate` (x; `column` names one of a user, `noise` is what it errs by), `shape` (φ), `size`
+        (a), `centre` (x_0), `scale` (s), and the range from `low` to `high` in which it is known.
     pump : int
         Of a term that each pump has; 0 for all.
     main : int
@@ -113,7 +113,7 @@ class LearntCorrection(Effect):
         if term == STATIC_HEAD:
             _check_lift(parameters, high * size)
         columns = list(parameters.columns)
-        columns += dict.fromkeys(part.column for part in self.part if part.column and part.column not in columns)
+        columns += dict.fromkeys(part.source for part in self.part if part.source and part.source not in columns)
         place = {"pump": self.pump - 1 if self.pump else ALL, "main": self.main - 1 if self.main else ALL}
         added = [CorrectionPart(term=term, size=size * self.offset, **place)] if self.offset else []
         for part in self.part:
@@ -123,7 +123,7 @@ class LearntCorrection(Effect):
                     term=term,
                     covariate=COVARIATES.index(part.covariate),
                     shape=SHAPES.index(part.shape),
-                    column=columns.index(part.column) if part.column else 0,
+                    column=columns.index(part.source) if part.source else 0,
                     size=size * part.size,
                     centre=part.centre,
                     scale=part.scale,

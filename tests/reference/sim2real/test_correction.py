@@ -102,3 +102,45 @@ def test_a_cause_that_nothing_goes_with_gets_none():
     taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
     assert taken is None
     assert "\n" not in why
+
+
+RISE_PER_MM_H = 0.02
+"""Of the reading of the flow meters, as rain makes it."""
+
+
+def rained(seed, rain_mm_h, noise_mm_h):
+    """A station whose flow meters read more in rain, which a gauge of its own measures with errors."""
+    case = truth(None, seed)
+    recording = run(case, truth=False)
+    columns = {
+        name: values * (1.0 + RISE_PER_MM_H * (rain_mm_h - 5.0)) if name.endswith("_flow_m3h") else values
+        for name, values in recording.columns.items()
+    }
+    errors = np.random.default_rng([1, seed]).normal(0.0, noise_mm_h, HOURS_S)
+    return case.station, replace(recording, columns={**columns, "covariate_rain_mm_h": rain_mm_h + errors})
+
+
+def rain_that_wanders(rng):
+    return 5.0 + 3.0 * np.sin(np.arange(HOURS_S) / 4000.0) + 0.02 * np.cumsum(rng.normal(size=HOURS_S))
+
+
+def rain_that_jumps(rng):
+    return np.repeat(rng.uniform(0.0, 10.0, HOURS_S // 900), 900)
+
+
+@pytest.mark.parametrize(
+    ("rain", "noise_mm_h", "told_mm_h"),
+    [(rain_that_wanders, 0.0, 0.0), (rain_that_wanders, 3.0, 3.0), (rain_that_jumps, 0.0, 0.0)],
+)
+def test_errors_of_a_column_do_not_make_its_slope_too_small(rain, noise_mm_h, told_mm_h):
+    """A gauge without errors whose rain jumps looks as if it had some: the recording says that it has none."""
+    station, recording = rained(970_961, rain(np.random.default_rng(970_961)), noise_mm_h)
+    replay, residuals = residuals_of(recording, station)
+    taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    assert why is None
+    effect = taken.learnt.effect
+    (part,) = effect.part
+    assert (effect.term, part.column, part.shape) == ("flow_reading", "rain_mm_h", "linear")
+    assert part.noise == pytest.approx(told_mm_h, rel=0.05)
+    assert part.size / part.scale == pytest.approx(RISE_PER_MM_H, rel=0.05)
+    assert ("errors of ±3" in taken.report.sentence) == (told_mm_h > 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.station.station_file import EffectTable
-from wetwell.simulator.corrections.parts import COVARIATES, TERMS
+from wetwell.simulator.corrections.parts import COVARIATES, TERMS, Column
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.parameters import plant_parameters
@@ -151,7 +151,7 @@ def test_each_term_moves_its_own_signal(quiet_alpha):
 
 def test_a_column_without_values_stands_at_its_centre(quiet_alpha):
     table = part("column", "linear", 0.1, 0.0, 20.0, column="rain_mm_h", centre=5.0, scale=5.0)
-    assert effective_parameters(under(quiet_alpha, learnt("head_loss", table))).columns == ("rain_mm_h",)
+    assert effective_parameters(under(quiet_alpha, learnt("head_loss", table))).columns == (Column(name="rain_mm_h"),)
     np.testing.assert_array_equal(
         run(under(quiet_alpha, learnt("head_loss", table)))["level_m"], run(quiet_alpha)["level_m"]
     )
@@ -176,6 +176,8 @@ def test_an_expression_is_data_and_nothing_else(quiet_alpha):
         (learnt("head_loss", part("level_m", formula="x")), "part[1].formula: unknown key"),
         (learnt("head_loss", part("column")), "part[1]: column: is for covariate 'column', and needed there"),
         (learnt("head_loss", part("level_m", column="rain")), "part[1]: column: is for covariate 'column'"),
+        (learnt("head_loss", part("level_m", noise=0.1)), "part[1]: noise: got 0.1, only a column has errors"),
+        (learnt("head_loss", part("column", column="rain", noise=-1.0)), "part[1].noise"),
         (learnt("head_loss", part("column", column="../x")), "part[1].column: got '../x'"),
         (learnt("head_loss", part("level_m", low=2.0, high=1.0)), "part[1]: high: got 1, must lie over low = 2"),
         (

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import dictionary
 from wetwell.sim2real.correction.means import Means
 from wetwell.sim2real.correction.selection import SIZE_PRIOR, Gram, proposals
@@ -59,9 +60,9 @@ def covariates():
     rng = np.random.default_rng(3)
     hours = np.linspace(0.0, 30.0, 2 * CELLS)
     return {
-        ("level_m", None): rng.uniform(0.5, 1.5, 2 * CELLS),
-        ("hour_of_day", None): hours % 24.0,
-        ("column", "rain_mm_h"): np.abs(rng.normal(0.0, 4.0, 2 * CELLS)),
+        Place("level_m"): rng.uniform(0.5, 1.5, 2 * CELLS),
+        Place("hour_of_day"): hours % 24.0,
+        Place("column", "rain_mm_h"): np.abs(rng.normal(0.0, 4.0, 2 * CELLS)),
     }
 
 
@@ -71,11 +72,11 @@ def test_term_covariate_and_size_of_a_known_cause_are_found(means, covariates, s
     atoms, left_out = dictionary(covariates, np.ones(2 * CELLS, dtype=bool))
     assert left_out == {}
     slopes = {"head_loss": rng.normal(0.0, 60.0, 2 * CELLS), "speed": rng.normal(0.0, 60.0, 2 * CELLS)}
-    wave = 0.2 * np.cos(2.0 * np.pi * (covariates["hour_of_day", None] - 5.0) / 24.0)
+    wave = 0.2 * np.cos(2.0 * np.pi * (covariates[Place("hour_of_day")] - 5.0) / 24.0)
     residuals = rng.normal(0.0, 1.0, 2 * CELLS) - slopes["speed"] * wave
     best = proposals(means, residuals, atoms, slopes)[0]
     assert best.term == "speed"
-    assert [atom.place for atom in best.atoms] == [("hour_of_day", None)]
+    assert [atom.place for atom in best.atoms] == [Place("hour_of_day")]
     part = best.atoms[0].part(best.sizes[1:])
     assert part.size == pytest.approx(0.2, rel=0.1)
     assert part.centre == pytest.approx(5.0, abs=0.4)
@@ -91,10 +92,10 @@ def test_noise_has_no_correction(means, covariates, seed):
 
 def test_columns_that_say_nothing_are_named_with_the_reason(covariates):
     more = {
-        ("column", "constant"): np.full(2 * CELLS, 3.0),
-        ("column", "empty"): np.full(2 * CELLS, np.nan),
-        ("column", "twice"): 2.0 * covariates["column", "rain_mm_h"] + 1.0,
-        ("column", "height"): 100.0 * covariates["level_m", None],
+        Place("column", "constant"): np.full(2 * CELLS, 3.0),
+        Place("column", "empty"): np.full(2 * CELLS, np.nan),
+        Place("column", "twice"): 2.0 * covariates[Place("column", "rain_mm_h")] + 1.0,
+        Place("column", "height"): 100.0 * covariates[Place("level_m")],
     }
     atoms, left_out = dictionary(covariates | more, np.ones(2 * CELLS, dtype=bool))
     assert left_out == {
