@@ -1,10 +1,11 @@
 """Means of the residuals of a group in a cycle, and what a right model may leave of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.likelihood.covariance import DIFFERING
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
@@ -44,6 +45,21 @@ class Means:
         """(cells, k) means of (bins, k) columns."""
         sums = [np.bincount(self.of_bin, column, self.counts.size) for column in columns.T]
         return np.array(sums).reshape(-1, self.counts.size).T / self.counts[:, None]
+
+    def middle(self, residuals: Floats) -> Floats:
+        """(bins,) median of the residuals of the group that a bin is of."""
+        of_bin = self.group[self.of_bin]
+        return np.asarray(ndimage.median(residuals, of_bin, np.arange(self.group_material.size))[of_bin])
+
+    def of_groups(self, columns: Floats) -> Floats:
+        """(bins, k) means of (bins, k) columns over the group that a bin is of."""
+        of_bin = self.group[self.of_bin]
+        count = np.bincount(of_bin)
+        return np.array([(np.bincount(of_bin, column) / count)[of_bin] for column in columns.T]).T
+
+    def without(self, cells: Flags) -> "Means":
+        """The means, but some cells say nothing."""
+        return replace(self, weight=np.where(cells, 0.0, self.weight))
 
     def products(self, columns: Floats) -> Floats:
         """(k, k) products of (cells, k) columns under the inverse of C, by Woodbury's identity."""

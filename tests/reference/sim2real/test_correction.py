@@ -9,11 +9,14 @@ from wetwell.protocols.station.station_file import load_station
 from wetwell.services.batch.field_data import write_station
 from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.correction.learning import learn
+from wetwell.sim2real.correction.workshop import Workshop
 from wetwell.sim2real.diagnosis.correction import weighed
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.sim2real.diagnosis.shrinkage import gap_of
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.sim2real.truth.case import Deviation
 from wetwell.sim2real.truth.sampling import case_of
@@ -84,6 +87,30 @@ def test_a_fresh_recording_is_nearer_with_it_and_nothing_is_left_to_learn(diagno
     again, left = residuals_of(fresh, station)
     assert weighed(learn(again, left), left.bins, again.run().plant, np.random.default_rng(0))[0] is None
     assert Simulation(station, Scenario(name="s"), seed=1).advance(600).columns["level_m"].size == 600
+
+
+@pytest.mark.parametrize(("vortex_m", "seed"), [(8.0, 970_971), (12.0, 970_971), (12.0, 970_972)])
+def test_what_is_told_closes_as_much_as_is_said_of_it(vortex_m, seed):
+    """Also where the first guess, along a straight line, would leave the pump no head."""
+    case = truth("inlet_vortex", seed, vortex_m=vortex_m, submergence_m=1.6)
+    replay, residuals = residuals_of(run(case, truth=False), case.station)
+    taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    assert why is None
+    everything = np.ones(residuals.bins.size, dtype=bool)
+    losses = (asinh_loss(residuals.of(replay.run(own))) for own in ((), (taken.learnt.effect,)))
+    told = gap_of(*losses, residuals.bins, everything, np.random.default_rng(0))
+    assert told.shrinkage > 0.8
+    assert told.shrinkage == pytest.approx(taken.report.shrinkage, abs=0.05)
+
+
+def test_residuals_far_off_are_not_alike():
+    """An offset must not pay by driving all residuals to where the loss is flat."""
+    case = truth(None, 970_941)
+    replay, residuals = residuals_of(run(case, truth=False), case.station)
+    shop = Workshop(replay, residuals)
+    near = shop.plain + np.random.default_rng(1).normal(0.0, 3.0, shop.plain.size)
+    for off in (near, near + 10.0, near + 100.0):
+        assert np.std(shop.bounded(off)) == pytest.approx(np.std(shop.bounded(near)), rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", [970_941, 970_942])

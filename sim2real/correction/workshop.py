@@ -1,0 +1,203 @@
+"""Proposals tried and refined in the simulator itself, and what they predict of times that gave no sizes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.correction.bin_covariates import Place
+from wetwell.sim2real.correction.dictionary import Atom, near
+from wetwell.sim2real.correction.means import Means, means_of
+from wetwell.sim2real.correction.selection import PROPOSED, TEMPER, Gram, Proposal, proposals
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss
+from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.corrections.parts import TERMS, Term
+from wetwell.simulator.effects.effect import Effect
+from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
+
+PROBE = 0.01
+"""Correction by which the slopes of a term are found. [1]"""
+REFINEMENTS = 12
+"""Refinements of a proposal in the simulator at the most."""
+WORTH_REFINING = 0.5
+"""By what the logarithm of the probability rises in a refinement at the least, else it was the last one. [1]"""
+SHARES = (1.0, 0.5, 0.25, 0.125)
+"""Shares of a step that are tried one after the other. [1]"""
+LOOKS = 2
+"""Looks at all terms after the first, each without what the one before has shown to be far off."""
+BLOCKS = 6
+"""Parts of time, each of which is predicted by sizes that the others give."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tried:
+    """A proposal in the simulator: residuals and their slopes (bins, columns) at its sizes."""
+
+    proposal: Proposal
+    residuals: Floats
+    slopes: Floats
+    gram: Gram
+
+
+class Workshop:
+    """A recording and a station on which corrections are tried."""
+
+    def __init__(self, replay: Replay, residuals: StationResiduals) -> None:
+        self._replay, self._residuals = replay, residuals
+        self._means = means_of(residuals.bins)
+        self.plain = residuals.of(replay.run())
+        self.nothing = Gram(self._means, self.bounded(self.plain), np.zeros((self.plain.size, 0))).nothing
+
+    @property
+    def bins(self) -> Bins:
+        """Bins of the residuals."""
+        return self._residuals.bins
+
+    def bounded(self, residuals: Floats) -> Floats:
+        r"""(bins,) residuals of which those far from the middle $\tilde z$ of their group count less.
+
+        $$\tilde z + 5 \operatorname{asinh}\big((z - \tilde z) / 5\big)$$
+
+        About the middle, and not about 0: else a constant that drives all residuals far off would make them alike.
+        """
+        middle = self._means.middle(residuals)
+        return middle + asinh_loss(residuals - middle)
+
+    def under(self, effect: Effect) -> Floats:
+        """(bins,) residuals under one more effect.
+
+        Raises
+        ------
+        ValueError
+            If it does not fit the station.
+        """
+        return self._residuals.of(self._replay.run([effect]))
+
+    def sensitivities(self) -> dict[Term, Floats]:
+        """(bins,) slope of the residuals over a constant correction of each term that they see."""
+        slopes = {
+            term: (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE for term in TERMS
+        }
+        return {term: slope for term, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
+
+    def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
+        r"""The best proposal of each of the best terms, the most probable first.
+
+        Residuals far off count less: after each look they are replaced by what a fit under the loss would see,
+        $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes of them.
+
+        References
+        ----------
+        .. [1] P. J. Huber, Robust Statistics, 1981, section 7.8: pseudo-observations.
+        """
+        slopes, seen = self.sensitivities(), self.plain
+        found = proposals(self._means, seen, atoms, slopes)
+        for _ in range(LOOKS):
+            best = found[0]
+            columns = np.column_stack([np.ones(seen.size), *(atom.columns for atom in best.atoms)])
+            after = self.plain + slopes[best.term] * (columns @ best.sizes)
+            seen = self.plain - after + self.bounded(after)
+            likely = dict.fromkeys([one.term for one in found])
+            found = proposals(self._means, seen, atoms, {term: slopes[term] for term in list(likely)[:PROPOSED]})
+        finer: list[Proposal] = []
+        for term in dict.fromkeys(one.term for one in found):
+            best = next(one for one in found if one.term == term)
+            around = [other for atom in best.atoms for other in near(atom, covariates[atom.place])]
+            finer += proposals(self._means, seen, around, {term: slopes[term]})
+        return sorted(finer, key=lambda one: -one.log)
+
+    def tried(self, proposal: Proposal) -> Tried | None:
+        """A proposal refined in the simulator; None where no station works with it, or none of it matters."""
+        found = self._nearest(proposal, np.zeros(proposal.sizes.size), -np.inf)
+        if found is None:
+            return None
+        for _ in range(REFINEMENTS):
+            before = found.proposal
+            better = self._nearest(replace(before, sizes=self._step(self._means, found)), before.sizes, before.log)
+            if better is None:
+                break
+            found = better
+            if found.proposal.log - before.log < WORTH_REFINING:
+                break
+        kept = self._material(found)
+        if not kept.atoms and not self._means.matters(found.slopes[:, 0] * found.proposal.sizes[0]):
+            return None
+        return found if len(kept.atoms) == len(found.proposal.atoms) else self.tried(kept)
+
+    def _nearest(self, proposal: Proposal, start: Floats, least: float) -> Tried | None:
+        """A proposal, or what is nearer to the sizes of a start and more probable than `least`; None without any."""
+        for share in SHARES:
+            sizes = start + share * (proposal.sizes - start)
+            try:
+                tried = self._at(replace(proposal, sizes=sizes))
+            except ValueError:
+                continue
+            if tried.proposal.log > least:
+                return tried
+        return None
+
+    def _step(self, means: Means, tried: Tried) -> Floats:
+        """(columns,) sizes that come next by these means: bins far from the middle of their group count less."""
+        middle = means.middle(tried.residuals)
+        off = tried.residuals - middle
+        known = np.where(off == 0.0, 1.0, off)
+        root = np.sqrt(np.where(off == 0.0, 1.0, asinh_loss(known) / known))
+        together = means.of_groups(tried.slopes)
+        columns = together + root[:, None] * (tried.slopes - together)
+        gram = Gram(means, middle + root * off, columns)
+        return gram.gain(range(tried.proposal.sizes.size), tried.proposal.sizes)[1]
+
+    def _material(self, found: Tried) -> Proposal:
+        """The proposal without addends that matter nowhere."""
+        whole = found.proposal
+        ends = np.cumsum([1, *(atom.columns.shape[1] for atom in whole.atoms)])
+        columns = list(pairwise(ends))
+        kept = [
+            number
+            for number, (begin, end) in enumerate(columns)
+            if self._means.matters(found.slopes[:, begin:end] @ whole.sizes[begin:end])
+        ]
+        sizes = [whole.sizes[:1], *(whole.sizes[slice(*columns[number])] for number in kept)]
+        return replace(whole, atoms=tuple(whole.atoms[number] for number in kept), sizes=np.concatenate(sizes))
+
+    def _at(self, proposal: Proposal) -> Tried:
+        residuals = self.under(effect_of(proposal))
+        slopes = np.zeros((residuals.size, proposal.sizes.size))
+        for k in range(proposal.sizes.size):
+            sizes = proposal.sizes.copy()
+            sizes[k] += PROBE
+            slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
+        gram = Gram(self._means, self.bounded(residuals), slopes)
+        log = proposal.prior + TEMPER * (gram.at(proposal.sizes) - self.nothing)
+        return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
+
+    def held_out(self, tried: Tried) -> Floats:
+        """(bins,) residuals where each part of the time is predicted by sizes that the others gave."""
+        second, of_bin = self.bins.second, self._means.of_bin
+        block_of_cell = np.zeros(self._means.counts.size, dtype=np.int64)
+        block_of_cell[of_bin] = np.minimum(second * BLOCKS // (int(second.max()) + 1), BLOCKS - 1)
+        found = tried.residuals.copy()
+        for one in range(BLOCKS):
+            held = block_of_cell == one
+            change = self._step(self._means.without(held), tried) - tried.proposal.sizes
+            found[held[of_bin]] += tried.slopes[held[of_bin]] @ change
+        return found
+
+
+def effect_of(proposal: Proposal) -> LearntCorrection:
+    """Effect of a proposal.
+
+    Raises
+    ------
+    ValueError
+        If its sizes are beyond what an effect may have; pydantic's.
+    """
+    ends = np.cumsum([1, *(atom.columns.shape[1] for atom in proposal.atoms)])
+    parts = [
+        atom.part(sizes) for atom, sizes in zip(proposal.atoms, np.split(proposal.sizes, ends)[1:-1], strict=True)
+    ]
+    return LearntCorrection(term=proposal.term, offset=float(proposal.sizes[0]), part=tuple(parts))
