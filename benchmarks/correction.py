@@ -108,11 +108,14 @@ def measured(seed: int, number: int, hours: float, kinds: tuple[CaseKind, ...]) 
     ]
     known = RIGHT.get(case.names[0]) if case.names else None
     terms, covariates = known or (set(), set())
-    is_right = taken.report.term in terms, taken.report.component in case.components
+    told = [(one.term, one.component) for one in (taken.report, *taken.report.equivalent)]
+    is_right = [(term in terms, component in case.components) for term, component in told]
     return row | {
         "equation": taken.report.equation,
-        "is_term_right": is_right[0],
-        "is_term_or_component_right": any(is_right),
+        "is_term_right": is_right[0][0],
+        "is_term_or_component_right": any(is_right[0]),
+        "is_it_or_an_equivalent_right": any(map(any, is_right)),
+        "components": sorted({component for _, component in told}),
         "is_covariate_right": None if known is None else bool(covariates & set(taken.report.covariates)),
         "shrinkage_held_out": taken.report.shrinkage,
         "shrinkage_fresh": shrinkage(*gaps),
@@ -141,6 +144,8 @@ def main() -> None:
         "with_a_gap": len(gaps),
         "taken": len(taken),
         "term_or_component_right": sum(row["is_term_or_component_right"] for row in taken),
+        "it_or_an_equivalent_right": sum(row["is_it_or_an_equivalent_right"] for row in taken),
+        "of_several_components": sum(len(row["components"]) > 1 for row in taken),
         "covariate_known": len(of_known),
         "covariate_right": sum(of_known),
         "shrinkage_fresh_median": float(np.median(fresh)) if fresh else None,

@@ -37,6 +37,8 @@ class Learnt:
         gave.
     covariates : mapping of (bins,) arrays
         What the terms were held against.
+    equivalent : tuple of LearntCorrection
+        Of other terms, which say the same of the recording: it does not tell them apart.
     """
 
     effect: LearntCorrection
@@ -47,6 +49,7 @@ class Learnt:
     before: Floats
     after: Floats
     covariates: dict[Place, Floats]
+    equivalent: tuple[LearntCorrection, ...]
 
 
 def _of_calendar(proposal: Proposal, atoms: Sequence[Atom]) -> Proposal | None:
@@ -82,7 +85,7 @@ def _covariates(replay: Replay, bins: Bins) -> dict[Place, Floats]:
 
 
 def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
-    """The most probable correction; None where none is more probable.
+    """The most probable correction that takes no signal further off; None where none is more probable than none.
 
     Parameters
     ----------
@@ -93,15 +96,16 @@ def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
     covariates = _covariates(replay, bins)
     atoms, _ = dictionary(covariates, bins.regime != IDLE)
     shop = Workshop(replay, residuals)
-    best: Tried | None = None
+    found: list[Tried] = []
     for proposals_of_term in _first_of_each(shop.proposals(atoms, covariates)):
         tried = next((one for one in map(shop.tried, proposals_of_term) if one is not None), None)
         if tried is not None and (daily := _of_calendar(tried.proposal, atoms)) is not None:
             tried = max(tried, shop.tried(daily) or tried, key=lambda one: one.proposal.log)
-        if tried is not None and tried.proposal.log > (0.0 if best is None else best.proposal.log):
-            best = tried
-    if best is None:
+        if tried is not None and tried.proposal.log > 0.0 and not shop.spoils(tried.residuals):
+            found.append(tried)
+    if not found:
         return None
+    best, *others = sorted(found, key=lambda one: -one.proposal.log)
     proposal = best.proposal
     return Learnt(
         effect=effect_of(proposal),
@@ -112,4 +116,5 @@ def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
         before=asinh_loss(shop.plain),
         after=asinh_loss(shop.held_out(best)),
         covariates=covariates,
+        equivalent=tuple(effect_of(one.proposal) for one in others if shop.are_alike(best.residuals, one.residuals)),
     )

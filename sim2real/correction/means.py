@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.likelihood.covariance import DIFFERING
+from wetwell.sim2real.likelihood.covariance import DIFFERING, GOOD_FORM
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
@@ -31,6 +31,8 @@ class Means:
         From 0.
     weight : (cells,) array
         Inverse of the diagonal.
+    allowed : (cells,) array
+        What a right model may be off, as of `likelihood.cells.Cells`.
     group_material : (groups,) array
         m_g.
     """
@@ -39,6 +41,7 @@ class Means:
     counts: Floats
     group: Integers
     weight: Floats
+    allowed: Floats
     group_material: Floats
 
     def of(self, columns: Floats) -> Floats:
@@ -73,6 +76,15 @@ class Means:
         squares = np.bincount(self.group, self.of(signature[:, None])[:, 0] ** 2) / np.bincount(self.group)
         return bool(np.any(squares > self.group_material**2))
 
+    def are_alike(self, one: Floats, other: Floats) -> bool:
+        """Whether two (bins,) changes of the residuals are one for all that a right model may have wrong.
+
+        They differ in no group by more than what is allowed, and than a good form has wrong of either.
+        """
+        first, second = self.of(np.column_stack([one, other])).T
+        wrong = self.allowed**2 + 2.0 * GOOD_FORM**2 * np.maximum(first**2, second**2)
+        return bool(np.all(np.bincount(self.group, (first - second) ** 2) <= np.bincount(self.group, wrong)))
+
 
 def means_of(bins: Bins) -> Means:
     """Cells of the bins of a recording."""
@@ -87,6 +99,7 @@ def means_of(bins: Bins) -> Means:
         counts=counts,
         group=group,
         weight=1.0 / (noise / counts + 1.0 - noise + (DIFFERING * material) ** 2),
+        allowed=np.hypot(material, np.sqrt(np.maximum(1.0 - noise, 0.0))),
         group_material=np.maximum(np.bincount(group, material) / np.bincount(group), LEAST_MATERIAL),
     )
 

@@ -175,6 +175,16 @@ class Workshop:
         log = proposal.prior + TEMPER * (gram.at(proposal.sizes) - self.nothing)
         return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
 
+    def spoils(self, residuals: Floats) -> bool:
+        """Whether (bins,) residuals leave some signal further off than it was, by more than what is material."""
+        bins = self.bins
+        more = asinh_loss(residuals) ** 2 - asinh_loss(self.plain) ** 2 - bins.material**2
+        return bool(np.any(np.bincount(bins.signal, more) > 0.0))
+
+    def are_alike(self, one: Floats, other: Floats) -> bool:
+        """Whether two (bins,) residuals are of corrections that say the same of the recording."""
+        return self._means.are_alike(self.plain - one, self.plain - other)
+
     def held_out(self, tried: Tried) -> Floats:
         """(bins,) residuals where each part of the time is predicted by sizes that the others gave."""
         second, of_bin = self.bins.second, self._means.of_bin

@@ -9,7 +9,7 @@ from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.intervals import TWO_SIDED
 from wetwell.sim2real.correction.learning import Learnt
 from wetwell.sim2real.correction.wording import UNITS_OF_TERMS, equation, name_of, sentence
-from wetwell.sim2real.diagnosis.report import CorrectionAddend, CorrectionReport, Gap
+from wetwell.sim2real.diagnosis.report import CorrectionAddend, CorrectionReport, EquivalentTerm, Gap
 from wetwell.sim2real.diagnosis.shrinkage import gap_of
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.simulator.effects.station.learnt_correction import COMPONENT_OF
@@ -70,6 +70,12 @@ def weighed(
         addends=_addends(learnt, reference),
         shrinkage=gap.shrinkage,
         shrinkage_ci=gap.shrinkage_ci,
+        equivalent=tuple(
+            EquivalentTerm(
+                term=one.term, component=COMPONENT_OF[one.term], equation=equation(one, one.reference(plant))
+            )
+            for one in learnt.equivalent
+        ),
     )
     return Correction(learnt=learnt, report=report, gap=gap), None
 

@@ -309,6 +309,23 @@ class CorrectionAddend(_Part):
     unit: str
 
 
+class EquivalentTerm(_Part):
+    """A correction of another term that says the same of the recording, for all that a right model may have wrong.
+
+    Parameters
+    ----------
+    term : str
+    component : str
+        Where the cause lies if it is this one.
+    equation : str
+        With units.
+    """
+
+    term: Term
+    component: Component
+    equation: str
+
+
 class CorrectionReport(_Part):
     """What is added to one term of the model where no effect of the library explains a gap.
 
@@ -330,6 +347,8 @@ class CorrectionReport(_Part):
         Share of the gap that it closes on parts of the time that its sizes do not come from. [1]
     shrinkage_ci : (float, float)
         In which that lies with 95 %. [1]
+    equivalent : list of EquivalentTerm
+        What the recording does not tell it from.
     """
 
     term: Term
@@ -340,6 +359,7 @@ class CorrectionReport(_Part):
     addends: tuple[CorrectionAddend, ...]
     shrinkage: Short
     shrinkage_ci: ShortInterval
+    equivalent: tuple[EquivalentTerm, ...] = ()
 
 
 class GapReport(_Part):

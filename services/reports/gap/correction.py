@@ -19,6 +19,13 @@ def correction_section(correction: Correction, diagnosis: Diagnosis) -> str:
     words = [
         paragraph(report.sentence),
         paragraph(f"Equation: {report.equation}"),
+        *(
+            paragraph(
+                f"The recording does not tell it from {one.equation}, which would lie in the "
+                f"{one.component.replace('_', ' ')}: both say the same for all that a right model may have wrong."
+            )
+            for one in report.equivalent
+        ),
         paragraph(
             f"On parts of the time that its sizes do not come from it closes {report.shrinkage:.2f} ({low:.2f} to "
             f"{high:.2f}) of the gap. It is in station.toml as an effect named learnt_correction."

@@ -53,6 +53,10 @@ def gap_lines(report: GapReport, out: Path) -> str:
             lines.append(f"          not to be told from {', '.join(effect.equivalent)}")
     if report.correction is not None:
         lines += [f"  correction {report.correction.equation}", f"  {report.correction.sentence}"]
+        lines += [
+            f"  not to be told from {one.equation}, which would lie in the {one.component.replace('_', ' ')}"
+            for one in report.correction.equivalent
+        ]
     lines += [f"  ranking {c.name:28} shrinks by {c.shrinkage:.1%}" for c in report.candidates[:PRINTED_CANDIDATES]]
     if (loop := report.closed_loop) is not None:
         lines.append(

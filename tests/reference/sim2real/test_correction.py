@@ -22,6 +22,7 @@ from wetwell.sim2real.truth.case import Deviation
 from wetwell.sim2real.truth.sampling import case_of
 from wetwell.sim2real.truth.truth_plant import run
 from wetwell.simulator.effects import effects_of
+from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -111,6 +112,37 @@ def test_residuals_far_off_are_not_alike():
     near = shop.plain + np.random.default_rng(1).normal(0.0, 3.0, shop.plain.size)
     for off in (near, near + 10.0, near + 100.0):
         assert np.std(shop.bounded(off)) == pytest.approx(np.std(shop.bounded(near)), rel=1e-6)
+
+
+def test_a_head_and_a_speed_of_a_pump_are_not_told_apart():
+    """At one speed the affinity laws make the same of both; a friction is something else."""
+    case = truth("inlet_vortex", 970_971, vortex_m=8.0, submergence_m=1.6)
+    replay, residuals = residuals_of(run(case, truth=False), case.station)
+    taken, _ = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    told = {taken.report.term, *(one.term for one in taken.report.equivalent)}
+    assert told == {"pump_head", "speed"}
+    assert {one.component for one in (taken.report, *taken.report.equivalent)} == {"pump", "drive"}
+    both = (taken.learnt.effect, *taken.learnt.equivalent)
+    one, other = (residuals.of(replay.run([effect])) for effect in both)
+    plain = residuals.of(replay.run())
+    assert np.mean((one - other) ** 2) < 0.01 * np.mean((plain - one) ** 2)
+
+
+def test_what_takes_another_signal_further_off_is_not_taken():
+    """A flow that comes late would be nearer with a static head that is higher at first, which the head denies."""
+    case = truth(None, 970_981)
+    recording = run(case, truth=False)
+    late = {
+        name: np.r_[np.zeros(60), values[:-60]] if name.endswith("_flow_m3h") else values
+        for name, values in recording.columns.items()
+    }
+    replay, residuals = residuals_of(replace(recording, columns=late), case.station)
+    shop = Workshop(replay, residuals)
+    start = {"covariate": "since_start_s", "shape": "decay", "scale": 60.0, "low": 0.0, "high": 600.0}
+    static = LearntCorrection.model_validate({"term": "static_head", "part": [start | {"size": 0.5}]})
+    reading = LearntCorrection.model_validate({"term": "flow_reading", "part": [start | {"size": -0.9}]})
+    assert shop.spoils(shop.under(static))
+    assert not shop.spoils(shop.under(reading))
 
 
 @pytest.mark.parametrize("seed", [970_941, 970_942])
