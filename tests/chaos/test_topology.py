@@ -54,6 +54,13 @@ class Cable:
         host, _, port = self.address.partition(":")
         self._server = await asyncio.start_server(self._serve, host, int(port))
 
+    async def join(self) -> None:
+        """Heal, and wait until somebody is connected through it again."""
+        await self.heal()
+        async with asyncio.timeout(LIMIT_S):
+            while len(self._writers) < 2:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+
     async def cut(self) -> None:
         self._server.close()
         while self._tasks:  # one more may have been accepted a moment ago
@@ -249,7 +256,7 @@ async def numbers_through_a_ring() -> list[tuple[str, list[int], int]]:
                 await send(1, limit_s=0.3)
         for name, strike in (
             ("link cut", cable.cut),
-            ("link back", cable.heal),
+            ("link back", cable.join),
             ("router dead", partial(killed, first)),
             ("router back", partial(replaced, first)),
             ("link cut again", cable.cut),  # now the way leads over the router that has come back
