@@ -23,6 +23,9 @@ FINER_PERIODS = 15
 LONGEST_PERIOD, SHORTEST_PERIOD = 2.0, 0.125
 """Ratio of periods of days that are tried one after the other, and how many around the best are tried then; the
 longest and the shortest over the length of the recording."""
+TIMES_OF_CHANGE = 15
+"""Times of a recording, evenly over it, from which something may be otherwise, and how many around the best are tried
+then."""
 LEAST_CYCLES = 6
 """Distinct values of a covariate at the least."""
 HOURS, WEEK_D = (24.0, 12.0), 7.0
@@ -142,7 +145,9 @@ def _atoms(place: Place, values: Floats, known: Floats) -> list[Atom]:
         case "days":
             count = int(np.log(LONGEST_PERIOD / SHORTEST_PERIOD) / np.log(PERIOD_RATIO))
             periods = [LONGEST_PERIOD * (high - low) / PERIOD_RATIO**k for k in range(count + 1)]
+            times = np.linspace(low, high, TIMES_OF_CHANGE + 2)[1:-1]
             found = [made("linear", middle, half), *(made("cosine", 0.0, period) for period in periods)]
+            found += [made("step", float(time), 1.0) for time in times]
         case "since_start_s":
             found = [made("decay", 0.0, scale_s) for scale_s in DECAYS_S if scale_s < high]
             found += [made("step", step_s, 1.0) for step_s in STEPS_S if low < step_s < high]
@@ -168,12 +173,27 @@ def _made(
     return Atom(place=place, shape=shape, centre=centre, scale=scale, low=low, high=high, columns=columns)
 
 
-def near(atom: Atom, values: Floats) -> list[Atom]:
-    """A swing over the days, with periods around its own; any other atom as it is."""
-    if atom.place.covariate != "days" or atom.shape != "cosine":
-        return [atom]
-    scales = atom.scale * PERIOD_RATIO ** np.linspace(-1.0, 1.0, FINER_PERIODS)
-    return [_made(atom.place, values, "cosine", 0.0, float(scale), (atom.low, atom.high)) for scale in scales]
+def near(atom: Atom, values: Floats, width: float) -> list[Atom]:
+    """A swing or a step over the days, with periods or times around its own; any other atom as it is.
+
+    Parameters
+    ----------
+    atom : Atom
+    values : (bins,) array
+        Of its covariate.
+    width : float
+        How far around, over the way to the next one of the dictionary. [1]
+    """
+    finer = width * np.linspace(-1.0, 1.0, FINER_PERIODS if atom.shape == "cosine" else TIMES_OF_CHANGE)
+    known = (atom.low, atom.high)
+    match atom.place.covariate, atom.shape:
+        case "days", "cosine":
+            scales = atom.scale * PERIOD_RATIO**finer
+            return [_made(atom.place, values, "cosine", 0.0, float(scale), known) for scale in scales]
+        case "days", "step":
+            times = atom.centre + finer * (atom.high - atom.low) / (TIMES_OF_CHANGE + 1)
+            return [_made(atom.place, values, "step", float(time), 1.0, known) for time in times]
+    return [atom]
 
 
 def shapes_of(values: Floats, shape: Shape, centre: float, scale: float, low: float, high: float) -> Floats:

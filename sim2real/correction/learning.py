@@ -84,6 +84,20 @@ def _covariates(replay: Replay, bins: Bins) -> dict[Place, Floats]:
     return bin_covariates(replay.traces, bins, prediction.plant, prediction.level_m, flow_m3h)
 
 
+def _equivalents(shop: Workshop, best: Tried, others: Sequence[Tried]) -> tuple[LearntCorrection, ...]:
+    """Those of other terms, by their own addends or by those of the best one, that say the same."""
+
+    def is_alike(one: Tried) -> bool:
+        return shop.are_alike(best.residuals, one.residuals)
+
+    found: list[LearntCorrection] = []
+    for other in others:
+        same = other if is_alike(other) else shop.of_term(other.proposal.term, best.proposal)
+        if same is not None and is_alike(same):
+            found.append(effect_of(same.proposal))
+    return tuple(found)
+
+
 def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
     """The most probable correction that takes no signal further off; None where none is more probable than none.
 
@@ -116,5 +130,5 @@ def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
         before=asinh_loss(shop.plain),
         after=asinh_loss(shop.held_out(best)),
         covariates=covariates,
-        equivalent=tuple(effect_of(one.proposal) for one in others if shop.are_alike(best.residuals, one.residuals)),
+        equivalent=_equivalents(shop, best, others),
     )

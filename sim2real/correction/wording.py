@@ -41,6 +41,7 @@ COVARIATES_IN_WORDS: dict[Covariate, tuple[str, str, str]] = {
     "column": ("the column", "", "how it gets there"),
 }
 """Covariates, their units, and what to look for where a term goes with them."""
+HINT_OF_A_CHANGE = "what was done or broke then; the times before and after it may be diagnosed apart"
 _FORMS = {
     "linear": "({x} − {centre}) / {scale}",
     "square": "(({x} − {centre}) / {scale})²",
@@ -120,8 +121,13 @@ def sentence(effect: LearntCorrection, reference: float) -> str:
         return f"{said[0].upper()}{said[1:]}: look for what is otherwise than in the station file."
     parts = sorted(effect.part, key=lambda part: -float(np.ptp(part.bounds)))
     said = f"{what} {', and '.join(_said(part, effect.term, reference) for part in parts)}"
-    hint = COVARIATES_IN_WORDS[parts[0].covariate][2]
+    hint = HINT_OF_A_CHANGE if _is_change(parts[0]) else COVARIATES_IN_WORDS[parts[0].covariate][2]
     return f"{said[0].upper()}{said[1:]}: look for {hint}."
+
+
+def _is_change(part: PartTable) -> bool:
+    """Whether something is otherwise from a time of the calendar on."""
+    return part.covariate == "days" and part.shape == "step"
 
 
 def _said(part: PartTable, term: Term, reference: float) -> str:
@@ -138,6 +144,8 @@ def _said(part: PartTable, term: Term, reference: float) -> str:
         part.size * shape_at(SHAPES.index(part.shape), x, part.centre, part.scale, low, high) for x in (low, high)
     ]
     change = amount(ends[1] - ends[0], term, reference)
+    if _is_change(part):
+        return f"changes by {change} at {_time(part.centre)} for good"
     if part.shape == "step":
         return f"changes by {change} from {part.centre:.3g}{of_unit} of {words} on"
     return f"changes by {change} as {words} goes from {low:.4g} to {high:.4g}{of_unit}"
@@ -151,7 +159,11 @@ def _highest(part: PartTable) -> str:
         again = "" if part.scale == 24.0 else f" and each {part.scale:g} h"
         return f"highest at {minutes // 60 % 24:02}:{minutes % 60:02} UTC{again}"
     if part.covariate == "days":
-        first = to_iso(math.floor(highest * DAY_S) * NS_PER_S)
-        return f"each {24.0 * part.scale:.3g} h, highest at {first} first"
+        return f"each {24.0 * part.scale:.3g} h, highest at {_time(highest)} first"
     unit = COVARIATES_IN_WORDS[part.covariate][1]
     return f"highest at {highest:.3g} {unit}".rstrip()
+
+
+def _time(days: float) -> str:
+    """A time of the calendar, to the second, from days since 1970."""
+    return to_iso(math.floor(days * DAY_S) * NS_PER_S)

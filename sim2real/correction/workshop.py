@@ -27,6 +27,8 @@ WORTH_REFINING = 0.5
 """By what the logarithm of the probability rises in a refinement at the least, else it was the last one. [1]"""
 SHARES = (1.0, 0.5, 0.25, 0.125)
 """Shares of a step that are tried one after the other. [1]"""
+WIDTHS = (1.0, 0.125)
+"""How far around the best periods and times others are tried, one after the other. [1]"""
 LOOKS = 2
 """Looks at all terms after the first, each without what the one before has shown to be far off."""
 BLOCKS = 6
@@ -79,10 +81,11 @@ class Workshop:
 
     def sensitivities(self) -> dict[Term, Floats]:
         """(bins,) slope of the residuals over a constant correction of each term that they see."""
-        slopes = {
-            term: (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE for term in TERMS
-        }
+        slopes = {term: self._sensitivity(term) for term in TERMS}
         return {term: slope for term, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
+
+    def _sensitivity(self, term: Term) -> Floats:
+        return (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE
 
     def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
         r"""The best proposal of each of the best terms, the most probable first.
@@ -105,9 +108,11 @@ class Workshop:
             found = proposals(self._means, seen, atoms, {term: slopes[term] for term in list(likely)[:PROPOSED]})
         finer: list[Proposal] = []
         for term in dict.fromkeys(one.term for one in found):
-            best = next(one for one in found if one.term == term)
-            around = [other for atom in best.atoms for other in near(atom, covariates[atom.place])]
-            finer += proposals(self._means, seen, around, {term: slopes[term]})
+            nearest = [one for one in found if one.term == term]
+            for width in WIDTHS:
+                around = [other for atom in nearest[0].atoms for other in near(atom, covariates[atom.place], width)]
+                nearest = proposals(self._means, seen, around, {term: slopes[term]})
+            finer += nearest
         return sorted(finer, key=lambda one: -one.log)
 
     def tried(self, proposal: Proposal) -> Tried | None:
@@ -127,6 +132,12 @@ class Workshop:
         if not kept.atoms and not self._means.matters(found.slopes[:, 0] * found.proposal.sizes[0]):
             return None
         return found if len(kept.atoms) == len(found.proposal.atoms) else self.tried(kept)
+
+    def of_term(self, term: Term, like: Proposal) -> Tried | None:
+        """The most probable correction of a term with the addends of another one's; None as of `tried`."""
+        columns = np.column_stack([np.ones(self.plain.size), *(atom.columns for atom in like.atoms)])
+        gram = Gram(self._means, self.bounded(self.plain), self._sensitivity(term)[:, None] * columns)
+        return self.tried(replace(like, term=term, sizes=gram.gain(range(like.sizes.size))[1]))
 
     def _nearest(self, proposal: Proposal, start: Floats, least: float) -> Tried | None:
         """A proposal, or what is nearer to the sizes of a start and more probable than `least`; None without any."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wetwell.protocols.station.station_file import load_station
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import write_station
 from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.correction.learning import learn
@@ -143,6 +144,25 @@ def test_what_takes_another_signal_further_off_is_not_taken():
     reading = LearntCorrection.model_validate({"term": "flow_reading", "part": [start | {"size": -0.9}]})
     assert shop.spoils(shop.under(static))
     assert not shop.spoils(shop.under(reading))
+
+
+def test_a_change_within_the_recording_is_told_with_its_time():
+    """And not as a swing that is longer than the recording."""
+    case = truth(None, 970_991)
+    recording = run(case, truth=False)
+    is_after = recording.time_ns >= recording.time_ns[0] + 25_000 * NS_PER_S
+    columns = {
+        name: np.where(is_after, 1.08, 1.0) * values if name.endswith("_flow_m3h") else values
+        for name, values in recording.columns.items()
+    }
+    replay, residuals = residuals_of(replace(recording, columns=columns), case.station)
+    taken, _ = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    (part,) = taken.learnt.effect.part
+    assert (taken.report.term, part.covariate, part.shape) == ("flow_reading", "days", "step")
+    assert part.size == pytest.approx(0.08, abs=0.01)
+    when_s = part.centre * 86_400 - int(recording.time_ns[0]) / NS_PER_S
+    assert when_s == pytest.approx(25_000, abs=HOURS_S / 100)
+    assert "for good: look for what was done or broke then" in taken.report.sentence
 
 
 @pytest.mark.parametrize("seed", [970_941, 970_942])

@@ -21,6 +21,7 @@ def means():
         counts=np.full(CELLS, 2.0),
         group=np.arange(CELLS) // 12,
         weight=1.0 / rng.uniform(0.5, 2.0, CELLS),
+        allowed=np.ones(CELLS),
         group_material=rng.uniform(0.2, 1.0, CELLS // 12),
     )
 
