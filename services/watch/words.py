@@ -76,6 +76,8 @@ def effect_words(effect: FoundEffect) -> str:
 
 def _name(one: Called, ended_ns: int | None = None) -> GapName:
     what = "something that no effect explains" if one.effect is None else effect_words(one.effect)
+    others = () if one.effect is None else one.effect.equivalent
+    what += f", or as well {' or '.join(others)}".replace("_", " ") if others else ""
     since = "from the first look on" if one.since_ns is None else f"since {to_iso(one.since_ns)[:16]}"
     until = "" if ended_ns is None else f", over since {to_iso(ended_ns)[:16]}"
     told = "" if one.fault is None else f"; the detector tells it as a fault of {one.fault}"

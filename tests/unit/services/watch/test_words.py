@@ -43,6 +43,9 @@ def test_each_name_is_a_line():
         "rising main: something that no effect explains, from the first look on",
         f"{FRICTION_LINE}; the detector tells it as a fault of main",
     ]
+    either = FRICTION.model_copy(update={"equivalent": ("pump_wear", "motor_slip")})
+    (told,) = message_of(state.model_copy(update={"called": (called(either),)})).called
+    assert ", or as well pump wear or motor slip, since" in told.text
     assert message.past[0].text.endswith("over since 1970-01-01T02:00")
     lines = watch_lines([message], {"alpha": "alpha (Pumpwerk Süd)"})
     assert lines.count("alpha (Pumpwerk Süd)") == 5, "in the table, and beside each name"
