@@ -47,7 +47,7 @@ class Control(Table):
     ramp_s : float
         Time from 0 Hz to nominal frequency, and back. [s]
     min_frequency_hz : float
-        Under which a running pump is not driven. [Hz]
+        Under which a running pump is not driven; the nominal frequency where pumps have no drive. [Hz]
     dwell_s : float
         How long a pump stays at `min_frequency_hz` before it stops. [s]
     rotation : str

@@ -194,9 +194,9 @@ class Station(Table):
             raise ValueError(
                 f"pump[{number}]: shut-off head {pump.coefficients[0]:g} m must exceed {lift}, or no water flows"
             )
-        if self.control.min_frequency_hz >= pump.nominal_frequency_hz:
+        if self.control.min_frequency_hz > pump.nominal_frequency_hz:
             raise ValueError(
-                f"control.min_frequency_hz: got {self.control.min_frequency_hz:g}, must lie under "
+                f"control.min_frequency_hz: got {self.control.min_frequency_hz:g}, must not exceed "
                 f"pump[{number}].nominal_frequency_hz = {pump.nominal_frequency_hz:g}"
             )
         key = "power_points" if pump.power_points is not None else "efficiency_points"

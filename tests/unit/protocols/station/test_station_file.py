@@ -220,8 +220,8 @@ BAD_FILES = {
         "control.mode: got 'fuzzy', input should be 'on_off', 'pid' or",
     ),
     "minimum over nominal": (
-        changed("min_frequency_hz = 20.0", "min_frequency_hz = 50.0"),
-        "control.min_frequency_hz: got 50, must lie under pump[1].nominal_frequency_hz = 50",
+        changed("min_frequency_hz = 20.0", "min_frequency_hz = 51.0"),
+        "control.min_frequency_hz: got 51, must not exceed pump[1].nominal_frequency_hz = 50",
     ),
     "zero nominal": (changed("nominal_frequency_hz = 60", "nominal_frequency_hz = 0"), "nominal_frequency_hz: got 0"),
     "name not a key chunk": (changed('"alpha"', '"pump/house"'), "name: got 'pump/house', string should match"),
