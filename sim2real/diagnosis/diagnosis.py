@@ -80,6 +80,15 @@ class Diagnosis:
     regimes: Regimes
     replay: Replay
 
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Components in which something unknown may lie: where its signals point, and those of the correction."""
+        found = [one.component for one in self.where[:1]]
+        if self.correction is not None:
+            report = self.correction.report
+            found += [report.component, *(one.component for one in report.equivalent)]
+        return tuple(dict.fromkeys(found)) or ("station",)
+
     def proposals(self, each: Each = map) -> Proposals:
         """Acts that would tell apart what is left, under the conditions of the recording: each is simulated.
 
@@ -101,7 +110,6 @@ class Diagnosis:
     ) -> GapReport:
         """What programs read; `notes` come before those on what is not measured; `each` weighs the proposals."""
         proposals = self.proposals(each)
-        blamed = self.where[0].component if self.where else None
         return GapReport(
             station=self.station.name,
             verdict=self.verdict,
@@ -132,7 +140,7 @@ class Diagnosis:
             experiments=proposed_acts(proposals),
             refused=refused_acts(proposals),
             prior_stations=prior_stations,
-            next_experiment=next_experiment(self.verdict, proposals.best, blamed),
+            next_experiment=next_experiment(self.verdict, proposals.best, self.suspects),
         )
 
 

@@ -9,7 +9,7 @@ NAMED = 3
 """Sets that a sentence names."""
 
 
-def next_experiment(verdict: Verdict, proposals: Sequence[Proposal], component: str | None) -> str:
+def next_experiment(verdict: Verdict, proposals: Sequence[Proposal], components: Sequence[str]) -> str:
     """Advice in one or two sentences: the best act, or what to do where none tells more.
 
     Parameters
@@ -17,13 +17,13 @@ def next_experiment(verdict: Verdict, proposals: Sequence[Proposal], component: 
     verdict : Verdict
     proposals : sequence of Proposal
         Best first.
-    component : str or None
-        The one held responsible.
+    components : sequence of str
+        Those in which something unknown may lie.
     """
     if verdict == "unknown":
         return (
             "No effect of the library explains this gap: inspect the "
-            f"{(component or 'station').replace('_', ' ')} on site, record its signals against an independent "
+            f"{' or the '.join(components).replace('_', ' ')} on site, record its signals against an independent "
             "instrument, and add the effect that is found to the library."
         )
     if proposals:

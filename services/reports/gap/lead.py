@@ -18,7 +18,7 @@ NAMES_OF = {"flow_m3h": ("flow", "m³/h"), "head_m": ("head", "m"), "power_kw": 
 def lead(report: GapReport, diagnosis: Diagnosis) -> str:
     """One sentence: what, where, how large in physical units, how sure."""
     sizes = _sizes(differences(diagnosis.traces, diagnosis.replay.run()))
-    where = report.where[0].component.replace("_", " ") if report.where else "station"
+    where = " or the ".join(diagnosis.suspects).replace("_", " ")
     sure = f"with a probability of {percent(report.posterior[0].probability)}" if report.posterior else "as it seems"
     if report.verdict == "none":
         seen = f": at full speed it has {sizes}" if sizes else ""

@@ -140,7 +140,8 @@ def test_what_is_left_open_survives_a_file(alpha):
 
 
 def test_advice_names_what_is_told_apart(found):
-    told = next_experiment("effect", found.best, "pump")
+    told = next_experiment("effect", found.best, ("pump",))
     assert told.startswith(found.best[0].act.sentence)
-    assert "inspect the rising main" in next_experiment("unknown", found.best, "rising_main")
-    assert "Nothing to explain" in next_experiment("none", (), None)
+    suspects = ("rising_main", "flow_meter")
+    assert "inspect the rising main or the flow meter" in next_experiment("unknown", found.best, suspects)
+    assert "Nothing to explain" in next_experiment("none", (), ("station",))
