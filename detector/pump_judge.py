@@ -21,8 +21,8 @@ from wetwell.detector.inference.posterior import (
     SYSTEM_FAULT,
     fault_scales,
 )
-from wetwell.detector.inference.prior import SystemPrior, update_prior
-from wetwell.detector.inference.weighing import OperatingPoint, Weighed, believe, weigh
+from wetwell.detector.inference.prior import PumpPrior, SystemPrior, update_prior
+from wetwell.detector.inference.weighing import OperatingPoint, Weighed, believe, remember_shown, weigh
 from wetwell.detector.pump_memory import PumpMemory
 from wetwell.detector.runs.run import Run, Segments
 from wetwell.detector.sensors.sensor_faults import WAYS, doubtful_sensors, in_words, silencing_sensors
@@ -146,7 +146,8 @@ class PumpJudge:
             memory.state = "unknown" if hidden else "learning"
             evidence["reason"] = hidden or (memory.learning.reason if memory.learning is not None else "")
             return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
-        return self._compare(run, memory.reference, system, evidence, rng)
+        siblings = [each.prior for each in self._on_the_same_main(station)]
+        return self._compare(run, memory.reference, system, siblings, evidence, rng)
 
     def lacking(self, run: Run) -> frozenset[str]:
         """Signals without which a run cannot be judged, and which it lacks."""
@@ -276,6 +277,7 @@ class PumpJudge:
         run: Run,
         reference: HealthyReference,
         system: SystemPrior,
+        siblings: Sequence[PumpPrior],
         evidence: dict[str, Any],
         rng: np.random.Generator,
     ) -> Judgement:
@@ -283,7 +285,7 @@ class PumpJudge:
         memory = self.memory
         weighed = self._weigh(run, reference, system, evidence)
         posterior = weighed.posterior
-        update_prior(posterior.probability, memory.prior, system, lacks_head=run.lacks_head)
+        update_prior(posterior.probability, memory.prior, system, lacks_head=run.lacks_head, siblings=siblings)
         state, remark = decide(posterior, weighed.point.head_m)
         memory.recent.append((sum(run.window_ns) // 2, posterior.shift_m))
         wrong = doubtful_sensors(run, reference)
@@ -293,6 +295,7 @@ class PumpJudge:
         memory.tell(state, run.window_ns, onset_component(state))
         memory.blame_meters(self._meter_errors(wrong, weighed, state), run.window_ns[0])
         believe(memory.prior.asset, system.asset, weighed, state, memory.onset_ns or run.window_ns[0])
+        remember_shown(memory.prior, weighed, state)
         evidence |= self._index(run, reference, rng)
         if state == "normal":
             baseline = reference.baseline.with_noise_of(run.segments, NOISE_WEIGHT, self._curve[0])
@@ -306,6 +309,11 @@ class PumpJudge:
             if asset.since_ns is not None:
                 asset.wasted_kwh[self._pump] = evidence["wasted_kwh_per_day"]
         return self._judgement(run.window_ns, probability, evidence)
+
+    def _on_the_same_main(self, station: Sequence[PumpMemory]) -> list[PumpMemory]:
+        """The other pumps that share its main."""
+        mains = self._datasheet.main_of_pump
+        return [each for pump, each in enumerate(station) if pump != self._pump and mains[pump] == mains[self._pump]]
 
     def _meter_errors(
         self, wrong: Mapping[str, Any], weighed: Weighed, state: State

@@ -10,6 +10,7 @@ from wetwell.detector.inference.carried import carry
 from wetwell.detector.inference.observation import PUMP, SYSTEM, Observation
 from wetwell.detector.inference.posterior import FLOW_METER, HEAD_SENSOR, Posterior, Scales, posterior_of
 from wetwell.detector.inference.prior import CHANGE_PER_RUN, PumpPrior, SystemPrior
+from wetwell.detector.inference.size_track import SizeTrack
 from wetwell.protocols.arrays import Floats
 from wetwell.protocols.messages.verdict import State
 from wetwell.protocols.quantities import pump_column
@@ -95,8 +96,9 @@ def believe(pump: AssetBelief, main: AssetBelief, weighed: Weighed, state: State
     is_headless = weighed.observation.system_in_pump != 0.0
     changed = [asset.is_carried != (state in states) and state != "unknown" for asset, states in assets]
     if not is_headless or state in PUMP_STATES or state == "normal":
-        _believe_pump(pump, weighed, is_headless=is_headless, is_sure=changed[0])
-    if weighed.point.friction_m > 0.0 and (not is_headless or state in MAIN_STATES or state == "normal"):
+        by_main = _by_main(main, weighed) if is_headless and state in MAIN_STATES else (0.0, 0.0)
+        _believe_pump(pump, weighed, by_main, is_headless=is_headless, is_sure=changed[0])
+    if weighed.point.friction_m > 0.0 and (not is_headless or state in ("system_fault", "normal")):
         _believe_main(main, weighed, is_headless=is_headless, is_sure=changed[1])
     for asset, states in assets:
         if state in states:
@@ -105,11 +107,50 @@ def believe(pump: AssetBelief, main: AssetBelief, weighed: Weighed, state: State
             asset.look()
 
 
-def _believe_pump(pump: AssetBelief, weighed: Weighed, *, is_headless: bool, is_sure: bool) -> None:
+def remember_shown(pump: PumpPrior, weighed: Weighed, state: State) -> None:
+    """Take how far a run without a head lies below the baseline into the prior of its pump, in place.
+
+    What is a meter's is no size that a fault may keep.
+    """
+    seen, point = weighed.observation, weighed.point
+    if seen.system_in_pump == 0.0 or state == "sensor_fault" or weighed.is_by_meter:
+        pump.shown = SizeTrack()
+        return
+    variance = float(seen.covariance[PUMP, PUMP] + seen.slope_variance[PUMP])
+    disturbance = float(point.run_covariance[PUMP, PUMP])
+    pump.shown.update(
+        point.time_ns,
+        -float(seen.mean[PUMP]),
+        variance,
+        weighed.scales.pump_m,
+        disturbance,
+        CHANGE_PER_RUN,
+        is_sure=False,
+    )
+
+
+def _by_main(main: AssetBelief, weighed: Weighed) -> tuple[float, float]:
+    """What its main adds to the loss of a pump that has no head sensor [m], and the variance of that [m²].
+
+    By what the runs of the other pumps have told of the main: a run without a head shows the sum.
+    """
+    point, friction_m = weighed.point, weighed.point.friction_m
+    if friction_m <= 0.0:
+        return 0.0, 0.0
+    disturbance = float(point.run_covariance[SYSTEM, SYSTEM]) / friction_m**2
+    rise, variance = main.track.foretold(point.time_ns, weighed.scales.system_m / friction_m, disturbance)
+    gain_m = -weighed.observation.system_in_pump * friction_m
+    return gain_m * rise, gain_m**2 * variance
+
+
+def _believe_pump(
+    pump: AssetBelief, weighed: Weighed, by_main: tuple[float, float], *, is_headless: bool, is_sure: bool
+) -> None:
     seen, point = weighed.observation, weighed.point
     value, variance = -seen.mean[PUMP], seen.covariance[PUMP, PUMP] + seen.slope_variance[PUMP]
     if is_headless:
-        value, variance = -weighed.posterior.shift_m[PUMP], weighed.posterior.deviation_m[PUMP] ** 2
+        value = -weighed.posterior.shift_m[PUMP] - by_main[0]
+        variance = weighed.posterior.deviation_m[PUMP] ** 2 + by_main[1]
     pump.scale, pump.flow_m3h = weighed.scales.pump_m, point.flow_m3h
     disturbance = float(point.run_covariance[PUMP, PUMP])
     pump.track.update(

@@ -57,7 +57,7 @@ _FIELDS: Mapping[str, Mapping[str, str]] = {
 }
 """Of these classes, by stored name, where the name is another now."""
 _ADDED: Mapping[str, Mapping[str, Callable[[], Any]]] = {
-    "PumpBelief": {"pump_if_system": lambda: None, "asset": AssetBelief},
+    "PumpBelief": {"pump_if_system": lambda: None, "asset": AssetBelief, "shown": SizeTrack},
     "PumpRecord": {"wrong_meters": dict},
     "SystemBelief": {"asset": AssetBelief},
 }

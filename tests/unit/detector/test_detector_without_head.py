@@ -21,12 +21,20 @@ BEGIN_S, GROWN_S = 8 * HOUR_S, 9 * HOUR_S
 HELD = {"start_s": BEGIN_S, "end_s": GROWN_S, "after": "hold"}
 BLOCKED = Blockage(pump=2, speed_loss=0.1, **HELD)
 CLOGGED = PipeClogging(friction_rise=0.25, **HELD)
+BLOCKED_PERCENT = 23.5
+"""Of the head at its duty point that a loss of a tenth of the speed takes."""
 
 
 def recorded(station, *faults, hours=13, has_head=False):
     recording = Simulation(station, Scenario(name="s", fault=faults), 3).advance(hours * HOUR_S)
     columns = {name: values for name, values in recording.columns.items() if has_head or not name.endswith("head_m")}
     return replace(recording, columns=columns)
+
+
+def with_pumps(station, pumps):
+    parts = station.model_dump(exclude_none=True)
+    control = {"start_levels_m": [1.6, 1.9][:pumps], "stop_levels_m": [0.5, 0.6][:pumps]}
+    return Station.model_validate(parts | {"pump": parts["pump"][:pumps], "control": control})
 
 
 def told_on(station, recording):
@@ -38,6 +46,11 @@ def late_states(verdicts, recording, pump):
     """States that are told of a pump once a fault has grown and each pump has run with it."""
     late_ns = recording.time_ns[0] + (GROWN_S + HOUR_S) * NS_PER_S
     return {verdict.state for verdict in verdicts if verdict.pump == pump and verdict.time > late_ns}
+
+
+def sizes(verdicts):
+    """Of the faults that stand, as told last. [%]."""
+    return {fault.asset: fault.severity.value for verdict in verdicts for fault in verdict.faults}
 
 
 @pytest.mark.parametrize(
@@ -57,12 +70,46 @@ def test_the_other_pumps_tell_a_fault_of_one_from_one_of_the_main(alpha, fault, 
     assert severity["value"] == pytest.approx(true_percent, abs=1.0)
 
 
+@pytest.mark.parametrize("has_head", [False, True], ids=["without head", "with head"])
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [(BLOCKED, ["normal", "pump_fault"]), (CLOGGED, ["system_fault"] * 2)],
+    ids=["blockage", "clogging"],
+)
+def test_what_the_pumps_have_told_stays_told_for_days_while_what_they_show_stays(alpha, fault, expected, has_head):
+    station = with_pumps(alpha, 2)
+    recording = recorded(station, fault, hours=72, has_head=has_head)
+    verdicts = told_on(station, recording)
+    assert [late_states(verdicts, recording, pump) for pump in (1, 2)] == [{state} for state in expected]
+    late = [verdict for verdict in verdicts if verdict.state == expected[1]][-20:]
+    assert min(verdict.probability[verdict.state] for verdict in late) > 0.95
+    ((asset, value),) = sizes(late[-1:]).items()
+    assert value == pytest.approx({"main": 25.0, "pump:2": BLOCKED_PERCENT}[asset], rel=0.02)
+
+
+@pytest.mark.parametrize("pumps", [2, 3])
+def test_a_main_that_clogs_later_is_told_beside_a_pump_that_is_blocked(alpha, pumps):
+    station = alpha if pumps == 3 else with_pumps(alpha, 2)
+    clogged = CLOGGED.model_copy(update={"start_s": 20 * HOUR_S, "end_s": 21 * HOUR_S})
+    recording = recorded(station, BLOCKED, clogged, hours=36)
+    verdicts = told_on(station, recording)
+    last = {verdict.pump: verdict for verdict in verdicts}
+    assert last.pop(2).state == "pump_and_system_fault"
+    assert {verdict.state for verdict in last.values()} == {"system_fault"}
+    assert sizes(verdicts[-pumps:]) == pytest.approx({"pump:2": BLOCKED_PERCENT, "main": 25.0}, rel=0.05)
+
+
+def test_a_main_that_is_flushed_after_days_is_told_as_clean_by_the_next_runs(alpha):
+    cleared = CLOGGED.model_copy(update={"end_s": 50 * HOUR_S, "after": "clear"})
+    recording = recorded(alpha, cleared, hours=54)
+    verdicts = told_on(alpha, recording)
+    clean_ns = recording.time_ns[0] + 51 * HOUR_S * NS_PER_S
+    assert {verdict.state for verdict in verdicts if verdict.time > clean_ns} == {"normal"}
+    assert verdicts[-1].faults == ()
+
+
 def test_a_pump_that_is_alone_on_its_main_is_told_to_have_moved_and_no_crew_is_chosen(alpha):
-    alone = Station.model_validate(
-        alpha.model_dump(exclude_none=True)
-        | {"pump": [alpha.pump[0].model_dump(exclude_none=True)]}
-        | {"control": {"start_levels_m": [1.6], "stop_levels_m": [0.5]}}
-    )
+    alone = with_pumps(alpha, 1)
     recording = recorded(alone, Blockage(pump=1, speed_loss=0.1, **HELD))
     verdicts = told_on(alone, recording)
     assert late_states(verdicts, recording, 1) == {"unknown"}

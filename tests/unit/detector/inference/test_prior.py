@@ -12,6 +12,7 @@ from wetwell.detector.inference.prior import (
     PumpPrior,
     SystemPrior,
     joint_prior,
+    kept_shares,
     update_prior,
 )
 
@@ -73,3 +74,25 @@ def test_a_sibling_that_meets_a_healthy_main_clears_the_suspicion_of_it():
     prior = joint_prior(first, system)
     assert prior[PUMP_FAULT] > 0.8
     assert prior[BOTH] < 0.02
+
+
+def test_what_a_pump_has_told_of_the_main_is_not_forgotten_as_its_sibling_runs_on():
+    """Each run shows that pump or main is at fault, and no more; the first told that it is the main."""
+    pumps, system = [PumpPrior(), PumpPrior()], SystemPrior()
+    for number in range(2000):
+        pump, sibling = pumps[number % 2], pumps[1 - number % 2]
+        probability = joint_prior(pump, system)
+        probability[[NORMAL, FLOW_METER, HEAD_SENSOR]] = 0.0
+        probability /= probability.sum()
+        update_prior(probability, pump, system, lacks_head=True, siblings=[sibling])
+    assert probability[SYSTEM_FAULT] > 0.85, "both pumps would have to have a fault of their own: 20 to 1"
+
+
+def test_what_has_begun_since_the_last_run_is_no_fault_that_was_there_before():
+    pump, system = PumpPrior(), SystemPrior()
+    update_prior(certain(NORMAL), pump, system, lacks_head=True)
+    np.testing.assert_allclose(kept_shares(pump, system)[[PUMP_FAULT, SYSTEM_FAULT, BOTH]], 0.0, atol=1e-12)
+    update_prior(certain(SYSTEM_FAULT), pump, system, lacks_head=True)
+    shares = kept_shares(pump, system)
+    assert shares[SYSTEM_FAULT] > 0.9
+    np.testing.assert_allclose(shares[[PUMP_FAULT, BOTH]], 0.0, atol=1e-12)
