@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from wetwell.services.reports.charts import Section, folded, page, paragraph, share_bars, table
+from wetwell.services.reports.charts import Section, folded, page, paragraph, percent, share_bars, table
 from wetwell.services.reports.gap.correction import correction_section
 from wetwell.services.reports.gap.experiments import experiments_table
 from wetwell.services.reports.gap.lead import effect_words, lead, shrinkage_words
@@ -10,6 +10,7 @@ from wetwell.services.reports.gap.pictures import duty_picture, trace_pictures
 from wetwell.services.reports.gap.statistics import statistics
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis
 from wetwell.sim2real.diagnosis.report import AnswerProbability, GapReport
+from wetwell.sim2real.likelihood.posterior import MISJUDGED
 
 DRAWN = 1e-3
 """Probability from which on an answer or a part is drawn."""
@@ -46,7 +47,10 @@ def _posterior(report: GapReport) -> str:
     rest = 1.0 - sum(shares.values())
     if rest >= DRAWN:
         shares["all others"] = rest
-    words = "The answers exclude one another, so their probabilities sum to 100 %."
+    words = (
+        "The answers exclude one another, so their probabilities sum to 100 %. None gets more than "
+        f"{percent(1.0 - MISJUDGED)}, however clear it is: of such answers on sealed recordings one in five was wrong."
+    )
     bars = paragraph(words) + share_bars("Probability of each answer", shares)
     places = {effect_words(name): share for name, share in report.component_probability.items() if share >= DRAWN}
     return bars + (share_bars("Probability that something is otherwise there", places) if places else "")
