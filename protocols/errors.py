@@ -55,6 +55,8 @@ def _one_line(fault: Mapping[str, Any]) -> str:
         return f"{path}: missing"
     if fault["type"] == "json_invalid":
         return message
+    if fault["type"] == "tuple_type" and isinstance(fault["input"], Mapping):
+        return f"{path}: is one table, must be a list of tables: write [[{path}]]"
     if isinstance(fault["input"], Mapping) or fault["type"] == "value_error":
         return f"{path}: {message}" if path else message
     if path.endswith(("password", "secret", "token")):

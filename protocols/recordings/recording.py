@@ -183,7 +183,7 @@ def recording_of(
     """
     origin = Origin.of_metadata(table.schema.metadata or {}) if origin is None else origin
     if "time" not in table.column_names:
-        raise RecordingError(f"{place}: column 'time' is missing")
+        raise RecordingError(f"{place}: column 'time' is missing: `wetwell convert` makes a recording of an export")
     columns: dict[str, Floats] = {}
     truth: dict[str, npt.NDArray[Any]] = {}
     ignored: list[str] = []
@@ -245,7 +245,9 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
         return table, Origin.of_mark(mark)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error, ValueError) as error:
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path}: is not UTF-8, so not a recording: `wetwell convert` makes one of it") from error
+    except (pa.ArrowException, EOFError, zlib.error, ValueError) as error:
         raise RecordingError(f"{path}: {_csv_fault(str(error), header, 2 if mark else 1)}") from error
 
 

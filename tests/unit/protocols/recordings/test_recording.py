@@ -175,7 +175,7 @@ ROW = "2025-01-31T06:00:00Z"
 PACKED = gzip.compress(f"time,pump1_flow_m3h\n{ROW},1\n".encode() * 500)
 BAD_FILES = {
     "empty": ("r.csv", "", "Empty CSV file"),
-    "no time": ("r.csv", "level_m,pump1_flow_m3h\n1,2\n", "column 'time' is missing"),
+    "no time": ("r.csv", "level_m,pump1_flow_m3h\n1,2\n", "column 'time' is missing: `wetwell convert`"),
     "no pump": ("r.csv", f"time,level_m\n{ROW},1\n", "no pump column such as 'pump1_flow_m3h' found"),
     "column twice": ("r.csv", "time,level_m,level_m\n", "column 'level_m' stands twice"),
     "word in a number": (
@@ -195,8 +195,8 @@ BAD_FILES = {
     "header alone": ("r.csv", "time,pump1_flow_m3h\n", "has no rows"),
     "time too far": ("r.csv", "time,pump1_flow_m3h\n9999-01-01T00:00:00Z,1\n", "column 'time', row 1: got '9999-"),
     "time in seconds": ("r.csv", "time,pump1_flow_m3h\n0.5,1\n", "column 'time', row 1: got '0.5', must be ISO 8601"),
-    "header not UTF-8": ("r.csv", "time,höhe\n".encode("latin-1"), "can't decode byte"),
-    "data not UTF-8": ("r.csv", f"time,pump1_flow_m3h\n{ROW},1\nö,1\n".encode("latin-1"), "can't decode"),
+    "header not UTF-8": ("r.csv", "time,höhe\n".encode("latin-1"), "`wetwell convert` makes one of it"),
+    "data not UTF-8": ("r.csv", f"time,pump1_flow_m3h\n{ROW},1\nö,1\n".encode("latin-1"), "is not UTF-8"),
     "far data not UTF-8": (
         "r.csv",
         ("time,pump1_flow_m3h\n" + f"{ROW},1\n" * 2000 + "ö,1\n").encode("latin-1"),
