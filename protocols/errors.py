@@ -49,14 +49,14 @@ def _one_line(fault: Mapping[str, Any]) -> str:
     path = _path(fault["loc"])
     message = str(fault["msg"]).removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
+    if fault["type"] == "tuple_type" and isinstance(fault["input"], Mapping):
+        message = f"is one table, must be a list of tables: write [[{path}]]"
     if fault["type"] == "extra_forbidden":
         return f"{path}: unknown key"
     if fault["type"] == "missing":
         return f"{path}: missing"
     if fault["type"] == "json_invalid":
         return message
-    if fault["type"] == "tuple_type" and isinstance(fault["input"], Mapping):
-        return f"{path}: is one table, must be a list of tables: write [[{path}]]"
     if isinstance(fault["input"], Mapping) or fault["type"] == "value_error":
         return f"{path}: {message}" if path else message
     if path.endswith(("password", "secret", "token")):

@@ -246,7 +246,9 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise RecordingError(f"{path}: is not UTF-8, so not a recording: `wetwell convert` makes one of it") from error
+        raise RecordingError(
+            f"{path}: is not UTF-8, so not a recording: `wetwell convert` makes one of it"
+        ) from error
     except (pa.ArrowException, EOFError, zlib.error, ValueError) as error:
         raise RecordingError(f"{path}: {_csv_fault(str(error), header, 2 if mark else 1)}") from error
 

@@ -118,7 +118,10 @@ BAD_FILES = {
     "missing sump": (changed("[sump]\narea_m2 = 8.0\n", ""), "sump: missing"),
     "missing pump": ('name = "a"\n[sump]\narea_m2 = 8.0\n', "pump: missing"),
     "no pump": ('name = "a"\npump = []\n[sump]\narea_m2 = 8.0\n', "pump: got [], tuple should have at least 1 item"),
-    "one pump, not a list": ('name = "a"\n[sump]\narea_m2 = 8.0\n[pump]\ncurve = [3, 0, -1]\n', "pump: is one table, must be a list of tables: write [[pump]]"),
+    "one pump, not a list": (
+        'name = "a"\n[sump]\narea_m2 = 8.0\n[pump]\ncurve = [3, 0, -1]\n',
+        "pump: is one table, must be a list of tables: write [[pump]]",
+    ),
     "zero area": (changed("area_m2 = 8.0", "area_m2 = 0.0"), "sump.area_m2: got 0.0, input should be greater than 0"),
     "area not a number": (changed("area_m2 = 8.0", 'area_m2 = "big"'), "sump.area_m2: got 'big', input should be a"),
     "area NaN": (changed("area_m2 = 8.0", "area_m2 = nan"), "sump.area_m2: got nan, input should be"),
