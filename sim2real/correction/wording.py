@@ -41,6 +41,16 @@ COVARIATES_IN_WORDS: dict[Covariate, tuple[str, str, str]] = {
     "column": ("the column", "", "how it gets there"),
 }
 """Covariates, their units, and what to look for where a term goes with them."""
+EFFECT_OF_A_CONSTANT: dict[Term, str] = {
+    "head_loss": "friction_bias",
+    "static_head": "static_head_bias",
+    "pump_head": "pump_wear",
+    "speed": "motor_slip",
+    "flow_reading": "flow_meter_gain",
+    "head_reading": "head_sensor_offset",
+    "level_balance": "unmetered_inflow",
+}
+"""Effect of the library that a constant correction of a term is."""
 HINT_OF_A_CHANGE = "what was done or broke then; the times before and after it may be diagnosed apart"
 _FORMS = {
     "linear": "({x} − {centre}) / {scale}",
@@ -111,6 +121,8 @@ def sentence(effect: LearntCorrection, reference: float) -> str:
 
     Examples
     --------
+    >>> print(sentence(LearntCorrection.model_validate({"term": "flow_reading", "offset": 0.04}), 1.0)[-66:])
+    than in the station file; the library has that as flow_meter_gain.
     >>> part = {"covariate": "hour_of_day", "shape": "cosine", "size": 0.12, "centre": 5.0, "scale": 24.0}
     >>> print(sentence(LearntCorrection.model_validate({"term": "head_loss", "part": [part]}), 1.0)[:82])
     The head loss of the main swings by ±12 % with the hour of the day, highest at 05:
@@ -118,7 +130,9 @@ def sentence(effect: LearntCorrection, reference: float) -> str:
     what = TERMS_IN_WORDS[effect.term]
     if not effect.part:
         said = f"{what} is off by {amount(effect.offset, effect.term, reference)}, whatever happens"
-        return f"{said[0].upper()}{said[1:]}: look for what is otherwise than in the station file."
+        known = EFFECT_OF_A_CONSTANT.get(effect.term)
+        named = f"; the library has that as {known}" if known else ""
+        return f"{said[0].upper()}{said[1:]}: look for what is otherwise than in the station file{named}."
     parts = sorted(effect.part, key=lambda part: -float(np.ptp(part.bounds)))
     said = f"{what} {', and '.join(_said(part, effect.term, reference) for part in parts)}"
     hint = HINT_OF_A_CHANGE if _is_change(parts[0]) else COVARIATES_IN_WORDS[parts[0].covariate][2]
