@@ -1,7 +1,7 @@
 """The dictionary of which a correction is made: shapes of covariates, each over the range in which it was seen."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.simulator.corrections.parts import SHAPES, Shape, shapes_at
 from wetwell.simulator.effects.station.correction_part import PartTable
 
+PART_PRIOR = 0.1
+"""Probability of one more addend, shared by what it may go with, and by the shapes of each. [1]"""
 KNOWN_RANGE = (0.01, 0.99)
 """Quantiles of a covariate between which its shapes are known."""
 DECAYS_S = (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
@@ -46,6 +48,8 @@ class Atom:
         In the unit of the covariate.
     columns : array
         Dimensionless.
+    log_prior : float
+        Logarithm of the probability that it acts, as one of its dictionary.
     """
 
     place: Place
@@ -55,6 +59,7 @@ class Atom:
     low: float
     high: float
     columns: Floats
+    log_prior: float = 0.0
 
     def part(self, sizes: Floats) -> PartTable:
         """Addend with sizes of the columns; of a swing its amplitude, and where it is highest."""
@@ -101,7 +106,10 @@ def dictionary(covariates: Mapping[Place, Floats], is_running: Floats) -> tuple[
             continue
         if known.size and np.unique(known).size >= (2 if place.covariate == "pumps_on_main" else LEAST_CYCLES):
             atoms += _atoms(place, values, known)
-    return tuple(atoms), left_out
+    places = [atom.place[:2] for atom in atoms]
+    shares = [PART_PRIOR / len(set(places)) / places.count(place) for place in places]
+    found = [replace(atom, log_prior=float(np.log(share))) for atom, share in zip(atoms, shares, strict=True)]
+    return tuple(found), left_out
 
 
 def _useless(
@@ -189,11 +197,13 @@ def near(atom: Atom, values: Floats, width: float) -> list[Atom]:
     match atom.place.covariate, atom.shape:
         case "days", "cosine":
             scales = atom.scale * PERIOD_RATIO**finer
-            return [_made(atom.place, values, "cosine", 0.0, float(scale), known) for scale in scales]
+            found = [_made(atom.place, values, "cosine", 0.0, float(scale), known) for scale in scales]
         case "days", "step":
             times = atom.centre + finer * (atom.high - atom.low) / (TIMES_OF_CHANGE + 1)
-            return [_made(atom.place, values, "step", float(time), 1.0, known) for time in times]
-    return [atom]
+            found = [_made(atom.place, values, "step", float(time), 1.0, known) for time in times]
+        case _:
+            return [atom]
+    return [replace(one, log_prior=atom.log_prior) for one in found]
 
 
 def shapes_of(values: Floats, shape: Shape, centre: float, scale: float, low: float, high: float) -> Floats:

@@ -1,7 +1,7 @@
 """Which term, going with what, explains the residuals best: a sparse regression under the likelihood's covariance."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,8 +14,6 @@ TEMPER = 0.3
 """Power of the likelihood of a correction: its cells are not as independent as `Means` takes them to be. [1]"""
 SIZE_PRIOR = 0.3
 """Standard deviation of the size of an addend before anything is seen, as a share of its term. [1]"""
-PART_PRIOR = 0.1
-"""Probability of one more addend. [1]"""
 MOST_PARTS = 3
 PROPOSED = 3
 """Terms that are tried in the simulator, the most probable first."""
@@ -31,15 +29,19 @@ class Proposal:
     atoms : tuple of Atom
     sizes : (columns,) array
         The offset, then those of the columns of each atom. [1]
-    prior, log : float
-        Logarithms of its prior probability, and of its probability over that of no correction.
+    log : float
+        Logarithm of its probability over that of no correction.
     """
 
     term: Term
     atoms: tuple[Atom, ...]
     sizes: Floats
-    prior: float
     log: float
+
+    @property
+    def log_prior(self) -> float:
+        """Logarithm of its probability before anything is seen."""
+        return sum(atom.log_prior for atom in self.atoms) - float(np.log(len(TERMS)))
 
 
 class Gram:
@@ -117,8 +119,6 @@ def proposals(
         Change of the residuals with a constant correction of each term; what a correction that varies does is taken
         to be its product with that.
     """
-    places = [atom.place[:2] for atom in atoms]
-    costs = [float(np.log(PART_PRIOR / len(set(places)) / places.count(place))) for place in places]
     found: list[Proposal] = []
     for term, slope in sensitivities.items():
         columns = [slope]
@@ -127,20 +127,17 @@ def proposals(
             of_atom[number] = list(range(len(columns), len(columns) + atom.columns.shape[1]))
             columns += [slope * values for values in atom.columns.T]
         gram = Gram(means, residuals, np.array(columns).T)
-        found += _path(term, gram, atoms, of_atom, costs)
+        found += _path(term, gram, atoms, of_atom)
     return sorted(found, key=lambda one: -one.log)
 
 
-def _path(
-    term: Term, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]], costs: Sequence[float]
-) -> list[Proposal]:
+def _path(term: Term, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]]) -> list[Proposal]:
     """The best addends by their number: one more as long as that pays, and each exchanged for a better one."""
 
     def weighed(numbers: tuple[int, ...]) -> Proposal:
         log, sizes = gram.gain([k for number in (-1, *numbers) for k in of_atom[number]])
-        prior = sum(costs[number] for number in numbers) - float(np.log(len(TERMS)))
-        chosen = tuple(atoms[number] for number in numbers)
-        return Proposal(term=term, atoms=chosen, sizes=sizes, prior=prior, log=TEMPER * (log - gram.nothing) + prior)
+        found = Proposal(term=term, atoms=tuple(atoms[number] for number in numbers), sizes=sizes, log=0.0)
+        return replace(found, log=TEMPER * (log - gram.nothing) + found.log_prior)
 
     best: list[tuple[Proposal, tuple[int, ...]]] = [(weighed(()), ())]
     while len(best) <= MOST_PARTS:

@@ -85,7 +85,11 @@ class Workshop:
         return {term: slope for term, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
 
     def _sensitivity(self, term: Term) -> Floats:
-        return (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE
+        """(bins,) slope; 0 where the station does not bear more of the term."""
+        try:
+            return (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE
+        except ValueError:
+            return np.zeros(self.plain.size)
 
     def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
         r"""The best proposal of each of the best terms, the most probable first.
@@ -98,6 +102,8 @@ class Workshop:
         .. [1] P. J. Huber, Robust Statistics, 1981, section 7.8: pseudo-observations.
         """
         slopes, seen = self.sensitivities(), self.plain
+        if not slopes:
+            return []
         found = proposals(self._means, seen, atoms, slopes)
         for _ in range(LOOKS):
             best = found[0]
@@ -183,7 +189,7 @@ class Workshop:
             sizes[k] += PROBE
             slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
         gram = Gram(self._means, self.bounded(residuals), slopes)
-        log = proposal.prior + TEMPER * (gram.at(proposal.sizes) - self.nothing)
+        log = proposal.log_prior + TEMPER * (gram.at(proposal.sizes) - self.nothing)
         return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
 
     def spoils(self, residuals: Floats) -> bool:
