@@ -245,12 +245,11 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
         return table, Origin.of_mark(mark)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise RecordingError(
-            f"{path}: is not UTF-8, so not a recording: `wetwell convert` makes one of it"
-        ) from error
-    except (pa.ArrowException, EOFError, zlib.error, ValueError) as error:
-        raise RecordingError(f"{path}: {_csv_fault(str(error), header, 2 if mark else 1)}") from error
+    except (pa.ArrowException, UnicodeDecodeError, EOFError, zlib.error, ValueError) as error:
+        fault = _csv_fault(str(error), header, 2 if mark else 1)
+        if isinstance(error, UnicodeDecodeError) and suffix != ".parquet":
+            fault = "is not UTF-8, so not a recording: `wetwell convert` makes one of it"
+        raise RecordingError(f"{path}: {fault}") from error
 
 
 def _csv_fault(message: str, header: list[str], header_rows: int) -> str:

@@ -315,6 +315,7 @@ class EquivalentTerm(_Part):
     Parameters
     ----------
     term : str
+        The term that it corrects.
     component : str
         Where the cause lies if it is this one.
     equation : str

@@ -7,7 +7,7 @@ from wetwell.sim2real.recording.regimes import IDLE
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.phases import PHASES_S, phase
 
-SETTLED_S = 60
+FOLLOWED_S = 60
 """Time at rest after which the level shows nothing of the pumps: the observer has followed it. [s]"""
 
 
@@ -44,7 +44,7 @@ def alike_in_cycles(bins: Bins, errors: Floats) -> float:
     0.35
     """
     span = phase(bins)
-    settled = (bins.regime == IDLE) & (span > np.searchsorted(PHASES_S, SETTLED_S))
+    settled = (bins.regime == IDLE) & (span > np.searchsorted(PHASES_S, FOLLOWED_S))
     cycles = int(bins.cycle.max(initial=0)) + 1
     keys, of_bin = np.unique(span[settled] * cycles + bins.cycle[settled], return_inverse=True)
     means = np.bincount(of_bin, errors[settled]) / np.bincount(of_bin)
