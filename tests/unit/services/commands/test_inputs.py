@@ -67,6 +67,24 @@ def test_an_input_that_is_given_twice_is_refused(run_wetwell, capsys):
     assert "'--station' is given 2 times" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ("export alpha --begin 2024-11-01", "'--begin' is no option of 'export': the nearest is '--from'"),
+        ("export alpha --until=2024-11-01", "'--until' is no option of 'export': the nearest is '--to'"),
+        ("station check alpha --jsn", "'--jsn' is no option of 'check': the nearest is '--json'"),
+        ("up --secnario demo", "'--secnario' is no option of 'up': the nearest is '--scenario'"),
+        ("alarms --confg x list", "'--confg' is no option of 'alarms': the nearest is '--config'"),
+        ("schema --qqq", "'--qqq' is no option of 'schema': it has "),
+    ],
+)
+def test_an_option_that_a_command_does_not_have_is_told_in_one_line(words, fault, run_wetwell, capsys):
+    assert run_wetwell(*words.split()) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"wetwell: {fault}")
+    assert said.count("\n") == 1
+
+
 def test_several_of_an_input_that_may_be_given_again_stand_without_name(run_wetwell, tmp_path, capsys):
     assert run_wetwell("convert", tmp_path / "a.csv", "--draft", tmp_path / "m.toml", tmp_path / "b.csv") == 2
     assert capsys.readouterr().err == f"wetwell: {tmp_path}/a.csv: cannot be read: No such file or directory\n"
