@@ -1,4 +1,4 @@
-"""The detector of one station: samples in, verdicts out; the same for a live stream and for a recording."""
+"""The detector of one station: samples in, verdicts out; of a live stream, or of a recording, whose gaps are sure."""
 
 from collections.abc import Iterator
 from typing import Self
@@ -92,7 +92,7 @@ class Detector:
         return tuple(self._verdicts_on(self._live.fill(sample)))
 
     def update_block(self, block: Block) -> list[Verdict]:
-        """Verdicts that a block of samples brings; the same as if they came one by one."""
+        """Verdicts that a block of samples brings; the same as if they came one by one, where none is confirmed."""
         return list(self.verdicts_on(block))
 
     def verdicts_on(self, block: Block) -> Iterator[Verdict]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wetwell.detector.stream.gate import CONFIRMATIONS
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.messages.readings import Readings, row_values
 from wetwell.protocols.quantities import columns_of
@@ -25,6 +26,8 @@ class Block(NamedTuple):
         Level, inflow, then frequency, flow, head, power and running (0 or more) of each pump; NaN is "no value".
     is_switched : (n, pumps) bool
         Whether a pump may have started or stopped within the interval that a value is the mean of.
+    is_confirmed : (n,) bool
+        Whether the samples that come next confirm a stamp, however far ahead it lies; live none is known.
     pumps : int
         How many pumps the source speaks of.
     is_bad : bool
@@ -35,6 +38,7 @@ class Block(NamedTuple):
     seq: Integers
     values: Floats
     is_switched: Flags
+    is_confirmed: Flags
     pumps: int
     is_bad: bool
 
@@ -45,20 +49,22 @@ class Block(NamedTuple):
             seq=np.ascontiguousarray(self.seq, dtype=np.int64),
             values=np.ascontiguousarray(self.values, dtype=np.float64),
             is_switched=np.ascontiguousarray(self.is_switched, dtype=np.bool_),
+            is_confirmed=np.ascontiguousarray(self.is_confirmed, dtype=np.bool_),
         )
 
 
 def blocks(recording: Recording, pumps: int) -> Iterator[Block]:
     """Yield the rows of a recording for a station with so many pumps, `seq` counting from 0."""
     columns = [recording.column(name) for name in columns_of(pumps)]
-    is_switched = switched_rows(recording, pumps)
+    is_switched, is_confirmed = switched_rows(recording, pumps), confirmed_rows(recording.time_ns)
     for first in range(0, len(recording), BLOCK_ROWS):
         last = min(first + BLOCK_ROWS, len(recording))
         values = np.empty((last - first, len(columns)))
         for number, column in enumerate(columns):
             values[:, number] = column[first:last]
         time_ns, seq = np.array(recording.time_ns[first:last]), np.arange(first, last)
-        yield Block(time_ns, seq, values, np.array(is_switched[first:last]), recording.pumps, False)
+        flags = np.array(is_switched[first:last]), is_confirmed[first:last]
+        yield Block(time_ns, seq, values, *flags, recording.pumps, False)
 
 
 def switched_rows(recording: Recording, pumps: int) -> Flags:
@@ -85,6 +91,21 @@ def switched_rows(recording: Recording, pumps: int) -> Flags:
     return switched
 
 
+def confirmed_rows(time_ns: Integers) -> Flags:
+    """(n,) whether the next rows, as many as a live clock that was set is followed after, all lie behind a row.
+
+    Examples
+    --------
+    >>> confirmed_rows(np.array([0, 1, 9000, 2, 3])).tolist()
+    [True, True, False, True, False]
+    """
+    beyond = np.full(CONFIRMATIONS - 1, np.iinfo(np.int64).max)
+    following = np.lib.stride_tricks.sliding_window_view(np.append(time_ns[1:], beyond), CONFIRMATIONS - 1)
+    is_confirmed: Flags = time_ns <= following[: len(time_ns)].min(axis=1)
+    is_confirmed[-1:] = False
+    return is_confirmed
+
+
 class LiveBlock:
     """A block of one sample, filled anew for each."""
 
@@ -92,6 +113,7 @@ class LiveBlock:
         self._time_ns, self._seq = np.zeros((2, 1), dtype=np.int64)
         self._values = np.full((1, len(columns_of(pumps))), np.nan)
         self._is_switched = np.zeros((1, pumps), dtype=bool)
+        self._is_confirmed = np.zeros(1, dtype=bool)
 
     def fill(self, sample: Readings) -> Block:
         """The sample as a block, until the next one is filled in."""
@@ -101,4 +123,5 @@ class LiveBlock:
         del values[self._values.shape[1] :]
         self._values[0, : len(values)] = values
         is_bad = sample.quality == "bad"
-        return Block(self._time_ns, self._seq, self._values, self._is_switched, len(sample.pumps), is_bad)
+        flags = self._is_switched, self._is_confirmed
+        return Block(self._time_ns, self._seq, self._values, *flags, len(sample.pumps), is_bad)

@@ -6,7 +6,8 @@ more than `MAX_JUMP_S` and `MAX_JUMP_STEPS` usual steps ahead ("future"), and sa
 a source whose clock was set: after `CONFIRMATIONS` such samples in a row that agree with one another, the gate
 follows them and counts a clock step. The usual step is learnt from the stream; before the second sample it may be
 any up to `SLOWEST_STEP_S`. Those that are behind with old numbers are most likely sent again after a lost link, and
-it takes more than `RESENT_SAMPLES` of them: then the source has begun anew.
+it takes more than `RESENT_SAMPLES` of them: then the source has begun anew. In a recording the rows that come next
+are known: where they confirm a sample that jumps ahead, it comes after a gap and passes.
 
 `samples` = frames + `doubled` + `late` + `future` - `clock_steps`. `lost` counts the numbers that `seq` has passed
 over; a sample that comes late after all is counted there too.
@@ -108,7 +109,7 @@ def seconds_between(earlier_ns: int, later_ns: int) -> float:
 
 
 @compiled
-def _is_in_order(state: Any, steps: Floats, time_ns: int, seq: int) -> bool:
+def _is_in_order(state: Any, steps: Floats, time_ns: int, seq: int, is_confirmed: bool) -> bool:
     """Whether a sample is let through; its gap is noted."""
     if not state["is_begun"]:
         state["gap_s"] = 0.0
@@ -124,6 +125,9 @@ def _is_in_order(state: Any, steps: Floats, time_ns: int, seq: int) -> bool:
     if 0.0 <= gap_s < MIN_GAP_S or (state["other_count"] > 0 and 0.0 <= since_other_s < MIN_GAP_S):
         state["doubled"] += 1
         return False
+    if is_confirmed and gap_s > max_jump_s:
+        state["gap_s"] = math.inf
+        return True
     if gap_s < 0.0:
         state["late"] += 1
     else:
@@ -170,11 +174,12 @@ def let_through(
     values: Floats,
     pumps: int,
     is_bad: bool,
+    is_confirmed: bool,
     frame: Floats,
 ) -> bool:
     """Whether a sample passes; then `frame` holds its values."""
     state["samples"] += 1
-    is_let_through = _is_in_order(state, steps, time_ns, seq)
+    is_let_through = _is_in_order(state, steps, time_ns, seq, is_confirmed)
     _count_lost(state, seq, is_let_through)
     if not is_let_through:
         return False

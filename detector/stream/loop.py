@@ -45,6 +45,7 @@ def process_samples(
     seq: Integers,
     values: Floats,
     is_switched: Flags,
+    is_confirmed: Flags,
     sample_pumps: int,
     is_bad: bool,
     table: Records,
@@ -69,7 +70,7 @@ def process_samples(
     while row < time_ns.shape[0]:
         now_ns = time_ns[row]
         if stop <= Stop.SEGMENT_FULL:
-            told = now_ns, seq[row], values[row], sample_pumps, is_bad
+            told = now_ns, seq[row], values[row], sample_pumps, is_bad, is_confirmed[row]
             if not let_through(state, sampling_steps, ranges, *told, frame):
                 row += 1
                 continue

@@ -165,6 +165,7 @@ class StationDetector:
             seq=np.array(message.seq, dtype=np.int64),
             values=message.values(len(self._publishers)),
             is_switched=np.zeros((len(message.time), len(self._publishers)), dtype=bool),
+            is_confirmed=np.zeros(len(message.time), dtype=bool),
             pumps=len(message.pumps),
             is_bad=message.quality == "bad",
         )

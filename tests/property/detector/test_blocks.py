@@ -65,12 +65,18 @@ def spoilt(recording, rng):
     )
 
 
+def live(recording, pumps):
+    """Blocks of a recording as if nobody knew which rows come next."""
+    for block in blocks(recording, pumps):
+        yield block._replace(is_confirmed=np.zeros_like(block.is_confirmed))
+
+
 def cut(block, rng):
     """The block in pieces of any length, some of them of one sample."""
     first = 0
     while first < len(block.time_ns):
         last = first + int(rng.choice([1, 2, 100, 3000]))
-        yield Block(*(values[first:last] for values in block[:4]), *block[4:])
+        yield Block(*(values[first:last] for values in block[:5]), *block[5:])
         first = last
 
 
@@ -84,7 +90,7 @@ def test_blocks_give_the_verdicts_and_the_state_of_single_samples(recordings, la
     station = stations()[layout]
     one_by_one, in_blocks = (Detector(station.name, datasheet_of(station)) for _ in range(2))
     expected = [verdict.encode() for row in recording.rows() for verdict in one_by_one.update(row)]
-    pieces = (piece for block in blocks(recording, len(station.pump)) for piece in cut(block, rng))
+    pieces = (piece for block in live(recording, len(station.pump)) for piece in cut(block, rng))
     assert [verdict.encode() for piece in pieces for verdict in in_blocks.update_block(piece)] == expected
     assert len(expected) > 25
     assert in_blocks.counts == one_by_one.counts
@@ -109,7 +115,7 @@ def test_slow_feeds_and_pumps_without_head_are_taken_alike(recordings, every):
 
 def test_messages_give_the_verdicts_of_the_rows_that_they_were(recordings):
     recording, station = spoilt(recordings["alpha", "blocked"], np.random.default_rng(99)), stations()["alpha"]
-    in_blocks, live = (Detector(station.name, datasheet_of(station)) for _ in range(2))
-    told = [verdict.encode() for block in blocks(recording, 3) for verdict in in_blocks.update_block(block)]
-    assert [v.encode() for sample in recording.samples("alpha") for v in live.update(sample)] == told
-    assert live.snapshot() == in_blocks.snapshot()
+    in_blocks, singly = (Detector(station.name, datasheet_of(station)) for _ in range(2))
+    told = [verdict.encode() for block in live(recording, 3) for verdict in in_blocks.update_block(block)]
+    assert [v.encode() for sample in recording.samples("alpha") for v in singly.update(sample)] == told
+    assert singly.snapshot() == in_blocks.snapshot()

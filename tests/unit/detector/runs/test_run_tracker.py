@@ -34,7 +34,7 @@ def sample(second, *pumps, level_m=1.0):
     """A block of one sample."""
     values = [level_m, NAN, *(value for pump in pumps + (OFF,) * (3 - len(pumps)) for value in pump)]
     time_ns, seq, switched = np.array([second * NS_PER_S]), np.array([second]), np.zeros((1, 3), dtype=bool)
-    return Block(time_ns, seq, np.array([values]), switched, 3, False)
+    return Block(time_ns, seq, np.array([values]), switched, np.zeros(1, dtype=bool), 3, False)
 
 
 def ended(tracker, block):

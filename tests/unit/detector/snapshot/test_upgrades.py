@@ -47,7 +47,7 @@ def rest(alpha):
     recording = Simulation(alpha, find_scenario("paper"), 7).advance(SEEN + 7200, truth=False)
     for block in blocks(recording, len(alpha.pump)):
         is_new = block.seq >= SEEN
-        yield Block(*(column[is_new] for column in block[:4]), *block[4:])
+        yield Block(*(column[is_new] for column in block[:5]), *block[5:])
 
 
 def without_steps(snapshot):

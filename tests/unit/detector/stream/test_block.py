@@ -1,11 +1,13 @@
 """Rows of means in which a pump may have been switched."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wetwell.detector.curves.datasheet import datasheet_of
 from wetwell.detector.detector import Detector
-from wetwell.detector.stream.block import blocks, switched_rows
+from wetwell.detector.stream.block import blocks, confirmed_rows, switched_rows
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.stations import find_scenario
@@ -58,6 +60,23 @@ def test_only_means_have_such_rows(value):
 def test_blocks_hand_them_on():
     (block,) = blocks(stored(pump1_frequency_hz=[0, 50, 50, 50, 0]), 1)
     assert block.is_switched[:, 0].astype(int).tolist() == [0, 1, 0, 1, 0]
+
+
+def test_rows_confirm_one_that_none_of_the_next_lies_before():
+    time_s = [0, 1, 7200, 2, 3, 9000, 9001, 9001]
+    assert confirmed_rows(np.array(time_s)).astype(int).tolist() == [1, 1, 0, 1, 1, 1, 1, 0]
+    assert confirmed_rows(np.array([5])).tolist() == [False]
+    assert confirmed_rows(np.zeros(0, dtype=np.int64)).tolist() == []
+
+
+@pytest.mark.parametrize("lost_s", [1, 1800, 7200, 14 * 86_400])
+def test_all_rows_behind_a_gap_of_a_recording_count_and_no_clock_was_set(alpha, lost_s):
+    recording = Simulation(alpha, find_scenario("demo"), 3).advance(4 * 3600)
+    time_ns = recording.time_ns + lost_s * NS_PER_S * (np.arange(len(recording)) >= 5000)
+    time_ns[9000] += 86_400 * NS_PER_S
+    detector = Detector.of(alpha)
+    detector.judge(replace(recording, time_ns=time_ns))
+    assert detector.counts == {"samples": len(recording), "future": 1} | ({"gaps": 1} if lost_s > 1 else {})
 
 
 def test_a_block_cut_out_of_a_larger_table_is_judged_as_one_that_stands_alone(alpha):

@@ -74,7 +74,7 @@ class Gate:
     def update(self, sent):
         """Frame of a sample, or None where it is dropped."""
         block = self.live.fill(sent)
-        told = block.time_ns[0], block.seq[0], block.values[0], block.pumps, block.is_bad
+        told = block.time_ns[0], block.seq[0], block.values[0], block.pumps, block.is_bad, block.is_confirmed[0]
         if not let_through(self.state[0], self.steps, self.ranges, *told, self.values):
             return None
         pumps = (
