@@ -23,10 +23,16 @@ class LinkError(WetwellError):
     """A link (Zenoh, Modbus) cannot be opened or used."""
 
 
-def first_fault(error: "ValidationError") -> str:
+def first_fault(error: "ValidationError", within: str = "") -> str:
     """One line for a failed validation: path of the key, value, rule; further faults are counted.
 
     An unknown key comes first: it is most often the misspelt one that is missed elsewhere.
+
+    Parameters
+    ----------
+    error : ValidationError
+    within : str
+        Key of the file under which what was validated stands; by default it is the whole file.
 
     Examples
     --------
@@ -42,7 +48,8 @@ def first_fault(error: "ValidationError") -> str:
     faults = error.errors(include_url=False)
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     unknown_keys = [fault for fault in faults if fault["type"] == "extra_forbidden"]
-    return _one_line((unknown_keys or faults)[0]) + more
+    fault = (unknown_keys or faults)[0]
+    return _one_line(fault | {"loc": (within, *fault["loc"])} if within else fault) + more
 
 
 def _one_line(fault: Mapping[str, Any]) -> str:
@@ -50,7 +57,7 @@ def _one_line(fault: Mapping[str, Any]) -> str:
     message = str(fault["msg"]).removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
     if fault["type"] == "tuple_type" and isinstance(fault["input"], Mapping):
-        message = f"is one table, must be a list of tables: write [[{path}]]"
+        message = f"is one table, must be a list of tables: write [[{_header(fault['loc'])}]]"
     if fault["type"] == "extra_forbidden":
         return f"{path}: unknown key"
     if fault["type"] == "missing":
@@ -62,6 +69,12 @@ def _one_line(fault: Mapping[str, Any]) -> str:
     if path.endswith(("password", "secret", "token")):
         return f"{path}: {message}"
     return f"{path}: got {fault['input']!r}, {message}"
+
+
+def _header(location: Sequence[int | str]) -> str:
+    """What stands in brackets over a table; behind a number pydantic has the kind of a union, which does not."""
+    names = [part for before, part in zip((None, *location), location, strict=False) if not isinstance(before, int)]
+    return ".".join(part for part in names if isinstance(part, str))
 
 
 def _path(location: Sequence[int | str]) -> str:

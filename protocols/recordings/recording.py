@@ -249,6 +249,8 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
         fault = _csv_fault(str(error), header, 2 if mark else 1)
         if isinstance(error, UnicodeDecodeError) and suffix != ".parquet":
             fault = "is not UTF-8, so not a recording: `wetwell convert` makes one of it"
+        elif any(header) and "time" not in header:
+            fault = "has no column 'time', so is no recording: `wetwell convert` makes one of an export"
         raise RecordingError(f"{path}: {fault}") from error
 
 

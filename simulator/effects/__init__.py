@@ -85,7 +85,7 @@ def effects_of(station: Station) -> tuple[Effect, ...]:
     try:
         effects = _ADAPTER.validate_python(tables)
     except ValidationError as error:
-        raise ValueError(f"station '{station.name}': effect{first_fault(error)}") from error
+        raise ValueError(f"station '{station.name}': {first_fault(error, 'effect')}") from error
     for number, effect in enumerate(effects, start=1):
         for part, count in (("pump", len(station.pump)), ("main", len(station.mains))):
             place = getattr(effect, part, 0)

@@ -184,6 +184,10 @@ def test_an_expression_is_data_and_nothing_else(quiet_alpha):
             learnt("head_loss", {"covariate": "level_m", "shape": "linear", "size": 0.1}),
             "part[1]: low, high: missing; shape 'linear' needs the range",
         ),
+        (
+            learnt("head_loss") | {"part": part("level_m")},
+            "effect[1].learnt_correction.part: is one table, must be a list of tables: write [[effect.part]]",
+        ),
         (learnt("head_loss", *[part("level_m")] * 4), "effect[1].learnt_correction.part: got"),
         (
             learnt("pump_head", part("level_m", size=-1.0, low=0.0, high=1.0)),

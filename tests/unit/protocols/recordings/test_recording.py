@@ -176,6 +176,13 @@ PACKED = gzip.compress(f"time,pump1_flow_m3h\n{ROW},1\n".encode() * 500)
 BAD_FILES = {
     "empty": ("r.csv", "", "Empty CSV file"),
     "no time": ("r.csv", "level_m,pump1_flow_m3h\n1,2\n", "column 'time' is missing: `wetwell convert`"),
+    "an export": ("r.csv", "Zeit;P1\n1.2.2025 06:00;1,5\n", "no column 'time', so is no recording"),
+    "a title over an export": ("r.csv", "Station 7\nZeit,P1\n", "no column 'time', so is no recording"),
+    "an export, far not UTF-8": (
+        "r.csv",
+        ("Zeit;P1\n" + "1.2.2025 06:00;1\n" * 2000 + "1.2.2025 06:00;ö\n").encode("latin-1"),
+        "`wetwell convert`",
+    ),
     "no pump": ("r.csv", f"time,level_m\n{ROW},1\n", "no pump column such as 'pump1_flow_m3h' found"),
     "column twice": ("r.csv", "time,level_m,level_m\n", "column 'level_m' stands twice"),
     "word in a number": (
