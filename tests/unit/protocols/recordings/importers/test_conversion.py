@@ -114,6 +114,22 @@ def test_tags_of_a_long_file_become_rows(bench):
     assert done.recording.station == "north"
 
 
+FROM_THE_FLAG = '[signal.pump1_frequency_hz]\ntag = "{tag}"\nscale = 50\n'
+
+
+def test_a_run_flag_of_numbers_can_stand_for_the_frequency_too(bench):
+    flag = '[signal.pump1_running]\ntag = "B1"\n'
+    text = WIDE + flag + FROM_THE_FLAG.format(tag="B1")
+    wide = "Zeit;LT1;FT1;B1\n15.11.2024 12:00:00;1,2;90;1\n15.11.2024 12:00:10;1,3;0;0\n"
+    rows = ("2024-11-15 12:00:00;P1;1;GOOD", "2024-11-15 12:00:10;P1;0;GOOD", "2024-11-15 12:00:10;LT1;9;GOOD")
+    numbers = LONG.replace('true = ["EIN"]', "") + FROM_THE_FLAG.format(tag="P1")
+    for done in (bench.convert(wide, text), bench.convert(long_rows(*rows), numbers)):
+        assert done.recording.columns["pump1_running"].tolist() == [1.0, 0.0]
+        assert done.recording.columns["pump1_frequency_hz"].tolist() == [50.0, 0.0]
+    with pytest.raises(ConfigError, match=r"signal\.pump1_frequency_hz\.true: is for pump1_running"):
+        bench.mapping(text + 'true = ["EIN"]\n')
+
+
 def test_stamps_that_differ_a_little_make_a_grid(bench):
     rows = [
         f"2024-11-15 12:{second // 60:02}:{second % 60:02}.{part};{tag};{value};GOOD"
