@@ -183,8 +183,9 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
         power_kw = 0.0
         if now.shaft_ratio > 0.0:  # a standing pump reads 0, also while the water still moves through it
             head_m = pump_head_m(curve[0], curve[1], curve[2], state.speed_ratio[i], flow_m3h)
+            turning = now.shaft_ratio * (1.0 + state.correction[SPEED, i])
             shaft_kw = shaft_power_kw(
-                now.shaft_ratio, flow_m3h, pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share
+                turning, flow_m3h, pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share
             )
             turned = 1.0 - pump.slip * now.load
             now.load = shaft_kw / (pump.rated_shaft_kw * now.shaft_ratio)

@@ -8,6 +8,7 @@ from wetwell.simulator.corrections.parts import COVARIATES, TERMS, Column
 from wetwell.simulator.effects import effective_parameters, effects_of
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.parameters import plant_parameters
+from wetwell.simulator.power import loaded_power_kw, shaft_power_kw
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -58,6 +59,21 @@ def test_a_constant_correction_is_the_effect_that_has_a_name(term, offset, named
     compared = [name for name in ours if not name.startswith("truth_")]
     for name in compared:
         np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_a_slower_pump_takes_less_power_where_power_goes_with_the_load(quiet_alpha):
+    station = under(quiet_alpha, {"name": "load_dependent_power", "share": 1.0}, learnt("speed", offset=-0.04))
+    plant, rows = effective_parameters(station), run(station)
+    pump, ratio = plant.pumps[0], rows["pump1_frequency_hz"] / plant.pumps[0].nominal_frequency_hz
+    flow_m3h = rows["truth_pump1_flow_m3h"]
+    steady = np.flatnonzero((np.convolve(ratio > 0.0, np.ones(61), "valid") == 61))[:50] + 60
+    assert steady.size == 50
+    for at in steady:
+        shaft_kw = shaft_power_kw(
+            0.96 * ratio[at], flow_m3h[at], pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share
+        )
+        power_kw = loaded_power_kw(shaft_kw, pump.rated_shaft_kw, plant.motor_efficiency, plant.drive_efficiency)
+        assert rows["truth_pump1_power_kw"][at] == pytest.approx(power_kw, rel=1e-6)
 
 
 def covariates_of(rows, pump):
