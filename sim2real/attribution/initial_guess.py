@@ -99,7 +99,7 @@ def _swing(bins: Bins, second_s: Floats, residuals: Floats) -> dict[str, float]:
     rows = (bins.signal == POWER) & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
     if rows.sum() < 50:
         return {}
-    time_s = second_s[bins.second[rows]] + 10.0
+    time_s = second_s[bins.second[rows]]
     values = residuals[rows] * bins.deviation[rows]
     day = 2.0 * np.pi * time_s / DAY_S
     slow = np.column_stack([np.ones(time_s.size), np.cos(day), np.sin(day)])

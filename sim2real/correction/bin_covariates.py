@@ -12,6 +12,7 @@ from wetwell.sim2real.residuals.bins import NO_PUMP, Bins
 from wetwell.simulator.corrections.acting import DAY_S, FIRST_MONDAY_D
 from wetwell.simulator.corrections.parts import Column, Covariate
 from wetwell.simulator.parameters import PlantParameters
+from wetwell.simulator.state import LONG_REST_S
 
 LEAST_ERRORS = 0.01
 """Share of its variance from which a column's errors are worth taking off: slopes are too small by that. [1]"""
@@ -79,13 +80,17 @@ def bin_covariates(
 
 
 def _times(running: Flags) -> tuple[Floats, Floats]:
-    """(n,) seconds since the longest run began, and for which nothing had run before it; of (pumps, n) flags."""
+    """(n,) seconds since the longest run began, and for which nothing had run before it; of (pumps, n) flags.
+
+    Before the recording all have rested for long, as in the simulator.
+    """
     place = np.arange(running.shape[1])
     since = np.max([np.where(one, place - _last(~one, place), 0) for one in running], axis=0)
     any_running = np.asarray(running.any(axis=0))
-    stood = np.where(any_running, 0, place - _last(any_running, place))
+    last = _last(any_running, place)
+    stood = np.where(any_running, 0.0, np.where(last < 0, LONG_REST_S, 0.0) + place - last)
     begins = np.maximum.accumulate(np.where(any_running & ~np.r_[False, any_running[:-1]], place, 0))
-    idle = np.where(any_running, np.r_[0, stood[:-1]][begins], stood)
+    idle = np.where(any_running, np.r_[LONG_REST_S, stood[:-1]][begins], stood)
     return since.astype(np.float64), idle.astype(np.float64)
 
 

@@ -11,7 +11,7 @@ from wetwell.sim2real.correction.dictionary import PERIOD_RATIO, Atom, dictionar
 from wetwell.sim2real.correction.selection import Proposal
 from wetwell.sim2real.correction.workshop import Tried, Workshop, effect_of
 from wetwell.sim2real.recording.regimes import IDLE
-from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.replay.replay import Replay, later
 from wetwell.sim2real.residuals.asinh_loss import asinh_loss
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.station import StationResiduals
@@ -80,7 +80,7 @@ def columns_of_no_use(replay: Replay, bins: Bins, given: Sequence[str]) -> list[
 
 def _covariates(replay: Replay, bins: Bins) -> dict[Place, Floats]:
     prediction = replay.run()
-    flow_m3h = replay.readings(())[0]
+    flow_m3h = later(replay.readings(())[0], 1.0)  # a correction goes by the flow of the second before
     return bin_covariates(replay.traces, bins, prediction.plant, prediction.level_m, flow_m3h)
 
 

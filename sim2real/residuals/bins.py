@@ -83,10 +83,10 @@ class Seconds:
         """(bins,) means of values of the seconds that count."""
         return np.asarray(np.bincount(self.bin, values, self.counts.size) / self.counts, dtype=np.float64)
 
-    def first(self, values: Integers) -> Integers:
-        """(bins,) value of the first second of each bin."""
-        begins = np.r_[True, self.bin[1:] != self.bin[:-1]] if self.bin.size else np.zeros(0, dtype=bool)
-        return values[self.second[begins]]
+    def middle(self, values: Integers) -> Integers:
+        """(bins,) value of (n,) ones, all seconds of a recording, in the middle of each bin."""
+        counts = self.counts.astype(np.int64)
+        return values[self.second[np.cumsum(counts) - counts + (counts - 1) // 2]]
 
     def bins(
         self,
@@ -103,10 +103,10 @@ class Seconds:
         """Bins of one signal of one pump, or of the station; regime and cycle are those of (n,) seconds."""
         return Bins(
             signal=np.full(self.counts.size, signal),
-            regime=self.first(regime),
-            cycle=self.first(cycle),
+            regime=self.middle(regime),
+            cycle=self.middle(cycle),
             pump=np.full(self.counts.size, pump),
-            second=self.first(np.arange(regime.size)),
+            second=self.middle(np.arange(regime.size)),
             deviation=deviation,
             floor=floor,
             tolerance=tolerance,
