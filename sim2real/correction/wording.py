@@ -51,6 +51,8 @@ EFFECT_OF_A_CONSTANT: dict[Term, str] = {
     "level_balance": "unmetered_inflow",
 }
 """Effect of the library that a constant correction of a term is."""
+READINGS: tuple[Term, ...] = ("flow_reading", "head_reading", "power", "level_reading")
+HINT_OF_A_LATE_READING = "a meter that is late, or takes time to follow"
 HINT_OF_A_CHANGE = "what was done or broke then; the times before and after it may be diagnosed apart"
 _FORMS = {
     "linear": "({x} − {centre}) / {scale}",
@@ -135,8 +137,15 @@ def sentence(effect: LearntCorrection, reference: float) -> str:
         return f"{said[0].upper()}{said[1:]}: look for what is otherwise than in the station file{named}."
     parts = sorted(effect.part, key=lambda part: -float(np.ptp(part.bounds)))
     said = f"{what} {', and '.join(_said(part, effect.term, reference) for part in parts)}"
-    hint = HINT_OF_A_CHANGE if _is_change(parts[0]) else COVARIATES_IN_WORDS[parts[0].covariate][2]
-    return f"{said[0].upper()}{said[1:]}: look for {hint}."
+    return f"{said[0].upper()}{said[1:]}: look for {_hint(parts[0], effect.term)}."
+
+
+def _hint(part: PartTable, term: Term) -> str:
+    if _is_change(part):
+        return HINT_OF_A_CHANGE
+    if part.covariate == "since_start_s" and term in READINGS:
+        return HINT_OF_A_LATE_READING
+    return COVARIATES_IN_WORDS[part.covariate][2]
 
 
 def _is_change(part: PartTable) -> bool:
