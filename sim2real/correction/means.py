@@ -6,7 +6,8 @@ import numpy as np
 from scipy import ndimage
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.likelihood.covariance import DIFFERING, GOOD_FORM
+from wetwell.sim2real.likelihood.covariance import DIFFERING, GOOD_FORM, POOR_FORM
+from wetwell.sim2real.recording.regimes import START_RAMP, STOP_RAMP
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
@@ -15,11 +16,14 @@ from wetwell.sim2real.residuals.phases import group_of, phase
 class Means:
     r"""Cells: one group (signal, pump, regime, span of time since it began) in one cycle.
 
-    $$C = \operatorname{diag}\left(\overline{f} / n + 1 - \overline{f} + (k\,m)^2\right) + \sum_g m_g^2\,1_g 1_g^T$$
+    $$C = \operatorname{diag}\left(\overline{f} / n + 1 - \overline{f} + (k\,m)^2\right)
+    + \sum_g \left(m_g^2 + (s\,r_g)^2\right) 1_g 1_g^T$$
 
     with the share f of a bin's variance that is noise, its n bins, and the material size m, of which the share
     `DIFFERING` k may change from cycle to cycle: an offset of a group g that all cycles share is none while it is
-    small.
+    small. Nor is it one while it is small beside what there is to explain, the median r_g of the residuals without a
+    correction: the form of a right one is wrong by the share s of that, `GOOD_FORM`, or `POOR_FORM` in starts and
+    stops.
 
     Attributes
     ----------
@@ -35,6 +39,8 @@ class Means:
         What a right model may be off, as of `likelihood.cells.Cells`.
     group_material : (groups,) array
         m_g.
+    group_wrong : (groups,) array
+        What all cycles of a group may share: m_g with what the form may have wrong.
     """
 
     of_bin: Integers
@@ -43,6 +49,7 @@ class Means:
     weight: Floats
     allowed: Floats
     group_material: Floats
+    group_wrong: Floats
 
     def of(self, columns: Floats) -> Floats:
         """(cells, k) means of (bins, k) columns."""
@@ -68,7 +75,7 @@ class Means:
         """(k, k) products of (cells, k) columns under the inverse of C, by Woodbury's identity."""
         weighted = columns * self.weight[:, None]
         by_group = np.array([np.bincount(self.group, column) for column in weighted.T]).T
-        ones = np.bincount(self.group, self.weight) + self.group_material**-2
+        ones = np.bincount(self.group, self.weight) + self.group_wrong**-2
         return np.asarray(columns.T @ weighted - by_group.T @ (by_group / ones[:, None]), dtype=np.float64)
 
     def matters(self, signature: Floats) -> bool:
@@ -86,21 +93,26 @@ class Means:
         return bool(np.all(np.bincount(self.group, (first - second) ** 2) <= np.bincount(self.group, wrong)))
 
 
-def means_of(bins: Bins) -> Means:
-    """Cells of the bins of a recording."""
+def means_of(bins: Bins, plain: Floats) -> Means:
+    """Cells of the bins of a recording, of which `plain` (bins,) are the residuals without a correction."""
     spans = int(phase(bins).max(initial=0)) + 1
     group_of_bin = np.unique(group_of(bins) * spans + phase(bins), return_inverse=True)[1]
     cycles = int(bins.cycle.max(initial=0)) + 1
     keys, of_bin = np.unique(group_of_bin * cycles + bins.cycle, return_inverse=True)
     group, counts = keys // cycles, np.bincount(of_bin).astype(np.float64)
     noise, material = (np.bincount(of_bin, values) / counts for values in (bins.floor, bins.material))
+    is_ramp = np.isin(bins.regime, (START_RAMP, STOP_RAMP))
+    form = np.where(np.bincount(group_of_bin, is_ramp) > 0.0, POOR_FORM, GOOD_FORM)
+    group_material = np.maximum(np.bincount(group, material) / np.bincount(group), LEAST_MATERIAL)
+    middle = ndimage.median(plain, group_of_bin, np.arange(group_material.size))
     return Means(
         of_bin=of_bin,
         counts=counts,
         group=group,
         weight=1.0 / (noise / counts + 1.0 - noise + (DIFFERING * material) ** 2),
         allowed=np.hypot(material, np.sqrt(np.maximum(1.0 - noise, 0.0))),
-        group_material=np.maximum(np.bincount(group, material) / np.bincount(group), LEAST_MATERIAL),
+        group_material=group_material,
+        group_wrong=np.hypot(group_material, form * middle),
     )
 
 

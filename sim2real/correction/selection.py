@@ -11,7 +11,7 @@ from wetwell.sim2real.correction.means import Means
 from wetwell.simulator.corrections.parts import TERMS, Term
 
 TEMPER = 0.3
-"""Power of the likelihood of a correction: its cells are not as independent as `Means` takes them to be. [1]"""
+"""Power of the likelihood, and of nothing else: its cells are not as independent as `Means` takes them to be. [1]"""
 SIZE_PRIOR = 0.3
 """Standard deviation of the size of an addend before anything is seen, as a share of its term. [1]"""
 MOST_PARTS = 3
@@ -48,9 +48,9 @@ class Gram:
     r"""Products of columns under the inverse of the covariance of the cells, and what follows for some of them.
 
     $$\Delta \ln L = \tfrac12 g^T (G + 1/\tau^2)^{-1} g - \tfrac12 \ln\det(1 + \tau^2 G), \qquad
-    G = A^T C^{-1} A, \quad g = -A^T C^{-1} r$$
+    G = T A^T C^{-1} A, \quad g = -T A^T C^{-1} r$$
 
-    with a prior of the sizes that is normal around 0 with `SIZE_PRIOR` τ.
+    with `TEMPER` T and a prior of the sizes that is normal around 0 with `SIZE_PRIOR` τ.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Gram:
     """
 
     def __init__(self, means: Means, residuals: Floats, columns: Floats) -> None:
-        self._products = means.products(means.of(np.column_stack([residuals, columns])))
+        self._products = TEMPER * means.products(means.of(np.column_stack([residuals, columns])))
         self.nothing = -0.5 * float(self._products[0, 0])
 
     def gain(self, chosen: Sequence[int] | Integers, base: Floats | None = None) -> tuple[float, Floats]:
@@ -99,9 +99,9 @@ class Gram:
         return self.nothing - 0.5 * (float(sizes @ sizes) / SIZE_PRIOR**2 + occam)
 
     def covariance(self, chosen: Sequence[int] | Integers) -> Floats:
-        """(columns, columns) covariance of the sizes; errors of the cells are dependent, so that it is tempered."""
+        """(columns, columns) covariance of the sizes."""
         rows = np.asarray(chosen, dtype=np.int64) + 1
-        inner = TEMPER * self._products[np.ix_(rows, rows)]
+        inner = self._products[np.ix_(rows, rows)]
         return np.asarray(np.linalg.inv(inner + np.eye(rows.size) / SIZE_PRIOR**2))
 
 
@@ -137,7 +137,7 @@ def _path(term: Term, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, l
     def weighed(numbers: tuple[int, ...]) -> Proposal:
         log, sizes = gram.gain([k for number in (-1, *numbers) for k in of_atom[number]])
         found = Proposal(term=term, atoms=tuple(atoms[number] for number in numbers), sizes=sizes, log=0.0)
-        return replace(found, log=TEMPER * (log - gram.nothing) + found.log_prior)
+        return replace(found, log=log - gram.nothing + found.log_prior)
 
     best: list[tuple[Proposal, tuple[int, ...]]] = [(weighed(()), ())]
     while len(best) <= MOST_PARTS:

@@ -10,7 +10,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import Atom, near
 from wetwell.sim2real.correction.means import Means, means_of
-from wetwell.sim2real.correction.selection import PROPOSED, TEMPER, Gram, Proposal, proposals
+from wetwell.sim2real.correction.selection import PROPOSED, Gram, Proposal, proposals
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import asinh_loss
 from wetwell.sim2real.residuals.bins import Bins
@@ -50,8 +50,8 @@ class Workshop:
 
     def __init__(self, replay: Replay, residuals: StationResiduals) -> None:
         self._replay, self._residuals = replay, residuals
-        self._means = means_of(residuals.bins)
         self.plain = residuals.of(replay.run())
+        self._means = means_of(residuals.bins, self.plain)
         self.nothing = Gram(self._means, self.bounded(self.plain), np.zeros((self.plain.size, 0))).nothing
 
     @property
@@ -189,7 +189,7 @@ class Workshop:
             sizes[k] += PROBE
             slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
         gram = Gram(self._means, self.bounded(residuals), slopes)
-        log = proposal.log_prior + TEMPER * (gram.at(proposal.sizes) - self.nothing)
+        log = proposal.log_prior + gram.at(proposal.sizes) - self.nothing
         return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
 
     def spoils(self, residuals: Floats) -> bool:

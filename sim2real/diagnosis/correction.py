@@ -63,6 +63,8 @@ def weighed(
         )
     report = CorrectionReport(
         term=effect.term,
+        pump=effect.pump,
+        main=effect.main,
         component=COMPONENT_OF[effect.term],
         covariates=tuple(dict.fromkeys(name_of(part) for part in effect.part)),
         equation=equation(effect, reference),

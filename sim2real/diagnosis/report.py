@@ -334,6 +334,8 @@ class CorrectionReport(_Part):
     ----------
     term : str
         The term that is corrected.
+    pump, main : int
+        Of which pump or main, from 1; 0 for all.
     component : str
         Where the cause then lies.
     covariates : list of str
@@ -353,6 +355,8 @@ class CorrectionReport(_Part):
     """
 
     term: Term
+    pump: int = 0
+    main: int = 0
     component: Component
     covariates: tuple[str, ...]
     equation: str

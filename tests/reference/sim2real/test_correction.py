@@ -165,6 +165,24 @@ def test_a_change_within_the_recording_is_told_with_its_time():
     assert "for good: look for what was done or broke then" in taken.report.sentence
 
 
+@pytest.mark.parametrize("quantity", ["flow_m3h", "power_kw"])
+def test_what_only_one_pump_has_is_told_of_it(quantity):
+    """A meter of the second pump follows the level; that of the first one is right."""
+    case = next(case for seed in range(971_010, 971_100) if len((case := truth(None, seed)).station.pump) > 1)
+    recording = run(case, truth=False)
+    level_m = recording.columns["level_m"]
+    name = f"pump2_{quantity}"
+    factor = 1.0 + 0.3 * (level_m - np.nanmean(level_m)) / np.nanmean(level_m)
+    replay, residuals = residuals_of(
+        replace(recording, columns=dict(recording.columns) | {name: factor * recording.columns[name]}), case.station
+    )
+    taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
+    assert why is None
+    assert (taken.report.term, taken.report.pump) == ({"flow_m3h": "flow_reading", "power_kw": "power"}[quantity], 2)
+    assert taken.report.equation.startswith(f"{taken.report.term} of pump 2 × (1 ")
+    assert "of pump 2" in taken.report.sentence
+
+
 @pytest.mark.parametrize("seed", [970_941, 970_942])
 def test_a_truth_as_its_file_says_gets_none(seed):
     case = truth(None, seed)

@@ -7,7 +7,7 @@ from scipy.stats import multivariate_normal
 from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import dictionary
 from wetwell.sim2real.correction.means import Means
-from wetwell.sim2real.correction.selection import SIZE_PRIOR, Gram, proposals
+from wetwell.sim2real.correction.selection import SIZE_PRIOR, TEMPER, Gram, proposals
 
 CELLS = 240
 
@@ -16,19 +16,22 @@ CELLS = 240
 def means():
     """Two bins a cell, a group of twelve cells each."""
     rng = np.random.default_rng(5)
+    spread = rng.uniform(0.5, 2.0, CELLS)
+    group_material = rng.uniform(0.2, 1.0, CELLS // 12)
     return Means(
         of_bin=np.repeat(np.arange(CELLS), 2),
         counts=np.full(CELLS, 2.0),
         group=np.arange(CELLS) // 12,
-        weight=1.0 / rng.uniform(0.5, 2.0, CELLS),
+        weight=1.0 / spread,
         allowed=np.ones(CELLS),
-        group_material=rng.uniform(0.2, 1.0, CELLS // 12),
+        group_material=group_material,
+        group_wrong=2.0 * group_material,
     )
 
 
 def covariance(means):
     found = np.diag(1.0 / means.weight)
-    for group, size in enumerate(means.group_material):
+    for group, size in enumerate(means.group_wrong):
         own = (means.group == group) * 1.0
         found += size**2 * np.outer(own, own)
     return found
@@ -46,13 +49,13 @@ def test_evidence_is_that_of_a_normal_distribution(means):
     rng = np.random.default_rng(2)
     residuals, columns = rng.normal(size=2 * CELLS), rng.normal(size=(2 * CELLS, 2))
     gram = Gram(means, residuals, columns)
-    r, a, c = means.of(residuals[:, None])[:, 0], means.of(columns), covariance(means)
+    r, a, c = means.of(residuals[:, None])[:, 0], means.of(columns), covariance(means) / TEMPER
     dense = multivariate_normal.logpdf(r, cov=c + SIZE_PRIOR**2 * a @ a.T) - multivariate_normal.logpdf(r, cov=c)
     log, sizes = gram.gain([0, 1])
     assert log - gram.nothing == pytest.approx(dense, rel=1e-8)
     moved = Gram(means, residuals + columns @ sizes, columns)
     assert moved.at(sizes) == pytest.approx(log, rel=1e-9)
-    spread = np.linalg.inv(0.3 * a.T @ np.linalg.solve(c, a) + np.eye(2) / SIZE_PRIOR**2)
+    spread = np.linalg.inv(a.T @ np.linalg.solve(c, a) + np.eye(2) / SIZE_PRIOR**2)
     np.testing.assert_allclose(gram.covariance([0, 1]), spread, rtol=1e-8)
 
 
