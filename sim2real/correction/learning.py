@@ -65,8 +65,10 @@ def _of_calendar(proposal: Proposal, atoms: Sequence[Atom]) -> Proposal | None:
 
 
 def _first_of_each(found: Sequence[Proposal]) -> list[list[Proposal]]:
-    """Proposals of each term, in their order."""
-    return [[one for one in found if one.term == term] for term in dict.fromkeys(one.term for one in found)]
+    """Proposals of each target, in their order."""
+    return [
+        [one for one in found if one.target == target] for target in dict.fromkeys(one.target for one in found)
+    ]
 
 
 def columns_of_no_use(replay: Replay, bins: Bins, given: Sequence[str]) -> list[tuple[str, str]]:
@@ -92,7 +94,7 @@ def _equivalents(shop: Workshop, best: Tried, others: Sequence[Tried]) -> tuple[
 
     found: list[LearntCorrection] = []
     for other in others:
-        same = other if is_alike(other) else shop.of_term(other.proposal.term, best.proposal)
+        same = other if is_alike(other) else shop.of_target(other.proposal.target, best.proposal)
         if same is not None and is_alike(same):
             found.append(effect_of(same.proposal))
     return tuple(found)

@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.correction.dictionary import Atom
 from wetwell.sim2real.correction.means import Means
-from wetwell.simulator.corrections.parts import TERMS, Term
+from wetwell.sim2real.correction.target import Target
 
 TEMPER = 0.3
 """Power of the likelihood, and of nothing else: its cells are not as independent as `Means` takes them to be. [1]"""
@@ -21,11 +21,11 @@ PROPOSED = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """A term with its addends.
+    """A term, of all pumps or mains or of one, with its addends.
 
     Attributes
     ----------
-    term : Term
+    target : Target
     atoms : tuple of Atom
     sizes : (columns,) array
         The offset, then those of the columns of each atom. [1]
@@ -33,7 +33,7 @@ class Proposal:
         Logarithm of its probability over that of no correction.
     """
 
-    term: Term
+    target: Target
     atoms: tuple[Atom, ...]
     sizes: Floats
     log: float
@@ -41,7 +41,7 @@ class Proposal:
     @property
     def log_prior(self) -> float:
         """Logarithm of its probability before anything is seen."""
-        return sum(atom.log_prior for atom in self.atoms) - float(np.log(len(TERMS)))
+        return self.target.log_prior + sum(atom.log_prior for atom in self.atoms)
 
 
 class Gram:
@@ -106,9 +106,9 @@ class Gram:
 
 
 def proposals(
-    means: Means, residuals: Floats, atoms: Sequence[Atom], sensitivities: Mapping[Term, Floats]
+    means: Means, residuals: Floats, atoms: Sequence[Atom], sensitivities: Mapping[Target, Floats]
 ) -> list[Proposal]:
-    """The best addends of each term, and the best of each smaller number; the most probable proposal first.
+    """The best addends of each target, and the best of each smaller number; the most probable proposal first.
 
     Parameters
     ----------
@@ -116,27 +116,29 @@ def proposals(
     residuals : (bins,) array
     atoms : sequence of Atom
     sensitivities : mapping of (bins,) arrays
-        Change of the residuals with a constant correction of each term; what a correction that varies does is taken
+        Change of the residuals with a constant correction of each target; what a correction that varies does is taken
         to be its product with that.
     """
     found: list[Proposal] = []
-    for term, slope in sensitivities.items():
+    for target, slope in sensitivities.items():
         columns = [slope]
         of_atom: dict[int, list[int]] = {-1: [0]}
         for number, atom in enumerate(atoms):
             of_atom[number] = list(range(len(columns), len(columns) + atom.columns.shape[1]))
             columns += [slope * values for values in atom.columns.T]
         gram = Gram(means, residuals, np.array(columns).T)
-        found += _path(term, gram, atoms, of_atom)
+        found += _path(target, gram, atoms, of_atom)
     return sorted(found, key=lambda one: -one.log)
 
 
-def _path(term: Term, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]]) -> list[Proposal]:
+def _path(
+    target: Target, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]]
+) -> list[Proposal]:
     """The best addends by their number: one more as long as that pays, and each exchanged for a better one."""
 
     def weighed(numbers: tuple[int, ...]) -> Proposal:
         log, sizes = gram.gain([k for number in (-1, *numbers) for k in of_atom[number]])
-        found = Proposal(term=term, atoms=tuple(atoms[number] for number in numbers), sizes=sizes, log=0.0)
+        found = Proposal(target=target, atoms=tuple(atoms[number] for number in numbers), sizes=sizes, log=0.0)
         return replace(found, log=log - gram.nothing + found.log_prior)
 
     best: list[tuple[Proposal, tuple[int, ...]]] = [(weighed(()), ())]

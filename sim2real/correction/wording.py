@@ -103,7 +103,13 @@ def equation(effect: LearntCorrection, reference: float) -> str:
     addends = [f"{_signed(scale * effect.offset)}{of_unit}"] if effect.offset else []
     addends += [f"{_signed(scale * part.size)}{of_unit} · {_form(part)}" for part in effect.part]
     whole = " ".join(addends)
-    return f"{effect.term} × (1 {whole})" if unit is None else f"{effect.term} {whole}"
+    what = f"{effect.term}{_place(effect)}"
+    return f"{what} × (1 {whole})" if unit is None else f"{what} {whole}"
+
+
+def _place(effect: LearntCorrection) -> str:
+    """Which pump or main a correction is of, empty for all."""
+    return f" of pump {effect.pump}" if effect.pump else f" of main {effect.main}" if effect.main else ""
 
 
 def _signed(value: float) -> str:
@@ -125,11 +131,15 @@ def sentence(effect: LearntCorrection, reference: float) -> str:
     --------
     >>> print(sentence(LearntCorrection.model_validate({"term": "flow_reading", "offset": 0.04}), 1.0)[-66:])
     than in the station file; the library has that as flow_meter_gain.
+    >>> print(sentence(LearntCorrection.model_validate({"term": "speed", "pump": 2, "offset": -0.04}), 1.0)[:44])
+    The speed of pump 2 is off by -4 %, whatever
     >>> part = {"covariate": "hour_of_day", "shape": "cosine", "size": 0.12, "centre": 5.0, "scale": 24.0}
     >>> print(sentence(LearntCorrection.model_validate({"term": "head_loss", "part": [part]}), 1.0)[:82])
     The head loss of the main swings by ±12 % with the hour of the day, highest at 05:
     """
-    what = TERMS_IN_WORDS[effect.term]
+    what, place = TERMS_IN_WORDS[effect.term], _place(effect)
+    if place:
+        what = what.removesuffix(" of the pump").removesuffix(" of the main") + place
     if not effect.part:
         said = f"{what} is off by {amount(effect.offset, effect.term, reference)}, whatever happens"
         known = EFFECT_OF_A_CONSTANT.get(effect.term)

@@ -11,11 +11,11 @@ from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import Atom, near
 from wetwell.sim2real.correction.means import Means, means_of
 from wetwell.sim2real.correction.selection import PROPOSED, Gram, Proposal, proposals
+from wetwell.sim2real.correction.target import Target, targets_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import asinh_loss
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.simulator.corrections.parts import TERMS, Term
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 
@@ -30,7 +30,7 @@ SHARES = (1.0, 0.5, 0.25, 0.125)
 WIDTHS = (1.0, 0.125)
 """How far around the best periods and times others are tried, one after the other. [1]"""
 LOOKS = 2
-"""Looks at all terms after the first, each without what the one before has shown to be far off."""
+"""Looks after the first, each without what the one before has shown to be far off."""
 BLOCKS = 6
 """Parts of time, each of which is predicted by sizes that the others give."""
 
@@ -79,47 +79,57 @@ class Workshop:
         """
         return self._residuals.of(self._replay.run([effect]))
 
-    def sensitivities(self) -> dict[Term, Floats]:
-        """(bins,) slope of the residuals over a constant correction of each term that they see."""
-        slopes = {term: self._sensitivity(term) for term in TERMS}
-        return {term: slope for term, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
+    def sensitivities(self, targets: Sequence[Target]) -> dict[Target, Floats]:
+        """(bins,) slope of the residuals over a constant correction of each target that they see."""
+        slopes = {target: self._sensitivity(target) for target in targets}
+        return {target: slope for target, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
 
-    def _sensitivity(self, term: Term) -> Floats:
+    def _sensitivity(self, target: Target) -> Floats:
         """(bins,) slope; 0 where the station does not bear more of the term."""
+        effect = LearntCorrection(term=target.term, pump=target.pump, main=target.main, offset=PROBE)
         try:
-            return (self.under(LearntCorrection(term=term, offset=PROBE)) - self.plain) / PROBE
+            return (self.under(effect) - self.plain) / PROBE
         except ValueError:
             return np.zeros(self.plain.size)
 
     def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
-        r"""The best proposal of each of the best terms, the most probable first.
+        r"""The best proposals of the best terms, of each for all pumps or mains or for the one that fits better.
 
-        Residuals far off count less: after each look they are replaced by what a fit under the loss would see,
-        $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes of them.
+        All terms are looked at first, of all pumps and mains; then the best ones, also of each pump or main; then what
+        fitted best of each. Residuals far off count less: after each look they are replaced by what a fit under the
+        loss would see, $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes of
+        them.
 
         References
         ----------
         .. [1] P. J. Huber, Robust Statistics, 1981, section 7.8: pseudo-observations.
         """
-        slopes, seen = self.sensitivities(), self.plain
+        targets = targets_of(self._replay.run().plant)
+        slopes = self.sensitivities([target for target in targets if target.is_of_all])
         if not slopes:
             return []
-        found = proposals(self._means, seen, atoms, slopes)
+        found = proposals(self._means, self.plain, atoms, slopes)
+        likely = list(dict.fromkeys(one.target.term for one in found))[:PROPOSED]
+        slopes |= self.sensitivities([one for one in targets if one.term in likely and not one.is_of_all])
+        looked = [target for target in slopes if target.term in likely]
         for _ in range(LOOKS):
-            best = found[0]
-            columns = np.column_stack([np.ones(seen.size), *(atom.columns for atom in best.atoms)])
-            after = self.plain + slopes[best.term] * (columns @ best.sizes)
-            seen = self.plain - after + self.bounded(after)
-            likely = dict.fromkeys([one.term for one in found])
-            found = proposals(self._means, seen, atoms, {term: slopes[term] for term in list(likely)[:PROPOSED]})
+            seen = self._seen(found[0], slopes[found[0].target])
+            found = proposals(self._means, seen, atoms, {target: slopes[target] for target in looked})
+            looked = [next(one.target for one in found if one.target.term == term) for term in likely]
         finer: list[Proposal] = []
-        for term in dict.fromkeys(one.term for one in found):
-            nearest = [one for one in found if one.term == term]
+        for target in looked:
+            nearest = [one for one in found if one.target == target]
             for width in WIDTHS:
                 around = [other for atom in nearest[0].atoms for other in near(atom, covariates[atom.place], width)]
-                nearest = proposals(self._means, seen, around, {term: slopes[term]})
+                nearest = proposals(self._means, seen, around, {target: slopes[target]})
             finer += nearest
         return sorted(finer, key=lambda one: -one.log)
+
+    def _seen(self, best: Proposal, slope: Floats) -> Floats:
+        """(bins,) residuals as a fit under the loss would see them, near to a proposal."""
+        columns = np.column_stack([np.ones(slope.size), *(atom.columns for atom in best.atoms)])
+        after = self.plain + slope * (columns @ best.sizes)
+        return self.plain - after + self.bounded(after)
 
     def tried(self, proposal: Proposal) -> Tried | None:
         """A proposal refined in the simulator; None where no station works with it, or none of it matters."""
@@ -139,11 +149,11 @@ class Workshop:
             return None
         return found if len(kept.atoms) == len(found.proposal.atoms) else self.tried(kept)
 
-    def of_term(self, term: Term, like: Proposal) -> Tried | None:
-        """The most probable correction of a term with the addends of another one's; None as of `tried`."""
+    def of_target(self, target: Target, like: Proposal) -> Tried | None:
+        """The most probable correction of a target with the addends of another one's; None as of `tried`."""
         columns = np.column_stack([np.ones(self.plain.size), *(atom.columns for atom in like.atoms)])
-        gram = Gram(self._means, self.bounded(self.plain), self._sensitivity(term)[:, None] * columns)
-        return self.tried(replace(like, term=term, sizes=gram.gain(range(like.sizes.size))[1]))
+        gram = Gram(self._means, self.bounded(self.plain), self._sensitivity(target)[:, None] * columns)
+        return self.tried(replace(like, target=target, sizes=gram.gain(range(like.sizes.size))[1]))
 
     def _nearest(self, proposal: Proposal, start: Floats, least: float) -> Tried | None:
         """A proposal, or what is nearer to the sizes of a start and more probable than `least`; None without any."""
@@ -227,4 +237,7 @@ def effect_of(proposal: Proposal) -> LearntCorrection:
     parts = [
         atom.part(sizes) for atom, sizes in zip(proposal.atoms, np.split(proposal.sizes, ends)[1:-1], strict=True)
     ]
-    return LearntCorrection(term=proposal.term, offset=float(proposal.sizes[0]), part=tuple(parts))
+    target, offset = proposal.target, float(proposal.sizes[0])
+    return LearntCorrection(
+        term=target.term, pump=target.pump, main=target.main, offset=offset, part=tuple(parts)
+    )

@@ -8,8 +8,11 @@ from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import dictionary
 from wetwell.sim2real.correction.means import Means
 from wetwell.sim2real.correction.selection import SIZE_PRIOR, TEMPER, Gram, proposals
+from wetwell.sim2real.correction.target import Target, targets_of
+from wetwell.simulator.parameters import plant_parameters
 
 CELLS = 240
+LOSS, SPEED = (Target(term=term, pump=0, main=0, log_prior=-2.0) for term in ("head_loss", "speed"))
 
 
 @pytest.fixture
@@ -75,11 +78,11 @@ def test_term_covariate_and_size_of_a_known_cause_are_found(means, covariates, s
     rng = np.random.default_rng([9, seed])
     atoms, left_out = dictionary(covariates, np.ones(2 * CELLS, dtype=bool))
     assert left_out == {}
-    slopes = {"head_loss": rng.normal(0.0, 60.0, 2 * CELLS), "speed": rng.normal(0.0, 60.0, 2 * CELLS)}
+    slopes = {target: rng.normal(0.0, 60.0, 2 * CELLS) for target in (LOSS, SPEED)}
     wave = 0.2 * np.cos(2.0 * np.pi * (covariates[Place("hour_of_day")] - 5.0) / 24.0)
-    residuals = rng.normal(0.0, 1.0, 2 * CELLS) - slopes["speed"] * wave
+    residuals = rng.normal(0.0, 1.0, 2 * CELLS) - slopes[SPEED] * wave
     best = proposals(means, residuals, atoms, slopes)[0]
-    assert best.term == "speed"
+    assert best.target == SPEED
     assert [atom.place for atom in best.atoms] == [Place("hour_of_day")]
     part = best.atoms[0].part(best.sizes[1:])
     assert part.size == pytest.approx(0.2, rel=0.1)
@@ -90,7 +93,7 @@ def test_term_covariate_and_size_of_a_known_cause_are_found(means, covariates, s
 def test_noise_has_no_correction(means, covariates, seed):
     rng = np.random.default_rng([10, seed])
     atoms, _ = dictionary(covariates, np.ones(2 * CELLS, dtype=bool))
-    slopes = {"head_loss": rng.normal(0.0, 60.0, 2 * CELLS), "speed": rng.normal(0.0, 60.0, 2 * CELLS)}
+    slopes = {target: rng.normal(0.0, 60.0, 2 * CELLS) for target in (LOSS, SPEED)}
     assert proposals(means, rng.normal(0.0, 1.0, 2 * CELLS), atoms, slopes)[0].log < 0.0
 
 
@@ -109,3 +112,11 @@ def test_columns_that_say_nothing_are_named_with_the_reason(covariates):
         "height": "is a copy of level_m (correlation 1.0000)",
     }
     assert {atom.place for atom in atoms} == set(covariates)
+
+
+def test_one_pump_is_as_probable_as_all_of_them(alpha):
+    targets = targets_of(plant_parameters(alpha))
+    assert sum(np.exp(target.log_prior) for target in targets) == pytest.approx(1.0)
+    speeds = {one.pump: float(np.exp(one.log_prior)) for one in targets if one.term == "speed"}
+    assert speeds == pytest.approx({0: 1.0 / 18.0, 1: 1.0 / 54.0, 2: 1.0 / 54.0, 3: 1.0 / 54.0})
+    assert [(one.pump, one.main) for one in targets if one.term == "level_balance"] == [(0, 0)]
