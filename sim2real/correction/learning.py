@@ -66,9 +66,7 @@ def _of_calendar(proposal: Proposal, atoms: Sequence[Atom]) -> Proposal | None:
 
 def _first_of_each(found: Sequence[Proposal]) -> list[list[Proposal]]:
     """Proposals of each target, in their order."""
-    return [
-        [one for one in found if one.target == target] for target in dict.fromkeys(one.target for one in found)
-    ]
+    return [[one for one in found if one.target == target] for target in dict.fromkeys(one.target for one in found)]
 
 
 def columns_of_no_use(replay: Replay, bins: Bins, given: Sequence[str]) -> list[tuple[str, str]]:

@@ -131,9 +131,7 @@ def proposals(
     return sorted(found, key=lambda one: -one.log)
 
 
-def _path(
-    target: Target, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]]
-) -> list[Proposal]:
+def _path(target: Target, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]]) -> list[Proposal]:
     """The best addends by their number: one more as long as that pays, and each exchanged for a better one."""
 
     def weighed(numbers: tuple[int, ...]) -> Proposal:

@@ -95,8 +95,8 @@ class Workshop:
     def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
         r"""The best proposals of the best terms, of each for all pumps or mains or for the one that fits better.
 
-        All terms are looked at first, of all pumps and mains; then the best ones, also of each pump or main; then what
-        fitted best of each. Residuals far off count less: after each look they are replaced by what a fit under the
+        All terms are looked at first, of all pumps and mains; then the best ones, of each pump or main, too; then
+        what fitted best of each. Residuals far off count less: after each look they are replaced by what a fit under the
         loss would see, $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes of
         them.
 
@@ -132,18 +132,28 @@ class Workshop:
         return self.plain - after + self.bounded(after)
 
     def tried(self, proposal: Proposal) -> Tried | None:
-        """A proposal refined in the simulator; None where no station works with it, or none of it matters."""
+        """A proposal refined in the simulator; None where no station works with it, or none of it matters.
+
+        Slopes hardly change with the sizes: they are looked at again where those at hand lead no further, and last.
+        """
         found = self._nearest(proposal, np.zeros(proposal.sizes.size), -np.inf)
         if found is None:
             return None
+        is_fresh = True
         for _ in range(REFINEMENTS):
             before = found.proposal
-            better = self._nearest(replace(before, sizes=self._step(self._means, found)), before.sizes, before.log)
+            step = replace(before, sizes=self._step(self._means, found))
+            better = self._nearest(step, before.sizes, before.log, found.slopes)
+            if better is None and not is_fresh:
+                found, is_fresh = self._at(before), True
+                continue
             if better is None:
                 break
-            found = better
+            found, is_fresh = better, False
             if found.proposal.log - before.log < WORTH_REFINING:
                 break
+        if not is_fresh:
+            found = self._at(found.proposal)
         kept = self._material(found)
         if not kept.atoms and not self._means.matters(found.slopes[:, 0] * found.proposal.sizes[0]):
             return None
@@ -155,12 +165,12 @@ class Workshop:
         gram = Gram(self._means, self.bounded(self.plain), self._sensitivity(target)[:, None] * columns)
         return self.tried(replace(like, target=target, sizes=gram.gain(range(like.sizes.size))[1]))
 
-    def _nearest(self, proposal: Proposal, start: Floats, least: float) -> Tried | None:
+    def _nearest(self, proposal: Proposal, start: Floats, least: float, slopes: Floats | None = None) -> Tried | None:
         """A proposal, or what is nearer to the sizes of a start and more probable than `least`; None without any."""
         for share in SHARES:
             sizes = start + share * (proposal.sizes - start)
             try:
-                tried = self._at(replace(proposal, sizes=sizes))
+                tried = self._at(replace(proposal, sizes=sizes), slopes)
             except ValueError:
                 continue
             if tried.proposal.log > least:
@@ -191,13 +201,15 @@ class Workshop:
         sizes = [whole.sizes[:1], *(whole.sizes[slice(*columns[number])] for number in kept)]
         return replace(whole, atoms=tuple(whole.atoms[number] for number in kept), sizes=np.concatenate(sizes))
 
-    def _at(self, proposal: Proposal) -> Tried:
+    def _at(self, proposal: Proposal, slopes: Floats | None = None) -> Tried:
+        """A proposal in the simulator, with slopes at its sizes or those at others."""
         residuals = self.under(effect_of(proposal))
-        slopes = np.zeros((residuals.size, proposal.sizes.size))
-        for k in range(proposal.sizes.size):
-            sizes = proposal.sizes.copy()
-            sizes[k] += PROBE
-            slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
+        if slopes is None:
+            slopes = np.zeros((residuals.size, proposal.sizes.size))
+            for k in range(proposal.sizes.size):
+                sizes = proposal.sizes.copy()
+                sizes[k] += PROBE
+                slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
         gram = Gram(self._means, self.bounded(residuals), slopes)
         log = proposal.log_prior + gram.at(proposal.sizes) - self.nothing
         return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
@@ -238,6 +250,4 @@ def effect_of(proposal: Proposal) -> LearntCorrection:
         atom.part(sizes) for atom, sizes in zip(proposal.atoms, np.split(proposal.sizes, ends)[1:-1], strict=True)
     ]
     target, offset = proposal.target, float(proposal.sizes[0])
-    return LearntCorrection(
-        term=target.term, pump=target.pump, main=target.main, offset=offset, part=tuple(parts)
-    )
+    return LearntCorrection(term=target.term, pump=target.pump, main=target.main, offset=offset, part=tuple(parts))

@@ -66,7 +66,7 @@ def test_a_slower_pump_takes_less_power_where_power_goes_with_the_load(quiet_alp
     plant, rows = effective_parameters(station), run(station)
     pump, ratio = plant.pumps[0], rows["pump1_frequency_hz"] / plant.pumps[0].nominal_frequency_hz
     flow_m3h = rows["truth_pump1_flow_m3h"]
-    steady = np.flatnonzero((np.convolve(ratio > 0.0, np.ones(61), "valid") == 61))[:50] + 60
+    steady = np.flatnonzero(np.convolve(ratio > 0.0, np.ones(61), "valid") == 61)[:50] + 60
     assert steady.size == 50
     for at in steady:
         shaft_kw = shaft_power_kw(
