@@ -96,9 +96,9 @@ class Workshop:
         r"""The best proposals of the best terms, of each for all pumps or mains or for the one that fits better.
 
         All terms are looked at first, of all pumps and mains; then the best ones, of each pump or main, too; then
-        what fitted best of each. Residuals far off count less: after each look they are replaced by what a fit under the
-        loss would see, $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes of
-        them.
+        what fitted best of each. Residuals far off count less: after each look they are replaced by what a fit under
+        the loss would see, $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes
+        of them.
 
         References
         ----------
