@@ -1,6 +1,7 @@
 """Proposals tried and refined in the simulator itself, and what they predict of times that gave no sizes."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -205,14 +206,25 @@ class Workshop:
         """A proposal in the simulator, with slopes at its sizes or those at others."""
         residuals = self.under(effect_of(proposal))
         if slopes is None:
-            slopes = np.zeros((residuals.size, proposal.sizes.size))
-            for k in range(proposal.sizes.size):
-                sizes = proposal.sizes.copy()
-                sizes[k] += PROBE
-                slopes[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / PROBE
+            slopes = self.slopes(proposal, residuals)
         gram = Gram(self._means, self.bounded(residuals), slopes)
         log = proposal.log_prior + gram.at(proposal.sizes) - self.nothing
         return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
+
+    def slopes(self, proposal: Proposal, residuals: Floats) -> Floats:
+        """(bins, columns) slopes over each size of (bins,) residuals under a proposal.
+
+        Upwards, or downwards where the station bears no more; 0 where it bears neither.
+        """
+        found = np.zeros((residuals.size, proposal.sizes.size))
+        for k in range(proposal.sizes.size):
+            for probe in (PROBE, -PROBE):
+                sizes = proposal.sizes.copy()
+                sizes[k] += probe
+                with suppress(ValueError):
+                    found[:, k] = (self.under(effect_of(replace(proposal, sizes=sizes))) - residuals) / probe
+                    break
+        return found
 
     def spoils(self, residuals: Floats) -> bool:
         """Whether (bins,) residuals leave some signal further off than it was, by more than what is material."""

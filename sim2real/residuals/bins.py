@@ -86,7 +86,7 @@ class Seconds:
     def middle(self, values: Integers) -> Integers:
         """(bins,) value of (n,) ones, all seconds of a recording, in the middle of each bin."""
         counts = self.counts.astype(np.int64)
-        return values[self.second[np.cumsum(counts) - counts + (counts - 1) // 2]]
+        return np.asarray(values[self.second[np.cumsum(counts) - counts + (counts - 1) // 2]])
 
     def bins(
         self,

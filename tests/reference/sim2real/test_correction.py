@@ -10,7 +10,9 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import write_station
 from wetwell.services.reports.gap.page import gap_page
 from wetwell.sim2real.correction.learning import learn
-from wetwell.sim2real.correction.workshop import Workshop
+from wetwell.sim2real.correction.selection import Proposal
+from wetwell.sim2real.correction.target import targets_of
+from wetwell.sim2real.correction.workshop import Workshop, effect_of
 from wetwell.sim2real.diagnosis.correction import weighed
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.sim2real.diagnosis.shrinkage import gap_of
@@ -103,6 +105,29 @@ def test_what_is_told_closes_as_much_as_is_said_of_it(vortex_m, seed):
     told = gap_of(*losses, residuals.bins, everything, np.random.default_rng(0))
     assert told.shrinkage > 0.8
     assert told.shrinkage == pytest.approx(taken.report.shrinkage, abs=0.05)
+
+
+def test_a_size_at_its_end_is_probed_the_other_way():
+    """A little more lift than this, and no pump of the station would lift it."""
+    case = truth(None, 970_941)
+    replay, residuals = residuals_of(run(case, truth=False), case.station)
+    shop = Workshop(replay, residuals)
+    target = next(one for one in targets_of(replay.run().plant) if one.term == "static_head")
+    most = max(size for size in np.arange(0.0, 2.0, 0.004) if bears(replay, float(size)))
+    last = Proposal(target=target, atoms=(), sizes=np.array([most]), log=0.0)
+    slopes = shop.slopes(last, shop.under(effect_of(last)))
+    lower = replace(last, sizes=last.sizes - 0.05)
+    assert np.any(slopes != 0.0)
+    again = shop.slopes(lower, shop.under(effect_of(lower)))
+    assert np.sum(slopes * again) > 0.5 * np.sum(again**2)
+
+
+def bears(replay, size):
+    try:
+        replay.run([LearntCorrection(term="static_head", offset=size)])
+    except ValueError:
+        return False
+    return True
 
 
 def test_residuals_far_off_are_not_alike():
