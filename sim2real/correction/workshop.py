@@ -54,6 +54,7 @@ class Workshop:
         self.plain = residuals.of(replay.run())
         self._means = means_of(residuals.bins, self.plain)
         self.nothing = Gram(self._means, self.bounded(self.plain), np.zeros((self.plain.size, 0))).nothing
+        self._sensitivities: dict[Target, Floats] = {}
 
     @property
     def bins(self) -> Bins:
@@ -86,12 +87,12 @@ class Workshop:
         return {target: slope for target, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
 
     def _sensitivity(self, target: Target) -> Floats:
-        """(bins,) slope; 0 where the station does not bear more of the term."""
-        effect = LearntCorrection(term=target.term, pump=target.pump, main=target.main, offset=PROBE)
-        try:
-            return (self.under(effect) - self.plain) / PROBE
-        except ValueError:
-            return np.zeros(self.plain.size)
+        """(bins,) slope; kept."""
+        found = self._sensitivities.get(target)
+        if found is None:
+            constant = Proposal(target=target, atoms=(), sizes=np.zeros(1), log=0.0)
+            found = self._sensitivities[target] = self.slopes(constant, self.plain)[:, 0]
+        return found
 
     def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
         r"""The best proposals of the best terms, of each for all pumps or mains or for the one that fits better.
