@@ -40,11 +40,15 @@ def correction_section(correction: Correction, diagnosis: Diagnosis) -> str:
 
 
 def _pictures(correction: Correction, diagnosis: Diagnosis) -> list[str]:
-    """Residuals without and with the correction against each covariate, of the signal that it changes most."""
-    learnt, bins = correction.learnt, diagnosis.bins
+    """Residuals without and with the correction against each covariate, of the signal that it changes most.
+
+    Of its pump, where it is of one and that pump has the signal.
+    """
+    learnt, bins, pump = correction.learnt, diagnosis.bins, correction.report.pump - 1
     gain = np.bincount(bins.signal, learnt.before**2 - learnt.after**2, len(SIGNALS))
     signal = int(np.argmax(gain))
-    rows = np.flatnonzero(bins.signal == signal)
+    is_own = (bins.signal == signal) & (bins.pump == pump)
+    rows = np.flatnonzero(is_own if is_own.any() else bins.signal == signal)
     rows = rows[:: max(rows.size // DRAWN_BINS, 1)]
     found = []
     for atom, part in {
