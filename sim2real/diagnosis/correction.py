@@ -9,7 +9,8 @@ from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.intervals import TWO_SIDED
 from wetwell.sim2real.correction.learning import Learnt
 from wetwell.sim2real.correction.wording import UNITS_OF_TERMS, equation, name_of, sentence
-from wetwell.sim2real.diagnosis.report import CorrectionAddend, CorrectionReport, EquivalentTerm, Gap
+from wetwell.sim2real.diagnosis.correction_report import CorrectionAddend, CorrectionReport, EquivalentTerm
+from wetwell.sim2real.diagnosis.report import Gap
 from wetwell.sim2real.diagnosis.shrinkage import gap_of
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.simulator.effects.station.learnt_correction import COMPONENT_OF

@@ -1,27 +1,19 @@
 """The report of a diagnosis, as programs read it: schema `wetwell.gap-report/2`."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from wetwell.protocols.recordings.origin import StoredValue
+from wetwell.sim2real.diagnosis.correction_report import CorrectionReport
+from wetwell.sim2real.diagnosis.report_part import ReportPart, Short, ShortInterval
 from wetwell.sim2real.experiments.reported import ProposedAct, RefusedAct
 from wetwell.sim2real.recording.regimes import Regime
 from wetwell.sim2real.residuals.bins import Signal
-from wetwell.simulator.corrections.parts import Term
 from wetwell.simulator.effects.effect import Component
 
-Short = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
-"""A number of six digits: nobody needs more."""
-Interval = tuple[float, float]
-ShortInterval = tuple[Short, Short]
 
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-
-
-class Where(_Part):
+class Where(ReportPart):
     """A cell of the gap: one signal in one regime.
 
     Parameters
@@ -48,7 +40,7 @@ class Where(_Part):
     share: Short
 
 
-class FittedParameter(_Part):
+class FittedParameter(ReportPart):
     """A parameter of an effect.
 
     Parameters
@@ -66,7 +58,7 @@ class FittedParameter(_Part):
     unit: str
 
 
-class FoundEffect(_Part):
+class FoundEffect(ReportPart):
     """An accepted effect.
 
     Parameters
@@ -90,7 +82,7 @@ class FoundEffect(_Part):
     parameters: dict[str, FittedParameter]
 
 
-class RankedCandidate(_Part):
+class RankedCandidate(ReportPart):
     """An effect of the library, tried alone.
 
     Parameters
@@ -111,7 +103,7 @@ class RankedCandidate(_Part):
     shrinkage_ci: ShortInterval
 
 
-class SignalGap(_Part):
+class SignalGap(ReportPart):
     """Gap of one signal, in units of the sensors' noise.
 
     Parameters
@@ -124,7 +116,7 @@ class SignalGap(_Part):
     after: Short
 
 
-class Gap(_Part):
+class Gap(ReportPart):
     """Gap on held-out cycles, in units of the sensors' noise.
 
     Parameters
@@ -149,7 +141,7 @@ class Gap(_Part):
     by_signal: dict[str, SignalGap]
 
 
-class ClosedLoop(_Part):
+class ClosedLoop(ReportPart):
     """The simulator running free under the recorded inflow.
 
     Parameters
@@ -167,7 +159,7 @@ class ClosedLoop(_Part):
     run_h_per_day: float
 
 
-class ClosedLoopComparison(_Part):
+class ClosedLoopComparison(ReportPart):
     """What the station did, and what the simulator does when it runs free.
 
     Parameters
@@ -189,7 +181,7 @@ class ClosedLoopComparison(_Part):
     after: ClosedLoop
 
 
-class DetectorVerdicts(_Part):
+class DetectorVerdicts(ReportPart):
     """Verdicts of the detector that call a fault on the recording, taken to be healthy.
 
     The detector learns its baseline, so constant effects make little difference to it.
@@ -213,7 +205,7 @@ class DetectorVerdicts(_Part):
     has_new_curves: bool
 
 
-class UntestedEffect(_Part):
+class UntestedEffect(ReportPart):
     """An effect that the recording cannot show; "none" means none of the others.
 
     Parameters
@@ -228,7 +220,7 @@ class UntestedEffect(_Part):
     reason: str
 
 
-class NoiseCheck(_Part):
+class NoiseCheck(ReportPart):
     """How large what is left of a signal in a regime is under the answer.
 
     Parameters
@@ -249,7 +241,7 @@ class NoiseCheck(_Part):
     noise_share: Short
 
 
-class AnswerProbability(_Part):
+class AnswerProbability(ReportPart):
     """Probability of one answer.
 
     Parameters
@@ -267,7 +259,7 @@ class AnswerProbability(_Part):
     probability: Short
 
 
-class DiagnosedRecording(_Part):
+class DiagnosedRecording(ReportPart):
     """One of the recordings that were diagnosed as one.
 
     Parameters
@@ -285,89 +277,7 @@ class DiagnosedRecording(_Part):
     is_by_hand: bool
 
 
-class CorrectionAddend(_Part):
-    """An addend of a correction.
-
-    Parameters
-    ----------
-    covariate : str
-        What it goes by: a covariate, a column by its name, or `offset` for one that is constant.
-    shape : str, optional
-        Name of its shape; none for an offset.
-    size : float
-        How large it is where its shape is 1.
-    ci : (float, float)
-        In which the true size lies with 95 %, if term and covariate are right.
-    unit : str
-        Of the size; "1" for a share of the term.
-    """
-
-    covariate: str
-    shape: str | None
-    size: Short
-    ci: ShortInterval
-    unit: str
-
-
-class EquivalentTerm(_Part):
-    """A correction of another term that says the same of the recording, for all that a right model may have wrong.
-
-    Parameters
-    ----------
-    term : str
-        The term that it corrects.
-    component : str
-        Where the cause lies if it is this one.
-    equation : str
-        With units.
-    """
-
-    term: Term
-    component: Component
-    equation: str
-
-
-class CorrectionReport(_Part):
-    """What is added to one term of the model where no effect of the library explains a gap.
-
-    Parameters
-    ----------
-    term : str
-        The term that is corrected.
-    pump, main : int
-        Of which pump or main, from 1; 0 for all.
-    component : str
-        Where the cause then lies.
-    covariates : list of str
-        What the correction goes by; empty for a constant.
-    equation : str
-        With units.
-    sentence : str
-        What it says, and what to look for.
-    addends : list of CorrectionAddend
-        The offset, then the others.
-    shrinkage : float
-        Share of the gap that it closes on parts of the time that its sizes do not come from. [1]
-    shrinkage_ci : (float, float)
-        In which that lies with 95 %. [1]
-    equivalent : list of EquivalentTerm
-        What the recording does not tell it from.
-    """
-
-    term: Term
-    pump: int = 0
-    main: int = 0
-    component: Component
-    covariates: tuple[str, ...]
-    equation: str
-    sentence: str
-    addends: tuple[CorrectionAddend, ...]
-    shrinkage: Short
-    shrinkage_ci: ShortInterval
-    equivalent: tuple[EquivalentTerm, ...] = ()
-
-
-class GapReport(_Part):
+class GapReport(ReportPart):
     """What `wetwell gap diagnose` writes.
 
     Parameters
@@ -430,7 +340,7 @@ class GapReport(_Part):
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
     posterior: tuple[AnswerProbability, ...] = ()
-    component_probability: dict[str, Short] = {}
+    component_probability: dict[str, Short] = Field(default_factory=dict)
     noise_check: tuple[NoiseCheck, ...] = ()
     candidates: tuple[RankedCandidate, ...]
     gap: Gap

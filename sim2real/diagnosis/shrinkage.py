@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.diagnosis.report import Gap, Interval, SignalGap
+from wetwell.sim2real.diagnosis.report import Gap, SignalGap
+from wetwell.sim2real.diagnosis.report_part import Interval
 from wetwell.sim2real.residuals.asinh_loss import squares_of
 from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.sim2real.residuals.groups import groups_of

@@ -12,7 +12,8 @@ from scipy.special import stdtrit
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.intervals import TWO_SIDED
-from wetwell.sim2real.diagnosis.report import FoundEffect, Short
+from wetwell.sim2real.diagnosis.report import FoundEffect
+from wetwell.sim2real.diagnosis.report_part import Short
 from wetwell.sim2real.likelihood.priors import Priors
 
 ADDED = 1.0

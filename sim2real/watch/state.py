@@ -6,7 +6,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from wetwell.protocols.station.station_file import EffectTable, Station
-from wetwell.sim2real.diagnosis.report import FoundEffect, Short, ShortInterval
+from wetwell.sim2real.diagnosis.report import FoundEffect
+from wetwell.sim2real.diagnosis.report_part import Short, ShortInterval
 
 MOST_LOOKS = 400
 """Looks that are kept of a station: a year, one a day."""
