@@ -337,7 +337,7 @@ def _kept() -> dict[str, Parser]:
 
 
 def _files() -> dict[str, Parser]:
-    mapping = [(EXAMPLES / name).read_bytes() for name in ("mapping.toml", "mapping-wide.toml")]
+    mapping = [(EXAMPLES / name).read_bytes() for name in ("mapping.toml", "mapping-wide.toml", "mapping-main.toml")]
     tokens = _made(lambda path: new_token(path, "ada", "viewer", 1), ".toml")
     toml = b"a = " + DEEP
     return {

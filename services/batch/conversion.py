@@ -11,6 +11,7 @@ from wetwell.protocols.quantities import pump_of
 from wetwell.protocols.recordings.importers.conversion import Conversion, convert
 from wetwell.protocols.recordings.importers.draft.draft import draft_of
 from wetwell.protocols.recordings.importers.mapping import TagMapping, load_mapping
+from wetwell.protocols.recordings.importers.signals.main_flow import HandedOut
 from wetwell.protocols.recordings.recording import write_recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
@@ -62,7 +63,7 @@ def told(done: Conversion, mapping: TagMapping, out: Path) -> dict[str, object]:
     columns = [
         {
             "column": name,
-            "tag": mapping.signal[name].tag,
+            "tag": mapping.tag_of(name),
             "values": int(np.sum(np.isfinite(values))),
             "low": _shown(np.fmin.reduce(values)),
             "high": _shown(np.fmax.reduce(values)),
@@ -82,6 +83,8 @@ def told(done: Conversion, mapping: TagMapping, out: Path) -> dict[str, object]:
         "assumed": done.assumed,
         "unreadable": done.refused,
     }
+    if done.main_flows:
+        told["rows_of_mains"] = [_of_main(name, flow) for name, flow in done.main_flows.items()]
     if done.bad_quality:
         told["left_out_for_quality"] = done.bad_quality
     if done.doubled:
@@ -92,6 +95,19 @@ def told(done: Conversion, mapping: TagMapping, out: Path) -> dict[str, object]:
         {"tag": tag, "rows": rows} if rows is not None else {"tag": tag} for tag, rows in done.unmapped.items()
     ]
     return told | {"unmapped": unmapped}
+
+
+def _of_main(name: str, flow: HandedOut) -> dict[str, object]:
+    """Whose flow the meter of a main told, in how many rows, and the highest that it read while all pumps stood."""
+    return {
+        "signal": name,
+        "pumps": ", ".join(map(str, flow.flow_m3h)),
+        "of_one": flow.one_runs,
+        "several_so_none": flow.several_run,
+        "unknown_so_none": flow.unknown,
+        "standing_so_0": flow.none_runs,
+        "up_to": _shown(flow.high_m3h),
+    }
 
 
 def _shown(value: float) -> float | None:

@@ -11,9 +11,11 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.errors import ConfigError, RecordingError
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.importers.mapping import TagMapping
 from wetwell.protocols.recordings.importers.reader import ExportReader
 from wetwell.protocols.recordings.importers.signals.events import Events
+from wetwell.protocols.recordings.importers.signals.main_flow import HandedOut, hand_out, runs_of
 from wetwell.protocols.recordings.importers.signals.rows import coincide, found_step_s, on_grid, on_union
 from wetwell.protocols.recordings.importers.tables.block import ExportFile
 from wetwell.protocols.recordings.importers.tables.opening import open_export
@@ -44,6 +46,8 @@ class Conversion:
         Rows at a stamp that their tag had already; the last one counts.
     undecided : int
         Stamps of a doubled hour that could be of the first or the second time; the first is taken.
+    main_flows : dict of signal to HandedOut
+        What became of the flow of each main.
     """
 
     recording: Recording
@@ -53,6 +57,7 @@ class Conversion:
     unmapped: dict[str, int | None]
     doubled: int
     undecided: int
+    main_flows: dict[str, HandedOut]
 
 
 def convert(paths: Sequence[Path], mapping: TagMapping, nominal_hz: Sequence[float] = ()) -> Conversion:
@@ -94,7 +99,17 @@ def convert(paths: Sequence[Path], mapping: TagMapping, nominal_hz: Sequence[flo
         time_ns, columns = _rows(events, mapping, assumed)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    ordered = {name: columns[name] for name in mapping.signal if name in columns}
+    none = np.full(time_ns.size, np.nan)
+    main_flows = {
+        main: hand_out(columns.get(main, none), runs_of(columns, pumps, time_ns.size))
+        for main, pumps in mapping.mains.items()
+    }
+    ordered: dict[str, Floats] = {}
+    for name in mapping.signal:
+        if name in main_flows:
+            ordered |= {pump_column(pump, "flow_m3h"): flow for pump, flow in main_flows[name].flow_m3h.items()}
+        elif name in columns:
+            ordered[name] = columns[name]
     return Conversion(
         recording=Recording(time_ns=time_ns, columns=ordered, station=mapping.station, value=mapping.value),
         assumed=assumed | reader.words,
@@ -103,6 +118,7 @@ def convert(paths: Sequence[Path], mapping: TagMapping, nominal_hz: Sequence[flo
         unmapped=_unmapped(files, mapping, reader),
         doubled=sum(int(np.sum(np.diff(part.time_ns) == 0)) for part in events),
         undecided=undecided,
+        main_flows=main_flows,
     )
 
 

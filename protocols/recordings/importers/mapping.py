@@ -8,8 +8,9 @@ from zoneinfo import ZoneInfo
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from wetwell.protocols.errors import ConfigError, first_fault
-from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_of
+from wetwell.protocols.quantities import PUMP_QUANTITIES, STATION_QUANTITIES, pump_column, pump_of
 from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX, covariate_of
+from wetwell.protocols.recordings.importers.signals.main_flow import RUN_QUANTITIES, is_main_flow
 from wetwell.protocols.recordings.importers.times.time_format import TimeFormat
 from wetwell.protocols.recordings.origin import StoredValue
 from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
@@ -17,6 +18,7 @@ from wetwell.protocols.station.table import Finite, Positive, Table
 from wetwell.protocols.units import factor, house_unit
 
 Text = Annotated[str, Field(min_length=1)]
+PumpNumber = Annotated[int, Field(ge=1)]
 
 
 class Columns(Table):
@@ -45,7 +47,7 @@ class Columns(Table):
 
 
 class TagSignal(Table):
-    r"""A tag of the export that is a column of the recording.
+    r"""A tag of the export that is a column of the recording, or the flow of a main, which its pumps are handed.
 
     $$value = factor(unit) \cdot scale \cdot raw + offset$$
 
@@ -71,6 +73,8 @@ class TagSignal(Table):
         Of a wide file: header of the column with the quality of this tag.
     max_age_s : float, optional
         How long a stored value holds; default: that of the mapping. [s]
+    pumps : tuple of int, optional
+        Of the flow of a main: all of its pumps, from 1; default, where there is one main: those of the mapping.
     """
 
     tag: Text
@@ -83,6 +87,7 @@ class TagSignal(Table):
     no_value: tuple[str, ...] = ()
     quality: Text | None = None
     max_age_s: Positive | None = None
+    pumps: Annotated[tuple[PumpNumber, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -123,7 +128,7 @@ class TagMapping(Table):
     columns : Columns
         Where time, tag and value stand.
     signal : dict of TagSignal
-        By the column of the recording, such as `pump1_flow_m3h`.
+        By the column of the recording, such as `pump1_flow_m3h`; `main1_flow_m3h` is the flow of a main.
     """
 
     station: Annotated[str, Field(pattern=NAME_PATTERN, max_length=64)]
@@ -193,15 +198,56 @@ class TagMapping(Table):
             raise ValueError(f"max_age_s: is for value 'held', got value '{self.value}'")
         if not any(pump_of(name) for name in self.signal):
             raise ValueError("signal: no signal of a pump such as pump1_flow_m3h")
+        self._check_mains()
         return self
+
+    def _check_mains(self) -> None:
+        known = self._pumps
+        taken: dict[int, str] = {}
+        mains = [name for name in self.signal if is_main_flow(name)]
+        for name in mains:
+            if len(mains) > 1 and self.signal[name].pumps is None:
+                raise ValueError(f"signal.{name}.pumps: missing, each of several mains needs its own")
+            for pump in self.mains[name]:
+                if pump not in known:
+                    there = ", ".join(map(str, known))
+                    raise ValueError(f"signal.{name}.pumps: got {pump}, the mapping has signals of pump {there}")
+                if pump in taken:
+                    again = "comes twice" if taken[pump] == name else f"is in {taken[pump]} already"
+                    raise ValueError(f"signal.{name}.pumps: got {pump}, which {again}")
+                taken[pump] = name
+                flow, *runs = (pump_column(pump, quantity) for quantity in ("flow_m3h", *RUN_QUANTITIES))
+                if flow in self.signal:
+                    raise ValueError(f"signal.{name}.pumps: got {pump}, which has a flow of its own, {flow}")
+                if not any(run in self.signal for run in runs):
+                    needed = " or ".join(runs)
+                    raise ValueError(f"signal.{name}.pumps: got {pump}, which needs {needed}, to tell when it runs")
+
+    @property
+    def _pumps(self) -> tuple[int, ...]:
+        """Numbers of the pumps that have a signal of their own, in order."""
+        return tuple(sorted({pump_of(name) for name in self.signal} - {0}))
+
+    @property
+    def mains(self) -> dict[str, tuple[int, ...]]:
+        """Pumps of each main that has a flow meter, by its signal."""
+        return {name: signal.pumps or self._pumps for name, signal in self.signal.items() if is_main_flow(name)}
+
+    def tag_of(self, column: str) -> str:
+        """Tag that a column of the recording comes from: that of the main, where a pump has its flow."""
+        of_main = {pump_column(pump, "flow_m3h"): main for main, pumps in self.mains.items() for pump in pumps}
+        return self.signal[of_main.get(column, column)].tag
 
 
 def _check_signal(name: str, signal: TagSignal) -> None:
-    if name not in STATION_QUANTITIES and not pump_of(name) and covariate_of(name) is None:
+    is_known = name in STATION_QUANTITIES or pump_of(name) or covariate_of(name) is not None
+    if not is_known and not is_main_flow(name):
         raise ValueError(
             f"signal.{name}: is no column of a recording, must be {', '.join(STATION_QUANTITIES)}, pump1_ and so on "
-            f"with {', '.join(PUMP_QUANTITIES)}, or {COVARIATE_PREFIX} with a name such as rain_mm_h"
+            f"with {', '.join(PUMP_QUANTITIES)}, {COVARIATE_PREFIX} with a name such as rain_mm_h, or main1_flow_m3h"
         )
+    if signal.pumps is not None and not is_main_flow(name):
+        raise ValueError(f"signal.{name}.pumps: is for main1_flow_m3h and so on")
     is_flag = name.endswith("_running")
     if signal.true and not is_flag:
         raise ValueError(f"signal.{name}.true: is for pump1_running and so on")
