@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +11,15 @@ import numpy as np
 
 from wetwell.protocols.recordings.importers.draft.look import Look, Seen, look
 from wetwell.protocols.recordings.importers.draft.stored_value import looks_like_means
-from wetwell.protocols.recordings.importers.draft.tag_names import TagGuess, number_pumps, of_loops, recognise
+from wetwell.protocols.recordings.importers.draft.tag_names import (
+    TagGuess,
+    number_pumps,
+    of_loops,
+    recognise,
+    recognise_main_flow,
+)
 from wetwell.protocols.recordings.importers.draft.unit_names import UnitGuess, unit_in, unit_of
+from wetwell.protocols.recordings.importers.signals.main_flow import RUN_QUANTITIES, is_main_flow
 from wetwell.protocols.recordings.importers.signals.scaling import RUNNING_WORDS, STANDING_WORDS
 from wetwell.protocols.recordings.importers.tables.opening import open_export
 from wetwell.protocols.units import house_unit
@@ -24,9 +31,9 @@ _PRESSURES = frozenset({"kPa", "Pa", "bar", "mbar", "psi"})
 _STEADY = 0.6
 """A tag is stored on change if fewer of its steps are the usual one, or if these cover so much less of its time than
 those of another tag. [1]"""
-_OF_RUNS = ("frequency_hz", "flow_m3h", "power_kw")
+_OF_RUNS = ("frequency_hz", "flow_m3h", "power_kw", "main1_flow_m3h")
 _MEAN_WHY = "the first row of a run mostly holds a part of the next one; of the interval that ends at the stamp"
-_ORDER = ("level_m", "inflow_m3h", "frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
+_ORDER = ("level_m", "inflow_m3h", "main1_flow_m3h", "frequency_hz", "flow_m3h", "head_m", "power_kw", "running")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,6 +85,8 @@ def draft_of(paths: Sequence[Path]) -> Draft:
     )
     for name in order:
         lines += ["", f"[signal.{name}]", *_signal_lines(name, taken[name], assumed)]
+        if is_main_flow(name):
+            lines.append(f"pumps = {list(pumps.values())}  # assumed: all; CHECK, and that it is no inflow")
     lines += ["", *(f"# not used: {_quoted(tag)}{_because(why)}" for tag, why in unmapped.items())]
     return Draft(text="\n".join(lines).rstrip("\n") + "\n", assumed=assumed, unmapped=list(unmapped))
 
@@ -93,7 +102,28 @@ def _signals(looked: Look) -> tuple[list[_Signal], dict[str, str]]:
             unmapped[tag] = f"unit {seen.unit_text}" if seen.unit_text else ""
         else:
             signals.append(_Signal(tag=tag, seen=seen, guess=guess, unit=units[tag]))
+    _add_main_flow(looked, units, signals, unmapped)
     return signals, unmapped
+
+
+def _add_main_flow(
+    looked: Look, units: Mapping[str, UnitGuess | None], signals: list[_Signal], unmapped: dict[str, str]
+) -> None:
+    """Take the one flow that names no pump for that of the main, where no pump has its own and all runs are told."""
+    pumps = number_pumps({signal.guess.pump for signal in signals if signal.guess.pump})
+    found = {tag: recognise_main_flow(tag, units[tag]) for tag in unmapped if looked.tags[tag].span is not None}
+    guesses = {tag: guess for tag, guess in found.items() if guess is not None}
+    if not pumps or not guesses or any(signal.guess.quantity == "flow_m3h" for signal in signals):
+        return
+    runs = {signal.guess.pump for signal in signals if signal.guess.quantity in RUN_QUANTITIES}
+    silent = [pump for pump in pumps if pump not in runs]
+    if len(guesses) > 1 or silent:
+        why = f"but nothing tells when pump {silent[0]} runs" if silent else f"or one of {len(guesses) - 1} more?"
+        unmapped |= dict.fromkeys(guesses, f"names no pump; main1_flow_m3h, {why}")
+        return
+    ((tag, guess),) = guesses.items()
+    del unmapped[tag]
+    signals.append(_Signal(tag=tag, seen=looked.tags[tag], guess=guess, unit=units[tag]))
 
 
 def _time_lines(looked: Look, assumed: dict[str, str]) -> list[str]:

@@ -86,6 +86,8 @@ _PUMP_WORD = r"(?:pumpe|pumppu|pump|pompe|pompa|bomba|pmp|pu|agg|p)"
 _PUMP_NUMBER = re.compile(rf"(?:^|[^a-z0-9]){_PUMP_WORD}[\s_.#:-]*(?:no|nr|n°)?[\s_.#:-]*0*(\d+(?:\.\d+)?)(?![0-9])")
 _PUMP_LATER_NUMBER = re.compile(r"(?:pump|pompe|pompa|bomba)\D*?(?<![a-z])(\d+(?:\.\d+)?)\D*$")
 
+_NO_FLOW_OF_PUMPS = ("overflow", "überlauf", "entlast", "trop-plein", "déversoir", "ylivuoto", "bypass", "airflow")
+"""Words of flows that no pump gives."""
 
 _LOOP = re.compile(r"(?:^|[^a-z0-9])([a-z]{2,3})[\s_.#:-]*0*(\d+)(?![0-9])")
 """Letters and number of a measuring loop, as in FT-101."""
@@ -98,7 +100,7 @@ class TagGuess:
     Attributes
     ----------
     quantity : str
-        `level_m`, `inflow_m3h`, or that of a pump such as `flow_m3h`.
+        `level_m`, `inflow_m3h`, `main1_flow_m3h`, or that of a pump such as `flow_m3h`.
     pump : str
         What the export calls its pump; empty for the station's own.
     why : str
@@ -120,22 +122,41 @@ def recognise(tag: str, unit: UnitGuess | None) -> TagGuess | None:
     >>> recognise("P1 Betriebsstunden", None) is None
     True
     """
+    guess = _read(tag, unit)
+    if guess.quantity in {"level_m", "inflow_m3h"}:
+        return TagGuess(quantity=guess.quantity, pump="", why=guess.why)
+    return guess if guess.quantity and guess.pump else None
+
+
+def recognise_main_flow(tag: str, unit: UnitGuess | None) -> TagGuess | None:
+    """A flow that names no pump, taken for that of the main; None for any other tag.
+
+    Examples
+    --------
+    >>> recognise_main_flow("FT-100", None)
+    TagGuess(quantity='main1_flow_m3h', pump='', why="'FT', which names no pump")
+    >>> recognise_main_flow("Overflow", None) is recognise_main_flow("P1 flow", None) is None
+    True
+    """
+    guess = _read(tag, unit)
+    if guess.quantity != "flow_m3h" or guess.pump or any(word in tag.lower() for word in _NO_FLOW_OF_PUMPS):
+        return None
+    return TagGuess(quantity="main1_flow_m3h", pump="", why=f"{guess.why}, which names no pump")
+
+
+def _read(tag: str, unit: UnitGuess | None) -> TagGuess:
+    """Quantity and pump that a name and a unit speak of, either empty where they speak of none."""
     text = re.sub(r"([a-zäöü])([A-Z])", r"\1_\2", tag).lower()
     tokens = {re.sub(r"\d+$", "", token) for token in re.split(r"[^\w]+|_", text) if token}
     others = () if unit and unit.house in _QUANTITY_OF_HOUSE else _NO_SIGNAL_OF_ITS_UNIT
     if tokens & _NO_LETTERS or any(word in text for word in (*_NO_SIGNAL, *others)):
-        return None
+        return TagGuess(quantity="", pump="", why="")
     quantity, why = _quantity(text, tokens)
     of_unit = _QUANTITY_OF_HOUSE.get(unit.house) if unit else None
     if of_unit and quantity not in {of_unit, "inflow_m3h" if of_unit == "flow_m3h" else of_unit}:
         quantity, why = of_unit, f"unit {unit.unit if unit else ''}"
     match = _PUMP_NUMBER.search(text) or _PUMP_LATER_NUMBER.search(text)
-    pump = match[1] if match else ""
-    if quantity == "head_m" and unit and not pump:
-        quantity = ""
-    if not quantity or (quantity not in {"level_m", "inflow_m3h"} and not pump):
-        return None
-    return TagGuess(quantity=quantity, pump="" if quantity in {"level_m", "inflow_m3h"} else pump, why=why)
+    return TagGuess(quantity=quantity, pump=match[1] if match else "", why=why)
 
 
 def _quantity(text: str, tokens: set[str]) -> tuple[str, str]:
