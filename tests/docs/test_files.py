@@ -24,7 +24,7 @@ MODELS: tuple[tuple[type[BaseModel], dict[str, Any]], ...] = (
     (Settings, {}),
     (Station, STATION),
     (Scenario, {"name": "fault", "duration_s": 86400.0}),
-    (TagMapping, {}),
+    (TagMapping, {"station": "north", "layout": "wide", "columns": {"time": "time"}}),
     (Preparation, {}),
     (DeviceFile, {}),
     (AccessTable, {}),
