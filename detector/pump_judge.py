@@ -132,6 +132,7 @@ class PumpJudge:
             evidence["missing"] = sorted(run.missing)
         if not len(run.segments):
             return self._without_segment(run, evidence)
+        memory.sees_flow_of_each |= bool(np.any(run.total_flow_m3h > run.flow_m3h))
         wrong = silencing_sensors(run, memory.reference)
         if wrong:
             return self._sensor_fault(run, evidence | wrong)
@@ -230,12 +231,15 @@ class PumpJudge:
         """Judge a run without a segment."""
         memory, lacking = self.memory, sorted(self.lacking(run))
         is_learnt = memory.reference is not None
-        if lacking and is_learnt:
+        is_of_all = self._has_one_meter(run, lacking)
+        if lacking and is_learnt and not is_of_all:
             return self._sensor_fault(run, evidence | {"lost": lacking})
         few = f"fewer than {run.segments.samples} steady samples"
         evidence["reason"] = _missing_reason(lacking) if lacking else few
         if lacking == ["head_m"] and self.does_without_head(run):
             evidence["reason"] = "without head_m the next runs are judged by flow, speed and the main's datasheet"
+        if is_of_all:
+            evidence["reason"] = "nobody measures the flow of each while several pumps run on one main"
         if lacking or is_learnt:
             memory.tell("unknown", run.window_ns, None)
         if lacking:
@@ -245,6 +249,14 @@ class PumpJudge:
             evidence["reason"] = hidden
             memory.tell("unknown", run.window_ns, None)
         return self._judgement(run.window_ns, {memory.state: 1.0}, evidence)
+
+    def _has_one_meter(self, run: Run, lacking: list[str]) -> bool:
+        """Whether the flow may be missing because one meter is there for all pumps of the main.
+
+        So it is where none was ever seen beside another pump. A meter that fails then is told by the next run alone.
+        """
+        is_beside = self._datasheet.main_of(self._pump).is_common_header and not run.lacked_flow_alone
+        return is_beside and lacking == ["flow_m3h"] and not self.memory.sees_flow_of_each
 
     def _hidden_by_rate(self, run: Run) -> str | None:
         """Why nothing can be learnt of a pump: a slow feed has shown no run in a day that is long enough."""

@@ -45,6 +45,8 @@ class PumpMemory:
         Fault that the last look at an open run was sure of.
     wrong_meters : dict
         Those that the last run has shown to be wrong, by name.
+    sees_flow_of_each : bool
+        Whether its flow was ever measured while another pump ran on its main.
     """
 
     learning: Learning | None = field(default_factory=Learning)
@@ -64,6 +66,7 @@ class PumpMemory:
     noises: deque[Floats] = field(default_factory=lambda: deque(maxlen=LEARNING_VALUES))
     recent: deque[tuple[int, Floats]] = field(default_factory=lambda: deque(maxlen=RECENT_RUNS))
     wrong_meters: dict[str, Meter] = field(default_factory=dict)
+    sees_flow_of_each: bool = False
 
     @property
     def offset_m(self) -> float | None:

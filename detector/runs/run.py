@@ -65,6 +65,8 @@ class Run:
         Usual step of the feed; 0 where it is not known. [s]
     lacks_head : bool
         Whether `head_m` is what the main takes by the datasheet, in place of a reading.
+    lacked_flow_alone : bool
+        Whether the flow was missing in a sample in which no other pump of the main ran.
     """
 
     pump: int
@@ -85,3 +87,4 @@ class Run:
     running: int = 0
     step_s: float = 0.0
     lacks_head: bool = False
+    lacked_flow_alone: bool = False

@@ -15,7 +15,7 @@ from wetwell.detector.statistics.rolling_f_test import RollingFTest
 from wetwell.detector.stream.block import Block
 from wetwell.detector.stream.loop import Stop, process_samples
 from wetwell.detector.stream.missing_signals import new_missing_signals
-from wetwell.detector.stream.run_state import SIGNALS, count_steady, drop_ended
+from wetwell.detector.stream.run_state import LACKED_FLOW_ALONE, SIGNALS, count_steady, drop_ended
 from wetwell.detector.stream.sampling_steps import USUAL
 from wetwell.detector.stream.state import new_state
 from wetwell.detector.stream.steady_samples import (
@@ -212,6 +212,7 @@ class RunTracker:
             running=int(self.state.missing_signals["running"][pump]),
             step_s=self._step_s,
             lacks_head=bool(self.state.lacks_head[pump]),
+            lacked_flow_alone=bool(seen >> LACKED_FLOW_ALONE & 1),
         )
 
     def _steady_samples(self) -> Records:

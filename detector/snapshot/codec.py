@@ -58,7 +58,7 @@ _FIELDS: Mapping[str, Mapping[str, str]] = {
 """Of these classes, by stored name, where the name is another now."""
 _ADDED: Mapping[str, Mapping[str, Callable[[], Any]]] = {
     "PumpBelief": {"pump_if_system": lambda: None, "asset": AssetBelief, "shown": SizeTrack},
-    "PumpRecord": {"wrong_meters": dict},
+    "PumpRecord": {"wrong_meters": dict, "sees_flow_of_each": bool},
     "SystemBelief": {"asset": AssetBelief},
 }
 """Fields that snapshots of form 2 may lack, and what makes what stands for them then."""

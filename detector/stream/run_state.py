@@ -34,6 +34,8 @@ NEEDED_BITS = sum(1 << bit for bit, name in enumerate(SIGNALS) if name in NEEDED
 """Places of the head, and of all that is needed, in the bits of the signals that a run has had."""
 LEVEL_BIT = 1 << SIGNALS.index("level_m")
 """Needed too where the main lifts to a delivery level."""
+LACKED_FLOW_ALONE = len(SIGNALS)
+"""Place behind them: the flow was missing while no other pump of the main ran."""
 BLIND_S = 60.0
 """A run that has lacked one of them for so long is reported at once."""
 WARM_UP_NS, SETTLING_NS, PART_NS, BLIND_NS = (int(s * NS_PER_S) for s in (WARM_UP_S, SETTLING_S, MAX_RUN_S, BLIND_S))
@@ -201,6 +203,15 @@ def _totals(table: Records, pumps: Any, main: int, frame: Floats) -> tuple[float
 
 
 @compiled
+def _is_alone(table: Records, pumps: Any, number: int) -> bool:
+    """Whether no other pump of the same main runs."""
+    for other in range(pumps.shape[0]):
+        if other != number and pumps[other]["is_running"] and table[other]["main"] == table[number]["main"]:
+            return False
+    return True
+
+
+@compiled
 def is_disturbed(table: Records, number: int, is_switched: Flags) -> bool:
     """Whether a pump of the same main may have started or stopped within the interval that a sample stands for."""
     for other in range(table.shape[0]):
@@ -229,6 +240,8 @@ def _collect(
     for bit, value in enumerate((frame[at + FREQUENCY], flow_m3h, head_m, frame[LEVEL], frame[at + POWER])):
         if not math.isnan(value):
             pump["seen"] |= 1 << bit
+    if math.isnan(flow_m3h) and _is_alone(table, pumps, number):
+        pump["seen"] |= 1 << LACKED_FLOW_ALONE
     speed_ratio = frame[at + FREQUENCY] / own["frequency_hz"]
     if not abs(speed_ratio - pump["speed_ratio"]) <= SPEED_STEP:
         pump["speed_ratio"] = speed_ratio

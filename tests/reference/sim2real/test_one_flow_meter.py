@@ -1,17 +1,20 @@
 """One flow meter in the main of two pumps: from the export to the flows of each, to verdicts and diagnosis."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wetwell.detector.curves.datasheet import datasheet_of
+from wetwell.detector.detector import Detector
 from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.importers.conversion import convert
 from wetwell.protocols.recordings.importers.mapping import load_mapping
 from wetwell.protocols.recordings.recording import read_recording
 from wetwell.protocols.station.station_file import load_station
-from wetwell.protocols.timestamps import to_iso
+from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -102,7 +105,25 @@ def test_the_health_of_such_a_station_is_seen(folder, recording, run_wetwell):
     others = [verdict for verdict in verdicts if verdict not in lacking]
     assert {verdict["state"] for verdict in others} <= {"learning", "unknown", "normal"}
     assert sum(verdict["state"] == "normal" for verdict in others) > 50
-    assert {verdict["asset"] for verdict in lacking} <= {None, "sensor:flow_m3h"}
+    assert lacking
+    assert {verdict["state"] for verdict in lacking} <= {"learning", "unknown"}
+    assert "nobody measures the flow of each while several pumps run on one main" in str(lacking[-1]["evidence"])
     assert run_wetwell("gap", "diagnose", "--recording", out, *station, "--out", folder / "diagnosis") == 0
     report = json.loads((folder / "diagnosis" / "report.json").read_text())
     assert report["verdict"] == "none"
+
+
+def test_such_a_meter_that_fails_is_told_by_a_run_alone(folder, recording):
+    made = convert([export(folder / "e.csv", recording)], load_mapping(folder / "instant.toml")).recording
+    failed_ns = int(made.time_ns[0]) + 18 * 3600 * NS_PER_S
+    columns = {
+        name: np.where(made.time_ns < failed_ns, values, np.nan) if name.endswith("_flow_m3h") else values
+        for name, values in made.columns.items()
+    }
+    verdicts = Detector("pair", datasheet_of(load_station(folder / "pair.toml"))).judge(
+        replace(made, columns=columns)
+    )
+    told = [verdict for verdict in verdicts if verdict.state == "sensor_fault"]
+    assert told
+    assert {verdict.asset for verdict in told} == {"sensor:flow_m3h"}
+    assert all(verdict.time > failed_ns for verdict in told)
