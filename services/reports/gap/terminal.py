@@ -51,11 +51,15 @@ def gap_lines(report: GapReport, out: Path) -> str:
         lines.append(f"  effect  {effect.name}: {values}")
         if effect.equivalent:
             lines.append(f"          not to be told from {', '.join(effect.equivalent)}")
-    if report.correction is not None:
-        lines += [f"  correction {report.correction.equation}", f"  {report.correction.sentence}"]
+    if (learnt := report.correction) is not None:
+        low, high = learnt.shrinkage_ci
+        lines += [f"  correction {learnt.equation}", f"  {learnt.sentence}"]
+        lines.append(
+            f"  it closes {learnt.shrinkage:.1%} ({low:.1%} to {high:.1%}) of the gap in times that gave no sizes"
+        )
         lines += [
             f"  not to be told from {one.equation}, which would lie in the {one.component.replace('_', ' ')}"
-            for one in report.correction.equivalent
+            for one in learnt.equivalent
         ]
     lines += [f"  ranking {c.name:28} shrinks by {c.shrinkage:.1%}" for c in report.candidates[:PRINTED_CANDIDATES]]
     if (loop := report.closed_loop) is not None:

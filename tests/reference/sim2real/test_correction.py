@@ -1,6 +1,7 @@
 """Corrections of recordings of another plant with a deviation that the library does not hold: learnt and run with."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from wetwell.protocols.station.station_file import load_station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import write_station
 from wetwell.services.reports.gap.page import gap_page
+from wetwell.services.reports.gap.terminal import gap_lines
 from wetwell.sim2real.correction.learning import learn
 from wetwell.sim2real.correction.selection import Proposal
 from wetwell.sim2real.correction.target import targets_of
@@ -65,6 +67,7 @@ def test_a_drift_that_nobody_named_gets_its_equation(diagnosis):
     assert found.equation.startswith("flow_reading × (1 ")
     assert "look for" in found.sentence
     assert found.shrinkage > 0.9
+    assert f"it closes {found.shrinkage:.1%} (" in gap_lines(report, Path("diagnosis"))
     swing = max(found.addends, key=lambda addend: abs(addend.size) * (addend.shape is not None))
     assert swing.ci[0] < swing.size < swing.ci[1]
 
