@@ -43,6 +43,10 @@ class Proposal:
         """Logarithm of its probability before anything is seen."""
         return self.target.log_prior + sum(atom.log_prior for atom in self.atoms)
 
+    def columns(self, bins: int) -> Floats:
+        """(bins, columns) what each size goes with: 1 of the offset, then the shapes of the atoms. [1]."""
+        return np.column_stack([np.ones(bins), *(atom.columns for atom in self.atoms)])
+
 
 class Gram:
     r"""Products of columns under the inverse of the covariance of the cells, and what follows for some of them.

@@ -129,8 +129,7 @@ class Workshop:
 
     def _seen(self, best: Proposal, slope: Floats) -> Floats:
         """(bins,) residuals as a fit under the loss would see them, near to a proposal."""
-        columns = np.column_stack([np.ones(slope.size), *(atom.columns for atom in best.atoms)])
-        after = self.plain + slope * (columns @ best.sizes)
+        after = self.plain + slope * (best.columns(slope.size) @ best.sizes)
         return self.plain - after + self.bounded(after)
 
     def tried(self, proposal: Proposal) -> Tried | None:
@@ -163,8 +162,8 @@ class Workshop:
 
     def of_target(self, target: Target, like: Proposal) -> Tried | None:
         """The most probable correction of a target with the addends of another one's; None as of `tried`."""
-        columns = np.column_stack([np.ones(self.plain.size), *(atom.columns for atom in like.atoms)])
-        gram = Gram(self._means, self.bounded(self.plain), self._sensitivity(target)[:, None] * columns)
+        columns = self._sensitivity(target)[:, None] * like.columns(self.plain.size)
+        gram = Gram(self._means, self.bounded(self.plain), columns)
         return self.tried(replace(like, target=target, sizes=gram.gain(range(like.sizes.size))[1]))
 
     def _nearest(self, proposal: Proposal, start: Floats, least: float, slopes: Floats | None = None) -> Tried | None:
