@@ -20,11 +20,12 @@ from wetwell.services.historian.store.interface import (
     StationSpan,
     StoreError,
     day_of,
-    maintain_one,
+    span_of,
 )
 from wetwell.services.historian.store.live.database import LiveDatabase
 from wetwell.services.historian.store.live.file import LiveFile
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
+from wetwell.services.historian.store.upkeep import Upkeep
 from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.folder_lock import folder_held
@@ -73,6 +74,7 @@ class FolderStore:
             act = "found another database than the last one"
             audit_in(folder, "history").note(now_ns(), act=act, reason=self.file.replaced)
         self.archive = Archive(folder)
+        self._upkeep = Upkeep(self, (self._roll, self._sum_up, self._downsample, self._delete_old))
         self._refused_files = 0
         self._adopt()
 
@@ -118,11 +120,17 @@ class FolderStore:
 
     def write(self, batch: Batch) -> int:
         """Keep a batch in the database."""
-        return self.live.write(batch)
+        new = self.live.write(batch)
+        self._upkeep.note(span_of(batch.samples))
+        return new
 
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
         return self.live.stations()
+
+    def station(self, name: str) -> StationSpan | None:
+        """One station; None if it is not known."""
+        return self.live.station(name)
 
     def newest_ns(self, station: str) -> int | None:
         """Where the history of a station ends; a day in a file counts as one that is believed."""
@@ -215,7 +223,7 @@ class FolderStore:
 
     def maintain(self, now_ns: int) -> str | None:
         """Turn one day into files, or one old file into minutes, or delete one that is too old."""
-        return maintain_one(self, now_ns, (self._roll, self._sum_up, self._downsample, self._delete_old))
+        return self._upkeep.one(now_ns)
 
     def scrub(self) -> Iterator[None]:
         """Look through all that is kept, a part at a time; what is damaged is put aside and told."""

@@ -1,7 +1,7 @@
 """What a store of the historian is: it keeps batches whole, and gives back what it has kept."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
@@ -87,6 +87,9 @@ class Store(Protocol):
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
 
+    def station(self, name: str) -> StationSpan | None:
+        """One station; None if it is not known."""
+
     def newest_ns(self, station: str) -> int | None:
         """Where the history of a station ends, whatever stamp may lie far ahead of it; None if it has no samples."""
 
@@ -131,18 +134,6 @@ def blocks(store: Store, station: str, start_ns: int, end_ns: int) -> Iterator[S
     """Samples from `start_ns` until before `end_ns`, day by day."""
     for day_ns in store.days_ns(station, start_ns, end_ns):
         yield store.samples(station, max(start_ns, day_ns), min(end_ns, day_ns + DAY_NS))
-
-
-def maintain_one(store: Store, now_ns: int, steps: Sequence[Callable[[str, int], str | None]]) -> str | None:
-    """Take the first step that has something to do; it gets a station and the beginning of its newest day."""
-    for span in store.stations():
-        end_ns = store.newest_ns(span.station)
-        newest_ns = day_of(min(span.last_ns if end_ns is None else end_ns, now_ns))
-        for step in steps:
-            done = step(span.station, newest_ns)
-            if done is not None:
-                return done
-    return None
 
 
 def day_of(time_ns: int) -> int:

@@ -18,13 +18,15 @@ from wetwell.services.historian.store.interface import (
     EventKind,
     StationSpan,
     day_of,
-    maintain_one,
     span_of,
 )
 from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_AT, end_of_stretch_ns
 from wetwell.services.historian.store.postgres_connection import PostgresConnection
+from wetwell.services.historian.store.upkeep import Upkeep
 from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
 from wetwell.services.runtime.postgres import Fence
+
+_SPANS: LiteralString = "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM wetwell.station"
 
 
 class PostgresStore:
@@ -64,6 +66,7 @@ class PostgresStore:
         self._keep_live_days = keep_live_days
         self._downsample_after_days = downsample_after_days
         self._keep_days = keep_days
+        self._upkeep = Upkeep(self, (self._sum_up, self._downsample, self._delete_old))
 
     @property
     def damages(self) -> int:
@@ -80,6 +83,7 @@ class PostgresStore:
 
     def write(self, batch: Batch) -> int:
         """Keep a batch in one transaction."""
+        spans = span_of(batch.samples)
         with self._connection.transaction() as database:
             names = {row.station for row in batch.samples} | {row.station for row in batch.events}
             database.cursor().executemany(
@@ -100,17 +104,21 @@ class PostgresStore:
                 "WHERE id = %(id)s",
                 [
                     {"first": first_ns, "last": last_ns, "day": day_of(first_ns), "id": ids[station]}
-                    for station, (first_ns, last_ns) in sorted(span_of(batch.samples).items())
+                    for station, (first_ns, last_ns) in sorted(spans.items())
                 ],
             )
-            return new + (events.rowcount if batch.events else 0)
+            new += events.rowcount if batch.events else 0
+        self._upkeep.note(spans)
+        return new
 
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
-        rows = self._connection.read(
-            "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM wetwell.station ORDER BY 1"
-        )
-        return [StationSpan(*row) for row in rows]
+        return [StationSpan(*row) for row in self._connection.read(f"{_SPANS} ORDER BY 1")]
+
+    def station(self, name: str) -> StationSpan | None:
+        """One station; None if it is not known."""
+        rows = self._connection.read(f"{_SPANS} WHERE name = %s", (name,))
+        return StationSpan(*rows[0]) if rows else None
 
     def newest_ns(self, station: str) -> int | None:
         """Where the history of a station ends; what has become minutes is believed."""
@@ -222,7 +230,7 @@ class PostgresStore:
 
     def maintain(self, now_ns: int) -> str | None:
         """Sum up one complete day, or turn one old day into minutes, or delete what is too old."""
-        return maintain_one(self, now_ns, (self._sum_up, self._downsample, self._delete_old))
+        return self._upkeep.one(now_ns)
 
     def scrub(self) -> Iterator[None]:
         """Nothing: pages are checked by the database."""

@@ -112,6 +112,8 @@ def test_a_day_that_cannot_be_summed_up_is_put_aside_and_holds_nothing_up(tmp_pa
             store.archive.delete("tens", "a", day_ns)
         path = store.archive.path("samples", "a", first)
         path.write_bytes(path.read_bytes()[:-200])
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        historian = Historian(store)
         while historian.maintain(NOW_NS):
             pass
         assert "failed_maintenance" not in historian.figures(NOW_NS)
