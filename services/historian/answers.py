@@ -31,17 +31,17 @@ def answer(store: Store, station: str, payload: bytes) -> History:
 
 
 def _answer(store: Store, station: str, query: HistoryQuery) -> History:
-    spans = {span.station: span for span in store.stations()}
     if query.kind == "stations" and station == SITE:
         return History(
-            station=SITE, kind="stations", messages=tuple(_of_station(store, each) for each in spans.values())
+            station=SITE, kind="stations", messages=tuple(_of_station(store, each) for each in store.stations())
         )
-    if station not in spans:
+    span = store.station(station)
+    if span is None:
         return History(station=station, kind=query.kind, error=f"station '{station}' is not known")
     if query.kind == "stations":
-        return History(station=station, kind="stations", messages=(_of_station(store, spans[station]),))
+        return History(station=station, kind="stations", messages=(_of_station(store, span),))
     if query.kind in ("samples", "kpi"):
-        return _of_span(store, spans[station], query)
+        return _of_span(store, span, query)
     return History(station=station, kind=query.kind, messages=_messages(store, station, query))
 
 

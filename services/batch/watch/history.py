@@ -44,7 +44,7 @@ def watch_history(
     ConfigError
         If nothing was kept of the station, or the folder cannot be used.
     """
-    span = next((one for one in store.stations() if one.station == station.name), None)
+    span = store.station(station.name)
     newest_ns = store.newest_ns(station.name)
     if span is None or newest_ns is None:
         raise ConfigError(f"station '{station.name}': the history has no samples")
