@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import gc
+import itertools
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.folder_lock import folder_held
-from wetwell.services.runtime.lifecycle import report_health, run_until_stopped, ticks
+from wetwell.services.runtime.lifecycle import report_health_in_turn, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.audit import audit_in
 
@@ -35,6 +36,8 @@ AGES_KEPT = 2.0
 """A member that stands by keeps the samples of so many checkpoint periods: one may be late by a whole one."""
 LEAST_FOLLOWED_S = 30.0
 """And of so much longer: from a state that was taken until it is written, and until the lease is over. [s]"""
+KEPT_TURN_S = 0.25
+"""States of many stations are saved in turns of this length: what wakes a process costs more than what it does. [s]"""
 
 
 async def serve_detector(settings: Settings, stations: Sequence[Station]) -> None:
@@ -138,13 +141,10 @@ async def judge_all(
         stack.callback(gc.unfreeze)
         log.info("%d stations: waiting for samples", len(judges))
         group.create_task(intake.run(), name=f"{name}.intake")
-        period_s = settings.health.period_s
-        for number, judge in enumerate(judges):
-            figures, lead_s = partial(_figures, judge, intake), period_s * number / len(judges)
-            group.create_task(
-                report_health(bus, judge.station, "detector", period_s, figures, lead_s=lead_s),
-                name=f"{name}.{judge.station}.health",
-            )
+        figures = {judge.station: partial(_figures, judge, intake) for judge in judges}
+        group.create_task(
+            report_health_in_turn(bus, "detector", settings.health.period_s, figures), name=f"{name}.health"
+        )
         group.create_task(keep_in_turn(judges, intake, kept.checkpoint_s), name=f"{name}.checkpoint")
 
 
@@ -163,18 +163,20 @@ def _figures(judge: StationDetector, intake: Intake) -> dict[str, float]:
 
 
 async def keep_in_turn(judges: Sequence[StationDetector], intake: Intake, period_s: float) -> None:
-    """Save each detector once a period, one after the other, so that no second bears all of them.
+    """Save each detector once a period, some in each turn, so that no second bears all of them.
 
     The oldest state comes first, and at once: where processes live shortly, one after another, each station has its
     turn. One that has yet to take what it has missed comes when it has, as its state is the one that is kept already.
     """
     turns = sorted(judges, key=lambda judge: judge.detector.seen_until_ns)
+    in_a_turn = max(1, int(len(turns) * KEPT_TURN_S / period_s))
     while turns:
-        ready = next((judge for judge in turns if not intake.is_behind(judge)), None)
-        if ready is None:
+        ready = list(itertools.islice((judge for judge in turns if not intake.is_behind(judge)), in_a_turn))
+        if not ready:
             await asyncio.sleep(LOOK_AGAIN_S)
             continue
-        turns.remove(ready)
-        turns.append(ready)
-        await ready.keep_aside()
-        await asyncio.sleep(period_s / len(turns))
+        for judge in ready:
+            turns.remove(judge)
+            turns.append(judge)
+            await judge.keep_aside()
+        await asyncio.sleep(period_s * len(ready) / len(turns))

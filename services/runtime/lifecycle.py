@@ -2,11 +2,12 @@
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from typing import Any
 
 from wetwell.protocols.bus.interface import Bus
@@ -18,6 +19,8 @@ from wetwell.services.systemd.notify import watched_by_systemd
 
 log = logging.getLogger(__name__)
 
+TURN_S = 0.1
+"""Many stations tell their health in turns of this length: what wakes a process costs more than what it does. [s]"""
 PARENT_VARIABLE = "WETWELL_STOP_WITH_PARENT"
 """Set for the children of a supervisor: they stop when their standard input ends, even if it was killed."""
 
@@ -54,13 +57,10 @@ async def stop_event() -> AsyncIterator[asyncio.Event]:
             loop.remove_reader(sys.stdin.fileno())
 
 
-async def ticks(period_s: float, lead_s: float = 0.0) -> AsyncIterator[float]:
-    """Yield the time since the start, in s, on each multiple of the period for ever; late ticks are skipped.
-
-    With a lead the start was so long ago: many that begin together tick apart from their second tick on.
-    """
+async def ticks(period_s: float) -> AsyncIterator[float]:
+    """Yield the time since the start, in s, on each multiple of the period for ever; late ticks are skipped."""
     loop = asyncio.get_running_loop()
-    start, n = loop.time() - lead_s, 0
+    start, n = loop.time(), 0
     while True:
         yield loop.time() - start
         n = max(n + 1, int((loop.time() - start) // period_s) + 1)
@@ -97,13 +97,48 @@ async def report_health(
     period_s: float,
     figures: Callable[[], dict[str, float]],
     condition: Callable[[], tuple[ServiceState, str]] = _running,
-    lead_s: float = 0.0,
     news: asyncio.Event | None = None,
 ) -> None:
     """Show that a service lives; publish its figures, its state and the reason for ever, also for `/metrics`.
 
     That is once a period, and at once where `news` is set.
     """
+    tell = _teller(bus, station, service, period_s, figures, condition)
+    async with asyncio.TaskGroup() as group:
+        if news is not None:
+            group.create_task(_at_news(news, tell), name=f"{service}.news")
+        async for _ in ticks(period_s):
+            tell()
+
+
+async def report_health_in_turn(
+    bus: Bus, service: str, period_s: float, figures: Mapping[str, Callable[[], dict[str, float]]]
+) -> None:
+    """Do as `report_health` for a service of many stations: of all at once, and then of some in each turn.
+
+    Parameters
+    ----------
+    figures : mapping of str to callable
+        Of each station.
+    """
+    tellers = [_teller(bus, station, service, period_s, each) for station, each in figures.items()]
+    turns = max(1, min(len(tellers), int(period_s / TURN_S)))
+    due, turn = tellers, itertools.cycle(range(turns))
+    async for _ in ticks(period_s / turns):
+        for tell in due:
+            tell()
+        due = tellers[next(turn) :: turns]
+
+
+def _teller(
+    bus: Bus,
+    station: str,
+    service: str,
+    period_s: float,
+    figures: Callable[[], dict[str, float]],
+    condition: Callable[[], tuple[ServiceState, str]] = _running,
+) -> Callable[[], None]:
+    """What tells the figures of a service once; its presence is announced."""
     bus.announce(alive_key(station, service))
     publisher = bus.publisher(status_key(station, service))
 
@@ -115,11 +150,7 @@ async def report_health(
         BOARD.report(station, service, period_s, status.figures)
         publisher.put(status.encode())
 
-    async with asyncio.TaskGroup() as group:
-        if news is not None:
-            group.create_task(_at_news(news, tell), name=f"{service}.news")
-        async for _ in ticks(period_s, lead_s):
-            tell()
+    return tell
 
 
 async def _at_news(news: asyncio.Event, tell: Callable[[], None]) -> None:
