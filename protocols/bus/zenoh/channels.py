@@ -10,12 +10,17 @@ TURN = 5_000
 """Messages that are taken from one channel before the others have their turn."""
 EARLY = 0.8
 """Share of the rhythm of a channel for which it is left alone after a message that was in time."""
+EARLY_S = 0.2
+"""Of a slow rhythm all but the last so many seconds. [s]"""
 SLOWER = 1.1
 """A rhythm is the shortest of the last pauses; it may become slower by this factor with each message."""
 LONGEST_REST_S = 0.8
-"""It is never left alone for longer: Zenoh's threads wait where a channel is full. [s]"""
+"""It is never left alone for longer at a time: Zenoh's threads wait where a channel is full. [s]"""
+SLOWEST_S = 60.0
+"""Messages that are further apart have no rhythm. [s]"""
 QUIET_S = 5.0
-"""A channel without a message for so long is looked into now and then only. [s]"""
+"""A channel without a message for so long, and for so many of its rhythms, is looked into now and then only. [s]"""
+QUIET_RHYTHMS = 1.5
 QUIET_REST_S = 0.25
 STIRRED_S = 2.0
 """After one that was silent has spoken the others are looked into each time for so long: where a link is back or a
@@ -33,35 +38,39 @@ Receive = Callable[[], zenoh.Sample | None]
 class Channel:
     """A channel that Zenoh's threads fill, and the rhythm of what comes."""
 
-    __slots__ = ("count", "heard_s", "receive", "rhythm_s")
+    __slots__ = ("count", "due_s", "heard_s", "quiet_s", "receive", "rhythm_s")
 
     def __init__(self, receive: Receive) -> None:
         self.receive = receive
         self.heard_s = float("-inf")
         self.rhythm_s = float("inf")
         self.count = 0
+        self.due_s = float("-inf")
+        self.quiet_s = float("-inf")
 
-    def rest_s(self, now_s: float) -> float:
-        """Time in s for which nothing is to be expected of it, after the `count` messages that have just been taken.
+    def heed(self, now_s: float) -> None:
+        """Learn from the `count` messages that have just been taken when the next is due, and until when to wait.
 
         By so much as the last one was late the next one comes sooner.
         """
         silent_s, count = now_s - self.heard_s, self.count
         self.heard_s, self.count = now_s, 0
-        if silent_s > count * QUIET_S:
-            return 0.0
         pause_s = silent_s / count
+        if pause_s > SLOWEST_S:
+            self.due_s, self.quiet_s = now_s, now_s + QUIET_S
+            return
         usual_s, self.rhythm_s = min(pause_s, self.rhythm_s), min(pause_s, SLOWER * self.rhythm_s)
         late_s = silent_s - count * usual_s
-        return max(min(EARLY * usual_s, LONGEST_REST_S) - late_s, 0.0)
+        self.due_s = now_s + max(EARLY * usual_s, usual_s - EARLY_S) - late_s
+        self.quiet_s = now_s + max(QUIET_S, QUIET_RHYTHMS * self.rhythm_s)
 
 
 class Channels:
     """Channels of a subscription.
 
     A look into an empty channel costs .25 µs: with a thousand of them two hundred times a second a twentieth of a
-    core. Stations have a rhythm: after a message its channel rests until shortly before the next one is due. What
-    comes earlier waits until then, by .8 of the rhythm or .8 s at most.
+    core. Stations have a rhythm: after a message its channel rests until shortly before the next one is due, with a
+    look each .8 s. What comes earlier waits until then, by .8 of the rhythm or .8 s at most.
 
     Parameters
     ----------
@@ -101,12 +110,13 @@ class Channels:
 
     def _rest(self, channel: Channel, now_s: float) -> bool:
         """Let a channel rest if it may; whether it does."""
-        is_quiet = now_s - channel.heard_s > QUIET_S
         if channel.count:
-            if is_quiet and now_s - self._stirred_s > CALM_S:
+            if now_s > channel.quiet_s and now_s - self._stirred_s > CALM_S:
                 self._stir(now_s)
-            rest_s = channel.rest_s(now_s)
-        elif is_quiet and now_s - self._stirred_s > STIRRED_S:
+            channel.heed(now_s)
+        if now_s < channel.due_s:
+            rest_s = min(channel.due_s - now_s, LONGEST_REST_S)
+        elif now_s > channel.quiet_s and now_s - self._stirred_s > STIRRED_S:
             rest_s = QUIET_REST_S
         else:
             return False

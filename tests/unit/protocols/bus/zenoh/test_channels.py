@@ -7,6 +7,7 @@ import pytest
 
 from wetwell.protocols.bus.zenoh.channels import (
     EARLY,
+    EARLY_S,
     FEW,
     LONGEST_REST_S,
     QUIET_REST_S,
@@ -68,6 +69,21 @@ def test_a_feed_with_a_rhythm_is_heard_in_time_with_few_looks(feeds, pause_s):
     assert feeds[0].looks < 2 * ticks * TICK_S / QUIET_REST_S + STIRRED_S / TICK_S
     if pause_s == 1.0:
         assert feeds[-1].looks < (1.0 - EARLY + 0.25) * ticks
+
+
+@pytest.mark.parametrize("pause_s", [10.0, 30.0])
+def test_a_feed_of_gathered_samples_is_heard_in_time_and_wakes_nobody(feeds, pause_s):
+    channels = Channels([feed.receive for feed in feeds], has_rhythm=True)
+    arrivals_s = [pause_s * number for number in range(1, 11)]
+    taken = played(feeds, channels, arrivals_s, 10 * pause_s + 1.0)
+    assert [number for _, number, _ in taken] == list(range(10))
+    waited_s = [now_s - arrival_s for arrival_s, _, now_s in taken]
+    assert max(waited_s[:2]) <= QUIET_REST_S + TICK_S
+    assert max(waited_s[2:]) <= TICK_S + 1e-9
+    once_awake = (STIRRED_S + QUIET_S) / TICK_S
+    each_time = (EARLY_S + SLOT_S) / TICK_S + pause_s / LONGEST_REST_S
+    assert feeds[-1].looks < 2 * once_awake + 10 * each_time
+    assert feeds[0].looks < once_awake + 10 * pause_s / QUIET_REST_S
 
 
 @pytest.mark.parametrize("late_s", [0.1, 0.4, 0.9])
