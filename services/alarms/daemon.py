@@ -162,7 +162,7 @@ async def _feed(subscription: Subscription[T], handle: Callable[[T], None], serv
     while True:
         for message in await subscription.receive():
             handle(message)
-        service.commit()
+        service.commit_in_time()
         await asyncio.sleep(0)  # let acts in between batches
 
 

@@ -43,6 +43,9 @@ SOURCES = frozenset({"gateway", "simulator"})
 MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
 
+SAVING_SHARE = 0.1
+"""Of the time for which the state is being written at the most, but for a look and for acts: it is written whole."""
+
 
 _MODES: Mapping[str, Mode | None] = {"maintenance": "maintenance", "stop": "stopped", "resume": None}
 
@@ -83,6 +86,7 @@ class AlarmService:
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._counts: Counter[str] = Counter()
         self._lost_s: float | None = None
+        self._rests_until_s = float("-inf")
         kept = kept or Kept(site_in(settings.state_dir), audit_in(settings.state_dir, "alarm"))
         self._audit, self._file = kept.audit, kept.site
         self._no_limits = limits_of(settings, None)
@@ -230,6 +234,11 @@ class AlarmService:
             log.info("station '%s': alarm %s is %s: %s", alarm.station, alarm.id, alarm.state, alarm.text)
             self._publish(alarm)
 
+    def commit_in_time(self) -> None:
+        """As `commit`; where the last one took long, with the next one or the next look."""
+        if self._now().steady_s >= self._rests_until_s:
+            self.commit()
+
     def publish_all(self) -> None:
         """Publish every alarm as it stands, after a restart."""
         for alarm in self.registry.alarms():
@@ -237,6 +246,7 @@ class AlarmService:
 
     def save(self) -> None:
         """Write the state to disk."""
+        begun_s = self._now().steady_s
         stations = {
             name: StationState(
                 time_ns=watch.time_ns,
@@ -249,6 +259,8 @@ class AlarmService:
             for name, watch in self.stations.items()
         }
         self._file.save(SiteState(book=self.registry.state(), stations=stations))
+        ended_s = self._now().steady_s
+        self._rests_until_s = ended_s + (ended_s - begun_s) / SAVING_SHARE
 
     def report(self) -> AlarmReport:
         """Rates, chattering and stale alarms."""
