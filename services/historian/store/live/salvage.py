@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from wetwell.services.historian.rows import HOUR_NS
+from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.store.live.connection import UNREADABLE, connect
 from wetwell.services.historian.store.live.end import End, read_end
 from wetwell.services.historian.store.live.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
@@ -22,7 +22,9 @@ CHECKED_VERSION = 3
 COUNTED_VERSION = 4
 """The first one that knows how many rows it has."""
 MOST_SKIPPED = 10_000
-"""Hours, or hundreds of messages, that are looked for behind the last row that could be read."""
+"""Hundreds of messages that are looked for before the last one."""
+MOST_TRIED = 20_000
+"""Spans of a station, or of a hundred messages, that are read by themselves where some rows cannot be read."""
 
 
 def damage_of(path: Path) -> list[str]:
@@ -112,7 +114,7 @@ def _all_samples(database: sqlite3.Connection, stations: Iterable[int]) -> Itera
 
 
 def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
-    """Rows of a station from both ends, and between them hour by hour."""
+    """Rows of a station from both ends, and what lies between them in parts."""
     query = f"SELECT {_SAMPLE} FROM sample WHERE station = ? ORDER BY time_ns"  # noqa: S608 - names of above
     first, is_whole = _read(database, query, (station,))
     yield from first
@@ -122,21 +124,48 @@ def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
     yield from last
     begin_ns, end_ns = (next((row[1] for row in reversed(rows) if _is_sample(row)), None) for rows in (first, last))
     if begin_ns is not None and end_ns is not None:
-        between = f"SELECT {_SAMPLE} FROM sample WHERE station = ? AND time_ns >= ? AND time_ns < ?"  # noqa: S608
-        for hour_ns in range(begin_ns, min(end_ns, begin_ns + MOST_SKIPPED * HOUR_NS), HOUR_NS):
-            yield from _readable(database, between, (station, hour_ns, hour_ns + HOUR_NS))
+        between = f"SELECT {_SAMPLE} FROM sample WHERE station = ? AND time_ns >= ? AND time_ns < ? ORDER BY time_ns"  # noqa: S608
+        yield from _in_parts(database, between, (station,), (begin_ns, end_ns), NS_PER_S)
 
 
 def _events(database: sqlite3.Connection) -> Iterator[Row]:
     """Messages, a hundred after the other."""
     ends = _readable(database, "SELECT max(id) FROM event")
     most = ends[0][0] if ends and isinstance(ends[0][0], int) else 0
+    query = "SELECT kind, station, time_ns, digest, payload, crc FROM event WHERE id > ? AND id <= ? ORDER BY id"
     for begin in range(max(0, most - 100 * MOST_SKIPPED), most + 1, 100):
-        yield from _readable(
-            database,
-            "SELECT kind, station, time_ns, digest, payload, crc FROM event WHERE id > ? AND id <= ?",
-            (begin, begin + 100),
-        )
+        yield from _in_parts(database, query, (), (begin, begin + 100), 1)
+
+
+def _in_parts(
+    database: sqlite3.Connection, query: str, values: Row, span: tuple[int, int], shortest: int
+) -> Iterator[Row]:
+    """Rows of a span of numbers, some of them twice: where one cannot be read, from both ends, and of each half.
+
+    Parameters
+    ----------
+    database : sqlite3.Connection
+    query : str
+        In order of the number; its last two values are the span.
+    values : tuple
+        The others.
+    span : (int, int)
+    shortest : int
+        A span that is not halved any more.
+    """
+    left = [span]
+    for _ in range(MOST_TRIED):
+        if not left:
+            return
+        begin, end = left.pop()
+        rows, is_whole = _read(database, query, (*values, begin, end))
+        yield from rows
+        if is_whole:
+            continue
+        yield from _readable(database, f"{query} DESC", (*values, begin, end))
+        if end - begin > shortest:
+            middle = (begin + end) // 2
+            left += [(middle, end), (begin, middle)]
 
 
 def _readable(database: sqlite3.Connection, query: str, values: Row = ()) -> list[Row]:

@@ -15,6 +15,8 @@ from wetwell.services.historian.store.interface import Batch, EventRow, StoreErr
 from wetwell.services.historian.store.live.salvage import damage_of
 
 PAGE = 4096
+ROWS_OF_A_PAGE = 60
+"""Of samples that came alone, at the most."""
 SECTOR = 512
 STATIONS = ("alpha", "beta")
 TIMES = 3_000
@@ -118,17 +120,19 @@ def test_what_is_left_is_what_was_written_and_new_samples_are_kept(content, tmp_
             assert "live.sqlite" in caplog.text
 
 
-def test_a_page_that_cannot_be_read_costs_its_own_rows_only(content, tmp_path):
+@pytest.mark.parametrize("apart", [[0], [0, 100, 200], [0, 150, 300, 1_000]])
+def test_pages_that_cannot_be_read_cost_their_own_rows_only(content, tmp_path, apart):
     changed = bytearray(content)
-    middle = changed.index(sample("alpha", 1_500).time.to_bytes(6, "big")) // PAGE * PAGE
-    changed[middle : middle + PAGE] = bytes(PAGE)
+    for number in apart:
+        page = content.index(sample("alpha", 1_500 + number).time.to_bytes(6, "big")) // PAGE * PAGE
+        changed[page : page + PAGE] = bytes(PAGE)
     (tmp_path / "live.sqlite").write_bytes(changed)
     with contextlib.closing(FolderStore(tmp_path)) as store:
         with pytest.raises(StoreError, match="malformed"):
             store.samples("alpha", 0, 2**62)
         store.write(Batch())
         kept = store.samples("alpha", 0, 2**62)
-        assert TIMES - 360 - 60 < len(kept) < TIMES
+        assert TIMES - ROWS_OF_A_PAGE * len(apart) <= len(kept) < TIMES
         assert store.damages == 1
         assert (tmp_path / "live.sqlite.refused-1").exists()
 
@@ -147,7 +151,7 @@ def test_a_row_without_a_time_beside_a_page_that_cannot_be_read_costs_no_other_r
         with pytest.raises(StoreError, match="malformed"):
             store.samples("alpha", 0, 2**62)
         store.write(Batch())
-        assert TIMES - 360 - 60 < len(store.samples("alpha", 0, 2**62)) < TIMES
+        assert TIMES - ROWS_OF_A_PAGE - 1 <= len(store.samples("alpha", 0, 2**62)) < TIMES
 
 
 @pytest.mark.parametrize("place", [payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data])
