@@ -37,7 +37,7 @@ AGES_KEPT = 2.0
 LEAST_FOLLOWED_S = 30.0
 """And of so much longer: from a state that was taken until it is written, and until the lease is over. [s]"""
 KEPT_TURN_S = 0.25
-"""States of many stations are saved in turns of this length: what wakes a process costs more than what it does. [s]"""
+"""States of many stations are saved in turns of this length: to wake a process costs more than what it does. [s]"""
 
 
 async def serve_detector(settings: Settings, stations: Sequence[Station]) -> None:

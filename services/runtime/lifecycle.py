@@ -20,7 +20,7 @@ from wetwell.services.systemd.notify import watched_by_systemd
 log = logging.getLogger(__name__)
 
 TURN_S = 0.1
-"""Many stations tell their health in turns of this length: what wakes a process costs more than what it does. [s]"""
+"""Many stations tell their health in turns of this length: to wake a process costs more than what it does. [s]"""
 PARENT_VARIABLE = "WETWELL_STOP_WITH_PARENT"
 """Set for the children of a supervisor: they stop when their standard input ends, even if it was killed."""
 
