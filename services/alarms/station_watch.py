@@ -52,16 +52,20 @@ class PumpVerdicts:
     times_ns: list[int] = field(default_factory=list)
     older: int = 0
 
-    def is_news(self, time_ns: int, *, is_start: bool) -> bool:
+    def is_news(self, time_ns: int, *, is_start: bool, clock_ns: int | None) -> bool:
         """Whether a verdict of this time is to be taken: not one that was, nor one that came too late.
 
-        At the start (`is_start`) older ones come from the caches of their publishers.
+        At the start (`is_start`) older ones come from the caches of their publishers. Later a detector that went on
+        from an older state tells them again; only where the clock of the station, that of its last sample, was set
+        back behind the last verdict do some older ones in a row begin a new time.
         """
         if time_ns in self.times_ns:
             return False
         if self.times_ns and time_ns < self.times_ns[-1]:
             if is_start:
                 self.times_ns = [time_ns, *self.times_ns][-KNOWN_VERDICTS:]
+                return False
+            if clock_ns is not None and clock_ns >= self.times_ns[-1]:
                 return False
             self.older += 1
             if self.older < FOLLOW_VERDICTS:
@@ -138,7 +142,8 @@ class StationWatch:
         all as it is.
         """
         is_start = now.steady_s - self.start_s < START_S
-        if not self.verdicts.setdefault(verdict.pump, PumpVerdicts()).is_news(verdict.time, is_start=is_start):
+        known = self.verdicts.setdefault(verdict.pump, PumpVerdicts())
+        if not known.is_news(verdict.time, is_start=is_start, clock_ns=self.time_ns):
             return False
         faults = verdict.standing()
         if faults is None:
