@@ -37,7 +37,7 @@ _SIZE = operator.attrgetter("size")
 _SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
 """Size, station, time, `seq` of a `SampleRow`: inserting rows of a page together takes half the time."""
 
-_SPANS = "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM station"
+_STATION_SPANS = "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM station"
 _OF_STATION = "FROM sample WHERE station = (SELECT id FROM station WHERE name = :station) "
 _LAST = "coalesce(last_ns, time_ns)"
 _TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
@@ -118,12 +118,12 @@ class LiveDatabase:
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
         with self._file.reading() as database:
-            return [StationSpan(*row) for row in database.execute(f"{_SPANS} ORDER BY 1")]
+            return [StationSpan(*row) for row in database.execute(f"{_STATION_SPANS} ORDER BY 1")]
 
     def station(self, name: str) -> StationSpan | None:
         """One station; None if it is not known."""
         with self._file.reading() as database:
-            row = database.execute(f"{_SPANS} WHERE name = ?", (name,)).fetchone()
+            row = database.execute(f"{_STATION_SPANS} WHERE name = ?", (name,)).fetchone()
             return None if row is None else StationSpan(*row)
 
     def samples(self, station: str, start_ns: int, end_ns: int) -> Samples:
