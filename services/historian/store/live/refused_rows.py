@@ -31,6 +31,7 @@ class RefusedRows:
         self._path = path
         self._lock = threading.Lock()
         self._found: dict[tuple[Table, tuple[int, ...]], None] = {}
+        self._not_there: set[tuple[Table, tuple[int, ...]]] = set()
 
     def note(self, table: Table, *key: int) -> None:
         """Know a row by the key of its table, and tell it."""
@@ -40,12 +41,24 @@ class RefusedRows:
         if is_new:
             log.error("%s: a row of table %s is not what was written, and left out", self._path, table)
 
-    def put_aside(self, database: sqlite3.Connection) -> int:
-        """Move what was found into the table of refused rows, in a transaction of the caller; how many."""
+    def put_aside(self, database: sqlite3.Connection) -> tuple[int, bool]:
+        """Move what was found into the table of refused rows, in a transaction of the caller.
+
+        Returns
+        -------
+        count, is_damaged : int, bool
+            How many rows; and whether one is read again and again that is not where its key says: then the order of
+            the file is damaged.
+        """
         with self._lock:
             found, self._found = self._found, {}
+        count, is_damaged = 0, False
         for table, key in found:
             row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
             database.execute(f"INSERT INTO refused SELECT ?, ?, {content} {row}", (table, str(key), *key))
-            database.execute(f"DELETE {row}", key)
-        return len(found)
+            deleted = database.execute(f"DELETE {row}", key).rowcount
+            count += deleted
+            if not deleted:
+                is_damaged = is_damaged or (table, key) in self._not_there
+                self._not_there.add((table, key))
+        return count, is_damaged

@@ -181,6 +181,29 @@ def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
         assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
 
 
+def test_a_row_that_is_not_where_its_time_says_is_put_aside_in_the_end(content, tmp_path):
+    written, changed = sample("alpha", 1_500).time.to_bytes(6, "big"), (205 * NS_PER_S).to_bytes(6, "big")
+    place = content.index(written)
+    (tmp_path / "live.sqlite").write_bytes(content[:place] + changed + content[place + 6 :])
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        told = [store.live.put_aside_damaged("alpha", 0, 2**62) for _ in range(5)]
+        assert told[-1] == 0
+        store.write(Batch())
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == [one for one in range(TIMES) if one != 1_500]
+        assert store.damages > 0
+        assert damage_of(tmp_path / "live.sqlite") == []
+
+
+def test_a_row_that_was_put_aside_meanwhile_is_no_damage_of_the_file(content, tmp_path):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.file.refused.note("sample", 1, 5, 5)
+        store.write(Batch())
+        assert store.damages == 0
+        assert not store.file.is_damaged
+
+
 def test_a_row_whose_station_was_changed_costs_no_row_behind_it(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
