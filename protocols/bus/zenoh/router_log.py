@@ -36,6 +36,8 @@ _REFUSALS = {
     "invalid peer certificate": "a certificate that is not of zenoh.tls.root_ca, or not valid now",
     "received fatal alert": "it does not trust this router's certificate",
 }
+_ENDS_THE_START = "Unable to open listener"
+"""Told by the error with which the process ends, whose line must be the last."""
 _ACCEPTED = re.compile(r"Accepted (?P<kind>TCP|TLS) connection on [^ ]+: (?P<peer>\S+:\d+)")
 
 
@@ -88,7 +90,7 @@ class LogReader:
         accepted = _ACCEPTED.search(said)
         if accepted is not None:
             return logging.INFO, f"connection from {accepted['peer']}"
-        if match["level"] in {"WARN", "ERROR"}:
+        if match["level"] in {"WARN", "ERROR"} and not said.startswith(_ENDS_THE_START):
             return logging.WARNING, said
         return None
 

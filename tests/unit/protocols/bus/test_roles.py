@@ -201,3 +201,9 @@ def test_only_messages_that_were_dropped_are_told_and_ever_more_rarely():
     cached = f"{start}::access_control: Using cached result: 0a is unauthorized to Put (ingress) on w/z/@tail"
     assert [reader.told(line) for line in (cached, dropped)][1] == (30, "'gw' may not put on w/z: dropped (1 time)")
     assert reader.told("no line of zenoh's") is None
+
+
+def test_an_address_in_use_is_told_by_the_error_alone():
+    start = "2026-01-01T00:00:00Z  WARN main ThreadId(01) zenoh::net::runtime::orchestrator"
+    assert LogReader().told(f"{start}: Unable to open listener tcp/127.0.0.1:7447: in use") is None
+    assert LogReader().told(f"{start}: Something else") == (logging.WARNING, "Something else")
