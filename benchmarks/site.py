@@ -44,7 +44,7 @@ def commands_of(folder: Path) -> dict[str, list[str]]:
 async def observe(folder: Path, load: list[Played], given: argparse.Namespace) -> Site:
     """Run the load against the daemons."""
     tables = {
-        "detector": {"state_dir": str(folder / "state")},
+        "detector": {"state_dir": str(folder / "state"), "checkpoint_s": given.checkpoint_s},
         "alarms": {"state_dir": str(folder / "alarms")},
         "health": {"period_s": given.health_s},
     }
@@ -144,6 +144,7 @@ def main() -> None:
     parser.add_argument("--accelerate", type=float, default=1.0, help="samples a second of each station")
     parser.add_argument("--gather", type=int, default=1, help="samples in a message")
     parser.add_argument("--health-s", type=float, default=10.0, help="between health messages of a service")
+    parser.add_argument("--checkpoint-s", type=float, default=60.0, help="between saved states of a station")
     parser.add_argument("--plots", type=Path, help="folder for soak.svg and soak-cpu.svg")
     parser.add_argument("--week", type=int, metavar="DAYS", help="so many days in one process instead")
     arguments = parser.parse_args()

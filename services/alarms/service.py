@@ -44,7 +44,7 @@ MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
 
 SAVING_SHARE = 0.1
-"""Of the time for which the state is being written at the most, but for a look and for acts: it is written whole."""
+"""Of the time for which the state is being written at the most, but for acts: it is written whole."""
 
 
 _MODES: Mapping[str, Mode | None] = {"maintenance": "maintenance", "stop": "stopped", "resume": None}
@@ -220,7 +220,7 @@ class AlarmService:
         self.registry.observe(SITE, "bus_lost", is_lost, now.wall_ns, now.wall_ns)
         if self.registry.rates.look(now.wall_ns):
             log.warning("alarm flood has %s", "begun" if self.registry.rates.is_flood else "ended")
-        self.commit()
+        self.commit_in_time()
         if self._file.errors:
             self.save()  # the disk may take it again
 
@@ -235,7 +235,7 @@ class AlarmService:
             self._publish(alarm)
 
     def commit_in_time(self) -> None:
-        """As `commit`; where the last one took long, with the next one or the next look."""
+        """As `commit`; where the last one took long, with a later one or a later look."""
         if self._now().steady_s >= self._rests_until_s:
             self.commit()
 

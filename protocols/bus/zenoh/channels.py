@@ -30,7 +30,7 @@ CALM_S = 60.0
 SLOT_S = 0.05
 """Channels that rest are woken in groups of this length, at the beginning of it. [s]"""
 FEW = 64
-"""So many channels are looked into each time."""
+"""So many channels are looked into each time. As many messages tell how fast all of them are."""
 
 Receive = Callable[[], zenoh.Sample | None]
 
@@ -78,6 +78,12 @@ class Channels:
         Each gives the next message of its channel, or None.
     has_rhythm : bool
         Whether each channel has one publisher. Others, and a few, are looked into each time.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Messages of a channel in a second, as the last messages show it; infinite of those that are looked into each
+        time. [1/s]
     """
 
     def __init__(self, receivers: Sequence[Receive], *, has_rhythm: bool) -> None:
@@ -86,6 +92,7 @@ class Channels:
         self._rests = has_rhythm and len(receivers) > FEW
         self._slot = 0
         self._stirred_s = float("-inf")
+        self.rate_hz = 1.0 if self._rests else float("inf")
 
     def messages(self, now_s: float) -> Iterator[zenoh.Sample]:
         """Yield what has come, of each channel in its order; to be taken to the end."""
@@ -114,6 +121,7 @@ class Channels:
             if now_s > channel.quiet_s and now_s - self._stirred_s > CALM_S:
                 self._stir(now_s)
             channel.heed(now_s)
+            self.rate_hz += (1.0 / min(channel.rhythm_s, SLOWEST_S) - self.rate_hz) / FEW
         if now_s < channel.due_s:
             rest_s = min(channel.due_s - now_s, LONGEST_REST_S)
         elif now_s > channel.quiet_s and now_s - self._stirred_s > STIRRED_S:

@@ -108,7 +108,7 @@ class ZenohBus:
         with refusal("publish on", key):
             cache = PublisherCache(history, goes_on)
             line = self._sessions.with_room(OF_A_PUBLISHER)
-            publisher = ZenohPublisher(line, key, cache, self._worker.queries)
+            publisher = ZenohPublisher(line, key, cache, self._worker.queries, self._worker.ends.spoken)
         self._worker.add_publisher(publisher)
         return publisher
 

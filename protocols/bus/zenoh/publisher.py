@@ -1,6 +1,5 @@
 """One key of a Zenoh bus, from the side of who publishes."""
 
-import math
 import threading
 import time
 from collections import deque
@@ -9,6 +8,7 @@ import zenoh
 
 from wetwell.protocols.bus.keys import tail_key
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
+from wetwell.protocols.bus.zenoh.ends import Speaker
 from wetwell.protocols.bus.zenoh.session import at_once, reason
 from wetwell.protocols.bus.zenoh.sessions import Line
 from wetwell.protocols.errors import LinkError
@@ -70,6 +70,7 @@ class ZenohPublisher:
         key: str,
         cache: PublisherCache,
         queries: "deque[tuple[ZenohPublisher, zenoh.Query]]",
+        spoken: "deque[Speaker]",
     ) -> None:
         self.key = key
         self.cache = cache
@@ -82,10 +83,14 @@ class ZenohPublisher:
         self._tail: zenoh.KeyExpr | None = None
         self._token: zenoh.LivelinessToken | None = None
         self._queries = queries
+        self._spoken = spoken
+        self._is_awaited = False
         self._lock = threading.Lock()
         self._put = line.session.put
         self._numbered = line.numbered(key)
         self._queryable = line.session.declare_queryable(key, at_once(self._ask))
+        if cache.end:
+            self._await()
 
     def put(self, payload: bytes, weight: int = 1) -> None:
         """Send a message, which counts as `weight` kept ones; without a router it is kept for the time after.
@@ -106,6 +111,12 @@ class ZenohPublisher:
             self._rhythm_s = pause_s if abs(pause_s - self._pause_s) < SAME_PAUSE * pause_s else 0.0
             self._pause_s, self._silent_s = pause_s, now_s
             self.rests_until_s = end_due_s(now_s, self._told_s, self._rhythm_s)
+            if not self._is_awaited:
+                self._await()
+
+    def _await(self) -> None:
+        self._is_awaited = True
+        self._spoken.append(self)
 
     def _ask(self, query: zenoh.Query) -> None:
         self._queries.append((self, query))
@@ -129,7 +140,7 @@ class ZenohPublisher:
     def settle(self, now_s: float) -> bool:
         """Tell those who follow which message was the last, if it is time to; whether it was."""
         with self._lock:
-            due_s = end_due_s(self._silent_s, self._told_s, self._rhythm_s) if self.cache.end else math.inf
+            due_s = end_due_s(self._silent_s, self._told_s, self._rhythm_s)
             is_due = due_s < now_s
             self._told_s = now_s if is_due else self._told_s
             self.rests_until_s = end_due_s(self._silent_s, now_s) if is_due else due_s

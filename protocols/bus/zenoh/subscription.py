@@ -25,6 +25,10 @@ LEAST_CHANNEL = 64
 """Of each of many channels: a minute of samples."""
 MANY = CHANNEL // 4
 """After so many at once the channels are looked into again without a pause, before they are full."""
+PACE_SHARE = 0.005
+"""Of the time from one message of a station to its next: so long they may wait for those of others, at the pace of a
+subscription at least. 5 ms of samples that come each second, 50 ms where ten are gathered."""
+SLOWEST_PACE_S = 0.1
 OF_A_KEY = 2
 """Declarations: its messages, and word of which was the last."""
 MOST_READY = 100_000
@@ -105,7 +109,8 @@ class ZenohSubscription:
             if is_crowded and header is not None and sequencer.let_go(key, header):
                 continue
             sequencer.handle_message(key, header, sample.payload.to_bytes())
-        self.due_s = now_s + (self.pace_s if count < MANY else 0.0)
+        pace_s = max(self.pace_s, min(PACE_SHARE / self._channels.rate_hz, SLOWEST_PACE_S))
+        self.due_s = now_s + (pace_s if count < MANY else 0.0)
         while self._tails:
             sequencer.handle_tail(*self._tails.popleft())
         self.pass_on()

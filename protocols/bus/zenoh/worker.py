@@ -17,6 +17,7 @@ import zenoh
 
 from wetwell.protocols.bus.publisher_cache import CacheQuery, Page
 from wetwell.protocols.bus.sequencer import SourceStream
+from wetwell.protocols.bus.zenoh.ends import Ends
 from wetwell.protocols.bus.zenoh.publisher import LAST_LOSS_S, ZenohPublisher
 from wetwell.protocols.bus.zenoh.sessions import Line, Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
@@ -30,10 +31,6 @@ IDLE_S = 0.02
 """So often questions are, and publishers that have fallen silent. [s]"""
 LEAST_SLEEP_S = 0.001
 """So that the threads of the process have their turn. [s]"""
-ROUNDS = 12
-"""In so many periods each publisher is looked at once."""
-TOLD_AT_ONCE = 20
-"""Publishers that say in one period which message was their last."""
 ASKED = 64
 """Questions for missing messages that are on the way at the same time."""
 ANSWER_S = 2.0
@@ -76,11 +73,11 @@ class ZenohWorker(threading.Thread):
     def __init__(self, sessions: Sessions, *, is_router: bool) -> None:
         super().__init__(name="zenoh-worker")
         self.queries: deque[tuple[ZenohPublisher, zenoh.Query]] = deque()
+        self.ends = Ends()
         self._sessions = sessions
         self._is_router = is_router
         self._subscriptions: list[ZenohSubscription] = []
         self._publishers: list[ZenohPublisher] = []
-        self._turn = 0
         self._due: deque[RecoveryQuery] = deque()
         self._asked: list[RecoveryQuery] = []
         self._stopping = threading.Event()
@@ -142,18 +139,13 @@ class ZenohWorker(threading.Thread):
             if line.has_come_back.is_set():
                 line.has_come_back.clear()
                 self._stir(line, now_s)
-        told = 0
-        for _ in range(-(-len(self._publishers) // ROUNDS)):
-            self._turn = (self._turn + 1) % len(self._publishers)
-            publisher = self._publishers[self._turn]
-            told += publisher.rests_until_s <= now_s and publisher.settle(now_s)
-            if told == TOLD_AT_ONCE:
-                break
+        self.ends.settle(now_s)
 
     def _stir(self, line: Line, now_s: float) -> None:
         for publisher in self._publishers:
             if publisher.line is line:
                 publisher.stir(now_s)
+        self.ends.look_at_all()
         due_s = now_s + random.uniform(0.0, LAST_LOSS_S / 2.0)
         self._plan(
             RecoveryQuery(subscription, key, due_s=due_s)

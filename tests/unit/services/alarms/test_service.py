@@ -53,16 +53,19 @@ def test_a_state_that_takes_long_to_write_is_not_written_all_the_time(slow):
         assert place.writes - count == 200
 
 
-def test_what_waits_is_kept_and_told_with_the_next_look_or_act(slow):
-    site, place, _ = slow
+def test_what_waits_is_kept_and_told_with_an_act_at_once_and_with_a_look_in_time(slow):
+    site, place, write_s = slow
     site.service.commit()
-    for number, then in enumerate((site.service.look, site.service.commit)):
+    for number, (then, waits_s) in enumerate(
+        ((site.service.look, write_s / SAVING_SHARE), (site.service.commit, 0.0))
+    ):
         change(site, number)
         site.service.commit_in_time()
         change(site, number + 1)
         site.service.commit_in_time()
         before = place.writes
         change(site, number)
+        site.wall_s += waits_s
         then()
         assert place.writes == before + 1
         assert not site.service.registry.changed

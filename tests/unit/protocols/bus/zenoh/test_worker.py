@@ -9,7 +9,7 @@ from wetwell.protocols.bus.mailbox import Mailbox
 from wetwell.protocols.bus.publisher_cache import PublisherCache, read_query
 from wetwell.protocols.bus.zenoh.sessions import Sessions
 from wetwell.protocols.bus.zenoh.subscription import ZenohSubscription
-from wetwell.protocols.bus.zenoh.worker import PERIOD_S, TOLD_AT_ONCE, RecoveryQuery, ZenohWorker
+from wetwell.protocols.bus.zenoh.worker import PERIOD_S, RecoveryQuery, ZenohWorker
 
 KEY = "wetwell/alpha/sample"
 
@@ -156,21 +156,6 @@ def test_a_publisher_that_keeps_less_than_is_missing_is_not_asked_for_ever(bench
     bench.go_on(0.1)
     assert bench.got == [b"0", *(b"%d" % number for number in range(15, 20))]
     assert "14 messages are lost" in caplog.text
-
-
-def test_no_period_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forgotten():
-    bench = Bench()
-    told: list[int] = []
-
-    def publisher(number):
-        return SimpleNamespace(rests_until_s=0.0, settle=lambda _: told.append(number) or True)
-
-    bench.worker._publishers = [publisher(number) for number in range(1_000)]
-    rounds = 1_000 // TOLD_AT_ONCE
-    for number in range(rounds):
-        bench.worker._settle(0.0)
-        assert len(told) == (number + 1) * TOLD_AT_ONCE
-    assert sorted(told) == list(range(1_000))
 
 
 def test_each_key_is_asked_for_in_the_session_that_declared_it():
