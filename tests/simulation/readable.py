@@ -90,6 +90,7 @@ class _View:
                 self.is_whole = database.execute("PRAGMA integrity_check(1)").fetchall() == [("ok",)]
             with contextlib.suppress(*UNREADABLE):
                 self.messages.update(payload for (payload,) in database.execute("SELECT payload FROM event"))
+            database.execute("PRAGMA writable_schema = ON")  # a trigger that is no SQL any more hides no row
             for order in _ORDERS[: 1 if self.is_whole else 2]:
                 with contextlib.suppress(*UNREADABLE):
                     self.samples.update(_intact(database.execute(f"{_ROWS} ORDER BY {order}")))

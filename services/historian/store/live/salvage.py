@@ -17,6 +17,12 @@ from wetwell.services.historian.store.live.tally import miscounts
 Row = tuple[Any, ...]
 
 _SAMPLE = "station, time_ns, seq, quality, data, size, last_ns, crc"
+_COLUMNS = {
+    "sample": _SAMPLE,
+    "event": "id, kind, station, time_ns, digest, payload, crc",
+    "hour": "station, hour_ns, data, crc",
+}
+"""In the order in which every version since the third one has them."""
 CHECKED_VERSION = 3
 """The first one whose rows have checksums."""
 COUNTED_VERSION = 4
@@ -69,7 +75,7 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
     saved, lost = 0, set[Row]()
     target.execute("BEGIN IMMEDIATE")
     try:
-        with _reading(damaged) as database:
+        with _reading_what_it_can(damaged) as database:
             for insert, rows, is_intact in _tables(database):
                 for row in rows:
                     if not is_intact(row):
@@ -213,4 +219,16 @@ def _is_hour(row: Row) -> bool:
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[sqlite3.Connection]:
     with contextlib.closing(connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+        yield database
+
+
+@contextlib.contextmanager
+def _reading_what_it_can(path: Path) -> Iterator[sqlite3.Connection]:
+    """Go on with what SQLite understands of a schema whose text a disk has changed; columns are known by places."""
+    with _reading(path) as database:
+        database.execute("PRAGMA writable_schema = ON")
+        with contextlib.suppress(*UNREADABLE):  # it takes the schema as far as it can, and the next statement works
+            database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        for table, columns in _COLUMNS.items():
+            database.execute(f"CREATE TEMP VIEW {table} ({columns}) AS SELECT * FROM main.{table}")  # noqa: S608 - names of above
         yield database

@@ -275,6 +275,27 @@ def test_a_word_of_the_schema_that_names_another_thing_is_damage(content, tmp_pa
     assert f"schema: {part}" in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("word", "broken"),
+    [
+        (b"last_ns INTEGER, crc", b"mast_ns INTEGER, crc"),
+        (b"data BLOB NOT NULL, size", b"data BLOB NOT NULL, si\xf3e"),
+        (b"AFTER DELETE", b"AFTER DEL\xc5TE"),
+        (b"INSERT INTO tally", b"INSERT IN\x11O tally"),
+    ],
+)
+def test_a_broken_word_of_the_schema_costs_no_row(content, tmp_path, word, broken):
+    changed = content.replace(word, broken, 1)
+    assert changed != content
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(Batch())
+        for station in STATIONS:
+            assert store.samples(station, 0, 2**62).seq.tolist() == list(range(TIMES))
+            assert len(store.events("verdicts", station, 0, 2**62, 10_000)) == TIMES // 10
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+
+
 @pytest.mark.parametrize("place", ["table", "index"])
 def test_a_station_whose_name_was_changed_keeps_its_own(content, tmp_path, place):
     changed = bytearray(content)
