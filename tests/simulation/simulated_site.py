@@ -161,6 +161,7 @@ class Process:
         context.run(LIFE.set, self.life)
         self.task = asyncio.create_task(self._run(self.bus), name=self.name, context=context)
         if self._stalls:
+            self._since_s = float("inf")  # it has done nothing yet, nor holds its folder
             self._stand()
 
     async def _run(self, bus: SimulatedBus) -> None:
@@ -206,7 +207,7 @@ class Process:
 
     @property
     def lived_s(self) -> float:
-        """For how long it has worked without a break; 0 while it does not. [s]"""
+        """For how long it has been there since it began to work; 0 or less while it is not. [s]"""
         return 0.0 if self.task is None or self.task.done() else _now_s() - self._since_s
 
     def go_on(self) -> None:
@@ -215,6 +216,7 @@ class Process:
         if self._stalls or self._away or self.bus is None:
             return
         self.bus.mute_s, self.bus.deaf_s = self._cut_s["mute"], self._cut_s["deaf"]
+        self._since_s = min(self._since_s, _now_s())
         self.life.go_on()
 
     def cut(self, seconds: float, *, is_mute: bool, is_deaf: bool) -> None:
