@@ -13,6 +13,7 @@ from pathlib import Path
 
 from wetwell.protocols.bus.keys import SITE, status_key, verdict_key
 from wetwell.protocols.bus.zenoh.link import ZenohBus
+from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.runtime.lifecycle import PARENT_VARIABLE
@@ -78,8 +79,9 @@ class Site:
         """Keep the last health figures of each service, for ever."""
         while True:
             for payload in await self._statuses.receive():
-                status = Status.decode(payload)
-                self.figures[status.station, status.service] = status.figures
+                with contextlib.suppress(MessageError):  # a router that cannot keep up has brought one on another key
+                    status = Status.decode(payload)
+                    self.figures[status.station, status.service] = status.figures
 
     async def wait_for(self, stations: int, services: int = 0) -> None:
         """Until so many stations have their judge, and so many services of the site have shown themselves."""
