@@ -26,6 +26,8 @@ from wetwell.protocols.messages.message import JSON_ENCODING
 
 logger = logging.getLogger(__name__)
 
+HANDSHAKE_S = 10.0
+"""So long Zenoh lets a handshake take. A router of thousands of stations that begin is busy for a minute. [s]"""
 MOST_REQUESTS = 1_000
 """Most questions, or changes of presence, that wait for one reader."""
 
@@ -254,8 +256,9 @@ def open_client(endpoint: str, access: ZenohAccess = OPEN, *, timeout_s: float =
     LinkError
         If no router is reached in time. Zenoh does not tell wrong credentials from a router that is not there.
     """
-    further = partial(open_client_session, endpoint, access, timeout_s)
-    return ZenohBus(Sessions(further(), further), is_router=False)
+    first = open_client_session(endpoint, access, timeout_s)
+    further = partial(open_client_session, endpoint, access, max(timeout_s, HANDSHAKE_S))
+    return ZenohBus(Sessions(first, further), is_router=False)
 
 
 async def connect_client(

@@ -97,9 +97,11 @@ class Sessions:
         return session
 
     def _opened(self) -> zenoh.Session | None:
-        """None in a router, and while there is none."""
+        """None in a router, and while there is none: nobody waits for one that is away."""
+        if self._further is None or not self.first.is_connected:
+            return None
         with contextlib.suppress(LinkError):
-            return None if self._further is None else self._further()
+            return self._further()
         return None
 
     @property

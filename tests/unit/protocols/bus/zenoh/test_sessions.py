@@ -14,7 +14,10 @@ class Session:
     def __init__(self):
         self.declared: list[str] = []
         self.is_open = True
-        self.info = SimpleNamespace(declare_transport_events_listener=lambda *_, **__: None)
+        self.routers = ["a router"]
+        self.info = SimpleNamespace(
+            declare_transport_events_listener=lambda *_, **__: None, routers_zid=lambda: self.routers
+        )
 
     def declare_keyexpr(self, key):
         self.declared.append(key)
@@ -51,6 +54,13 @@ def test_what_belongs_together_is_in_one_session():
 def test_where_there_can_be_no_other_the_first_takes_all(further):
     sessions = Sessions(Session(), further)
     assert {sessions.with_room(1) for _ in range(ROOM_OF_FIRST + 1)} == {sessions.first}
+    assert sessions.apart() is sessions.first.session
+
+
+def test_nobody_waits_for_another_session_while_the_router_is_away():
+    sessions = Sessions(Session(), lambda: pytest.fail("it would be waited for"))
+    sessions.first.session.routers = []
+    assert sessions.with_room(ROOM_OF_FIRST + 1) is sessions.first
     assert sessions.apart() is sessions.first.session
 
 
