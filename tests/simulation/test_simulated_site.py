@@ -27,7 +27,7 @@ def test_a_seed_gives_the_same_events_again(folder):
 @pytest.mark.timeout(900)  # half a minute of one quiet core
 def test_many_seeds_see_every_accident(folder):
     happened: Counter[str] = Counter()
-    for seed in range(100, 105):
+    for seed in range(100, 106):
         site = alpha_site(seed, 2, 2.0, 60, folder / str(seed))
         assert broken_rules(site) == [], f"seed {seed}"
         happened.update(accident.split()[0] for accident in site.accidents)
