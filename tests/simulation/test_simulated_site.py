@@ -7,9 +7,9 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
-from accidents import KINDS, plan_of
+from accidents import KINDS, Accident, plan_of
 from rules import broken_rules, fingerprint
-from site_kinds import alpha_site
+from site_kinds import alpha_site, light_site
 
 
 @pytest.mark.long
@@ -45,3 +45,12 @@ def test_plans_have_every_kind_and_target_and_overlap():
     kinds = [len({one.kind for one in plan}) for plan in plans]
     assert min(kinds) < 5
     assert max(kinds) > 11
+
+
+def test_a_process_that_stands_since_its_begin_has_no_folder_yet_that_a_second_could_share(folder):
+    plan = (
+        Accident(kind="stall", target="historian", at_s=1_000.0, lasts_s=4_000.0, seed=1),
+        Accident(kind="hole", target="historian", at_s=2_000.0, lasts_s=1.0, seed=1),  # it begins again, and stands
+        Accident(kind="twin", target="historian", at_s=3_000.0, lasts_s=100.0, seed=1),
+    )
+    assert light_site(7, 1, 0.1, 300, folder, plan).crashes == []
