@@ -5,7 +5,7 @@ from collections import defaultdict, deque
 from itertools import chain
 from typing import Protocol
 
-SLOT_S = 0.25
+END_SLOT_S = 0.25
 """Publishers are looked at in groups of this length, at the end of it. [s]"""
 TOLD_AT_ONCE = 20
 """Publishers that say in one look which message was their last; it costs more than a usual one."""
@@ -40,7 +40,7 @@ class Ends:
         while self.spoken:
             self._await(self.spoken.popleft())
         told = 0
-        for slot in sorted(slot for slot in self._waiting if slot * SLOT_S <= now_s):
+        for slot in sorted(slot for slot in self._waiting if slot * END_SLOT_S <= now_s):
             for speaker in self._waiting.pop(slot):
                 told += told < TOLD_AT_ONCE and speaker.rests_until_s <= now_s and speaker.settle(now_s)
                 self._await(speaker)
@@ -51,4 +51,4 @@ class Ends:
         self._waiting.clear()
 
     def _await(self, speaker: Speaker) -> None:
-        self._waiting[math.ceil(speaker.rests_until_s / SLOT_S)].append(speaker)
+        self._waiting[math.ceil(speaker.rests_until_s / END_SLOT_S)].append(speaker)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from wetwell.protocols.bus.zenoh.ends import SLOT_S, TOLD_AT_ONCE, Ends
+from wetwell.protocols.bus.zenoh.ends import END_SLOT_S, TOLD_AT_ONCE, Ends
 from wetwell.protocols.bus.zenoh.publisher import end_due_s
 
 LOOK_S = 0.02
@@ -36,7 +36,7 @@ def test_a_silent_publisher_says_its_end_when_it_should():
     ends.spoken.append(speaker)
     went_on(ends, 100.0, 200.0)
     for told_s, due_s in zip(speaker.told_s, (101.0, 104.0, 116.0, 164.0, 224.0, 284.0), strict=True):
-        assert due_s <= told_s <= due_s + 5 * SLOT_S
+        assert due_s <= told_s <= due_s + 5 * END_SLOT_S
 
 
 def test_who_speaks_again_and_again_is_hardly_looked_at():
