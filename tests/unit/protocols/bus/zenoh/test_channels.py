@@ -157,3 +157,22 @@ def test_a_reader_that_fails_at_a_message_loses_no_channel(feeds):
         take(1001.0)
     take(1001.0 + TICK_S)
     assert len(taken) == MANY
+
+
+@pytest.mark.parametrize(("fast", "slow", "rate_hz"), [(80, 0, 1.0), (0, 80, 0.1), (40, 120, 41.2 / 52.0)])
+def test_the_rate_of_all_is_that_of_their_messages(fast, slow, rate_hz):
+    feeds = [Feed() for _ in range(fast + slow)]
+    channels = Channels([feed.receive for feed in feeds], has_rhythm=True)
+    for tick in range(6_000):
+        for number, feed in enumerate(feeds):
+            every = 20 if number < fast else 200  # a second, ten seconds
+            if tick % every == number % every:
+                feed.waiting.append((0.0, 0))
+        list(channels.messages(1000.0 + 0.05 * tick))
+    assert channels.rate_hz == pytest.approx(rate_hz, rel=0.2)
+
+
+def test_few_have_no_rate():
+    channels = Channels([Feed().receive for _ in range(FEW)], has_rhythm=True)
+    list(channels.messages(1000.0))
+    assert channels.rate_hz == float("inf")
