@@ -121,7 +121,8 @@ class Channels:
             if now_s > channel.quiet_s and now_s - self._stirred_s > CALM_S:
                 self._stir(now_s)
             channel.heed(now_s)
-            self.rate_hz += (1.0 / min(channel.rhythm_s, SLOWEST_S) - self.rate_hz) / FEW
+            if channel.rhythm_s < SLOWEST_S:  # of a first message nobody knows when the next one comes
+                self.rate_hz += (1.0 / channel.rhythm_s - self.rate_hz) / FEW
         if now_s < channel.due_s:
             rest_s = min(channel.due_s - now_s, LONGEST_REST_S)
         elif now_s > channel.quiet_s and now_s - self._stirred_s > STIRRED_S:

@@ -176,3 +176,13 @@ def test_few_have_no_rate():
     channels = Channels([Feed().receive for _ in range(FEW)], has_rhythm=True)
     list(channels.messages(1000.0))
     assert channels.rate_hz == float("inf")
+
+
+def test_first_messages_make_nobody_slow():
+    feeds = [Feed() for _ in range(MANY)]
+    channels = Channels([feed.receive for feed in feeds], has_rhythm=True)
+    for second in range(3):
+        for feed in feeds:
+            feed.waiting.append((0.0, 0))
+        list(channels.messages(1000.0 + second))
+        assert channels.rate_hz == pytest.approx(1.0)
