@@ -41,9 +41,14 @@ class Ends:
             self._await(self.spoken.popleft())
         told = 0
         for slot in sorted(slot for slot in self._waiting if slot * END_SLOT_S <= now_s):
-            for speaker in self._waiting.pop(slot):
-                told += told < TOLD_AT_ONCE and speaker.rests_until_s <= now_s and speaker.settle(now_s)
+            due = self._waiting.pop(slot)
+            while due and told < TOLD_AT_ONCE:
+                speaker = due.pop()
+                told += speaker.rests_until_s <= now_s and speaker.settle(now_s)
                 self._await(speaker)
+            if due:  # the rest has its turn with the next looks, and is not walked over until then
+                self._waiting[slot].extend(due)
+                return
 
     def look_at_all(self) -> None:
         """Look at all of them the next time: their link was away."""

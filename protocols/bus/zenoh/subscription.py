@@ -29,6 +29,7 @@ PACE_SHARE = 0.005
 """Of the time from one message of a station to its next: so long they may wait for those of others, at the pace of a
 subscription at least. 5 ms of samples that come each second, 50 ms where ten are gathered."""
 SLOWEST_PACE_S = 0.1
+"""So long at most they wait for others, however seldom they come. [s]"""
 OF_A_KEY = 2
 """Declarations: its messages, and word of which was the last."""
 MOST_READY = 100_000

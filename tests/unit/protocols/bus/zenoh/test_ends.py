@@ -56,6 +56,7 @@ def test_no_look_tells_the_ends_of_more_than_a_few_publishers_and_none_is_forgot
     for number in range(1_000 // TOLD_AT_ONCE):
         ends.settle(1.5)
         assert sum(len(speaker.told_s) for speaker in speakers) == (number + 1) * TOLD_AT_ONCE
+        assert sum(speaker.looks for speaker in speakers) == (number + 1) * TOLD_AT_ONCE
     assert all(len(speaker.told_s) == 1 for speaker in speakers)
 
 
