@@ -19,10 +19,12 @@ from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.likelihood.cells import cells_of
+from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import SetProbability, best_set, equivalents, posterior_of, verdict_of
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
@@ -110,6 +112,7 @@ def attribute(
     condition = conditions_of(residuals.bins, traces, replay.station)
     has_inflow = traces.inflow_m3h is not None
     cells = cells_of(residuals.bins, condition, has_inflow=has_inflow, is_each_second=traces.is_each_second)
+    cells = with_jumps(cells, residuals.bins, residuals_of(plain))
     hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES
+from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES, START_RAMP, STOP_RAMP
 from wetwell.sim2real.residuals.bins import LEVEL, Bins
 from wetwell.sim2real.residuals.phases import group_of, phase
 
@@ -17,6 +17,23 @@ SURGES = (0.0, *TIMES[:3])
 """Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
 of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what
 the station file makes of it. Each as likely. [1]"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jumps:
+    """How an inflow that nobody measures moves: mostly little, and now and then much.
+
+    Attributes
+    ----------
+    probability : float
+        That it jumps in a cell. [1]
+    quiet, jumping : float
+        Variance of the level where it does not, and where it does, over what it is on average. [1]
+    """
+
+    probability: float
+    quiet: float
+    jumping: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,16 +50,22 @@ class Block:
         Numbers from 0 within the block.
     variance, allowed : (k,) arrays
         As of `Cells`.
+    of_inflow : (k,) array
+        Variance by which surges and rain count: `variance` as it is on average.
     surges : tuple of float
         Variance that surges of the inflow may add, over `variance`; each as likely.
     may_rain : bool
         Whether the inflow may also move much faster in some cycles: nobody measures it.
+    may_jump : bool
+        Whether the inflow may jump in some cells, too: nothing is switched in them.
     in_storm : (cycles,) array
         Whether several pumps run in a cycle: more comes in than one carries.
     span : (groups,) array
         Span of the time since the regime began, and condition, of each group: numbers from 0; pumps have the same.
     surge : float or (k,) array
         The one that is supposed.
+    jumps : Jumps or None
+        As they were learnt; None where the inflow does not jump, or may not.
     """
 
     signal: int
@@ -52,11 +75,14 @@ class Block:
     cycle: Integers
     variance: Floats
     allowed: Floats
+    of_inflow: Floats
     surges: tuple[float, ...]
     may_rain: bool
+    may_jump: bool
     in_storm: Flags
     span: Integers
     surge: float | Floats = 0.0
+    jumps: Jumps | None = None
 
     def group_sums(self, values: Floats) -> Floats:
         """(groups, ...) sums of (k, ...) values."""
@@ -158,6 +184,7 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     for key in np.unique(block_of):
         rows = np.flatnonzero(block_of == key)
         its_cycles, its_cycle = np.unique(cycle[rows], return_inverse=True)
+        is_ramp = int(key) % len(REGIMES) in (START_RAMP, STOP_RAMP)
         is_level = int(key) // len(REGIMES) == LEVEL
         blocks.append(
             Block(
@@ -168,10 +195,12 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
                 cycle=its_cycle,
                 variance=variance[rows],
                 allowed=allowed[rows],
+                of_inflow=variance[rows],
                 in_storm=in_storm[its_cycles],
                 span=np.unique(span[np.unique(group[rows])], return_inverse=True)[1],
                 surges=SURGES if is_level and not (has_inflow and is_each_second) else SURGES[:1],
                 may_rain=is_level and not has_inflow,
+                may_jump=is_level and not has_inflow and not is_ramp,
             )
         )
     return Cells(of_bin=of_bin, counts=counts, group=group, variance=variance, allowed=allowed, blocks=tuple(blocks))

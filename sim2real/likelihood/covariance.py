@@ -94,7 +94,12 @@ def no_form(cells: Cells) -> Form:
 
 def expected_squares(block: Block) -> Floats:
     """(k,) mean squares of the residuals of a good model: noise, and what it may be off."""
-    return np.asarray(block.variance + (2.0 + 2.0 * DIFFERING**2) * OFFSET**2 * block.allowed**2, dtype=np.float64)
+    return np.asarray(block.variance + expected_offset(block.allowed), dtype=np.float64)
+
+
+def expected_offset(allowed: Floats) -> Floats:
+    """Mean squares of what a good model may be off where so much is allowed."""
+    return np.asarray((2.0 + 2.0 * DIFFERING**2) * OFFSET**2 * allowed**2, dtype=np.float64)
 
 
 def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -> tuple[Floats, float]:
@@ -102,12 +107,13 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
 
     $$C = \operatorname{diag}\left(\sigma^2 + d^2 + (s_c f)^2\right) + \sum_c d_c d_c^T
     + A\left(a; o_b, o_s, o_g\right) + A\left(\bar f; s_b, s_s, s_g\right) + A\left(t; \lambda\right), \quad
-    d^2 = \tfrac12 \left((c a)^2 + u \sigma^2 + (w f_w)^2\right)$$
+    d^2 = \tfrac12 \left((c a)^2 + u \bar\sigma^2 + (w f_w)^2\right)$$
 
     $$A(x; b, s, g) = b^2 x x^T + \sum_{\text{spans}} s^2 x_s x_s^T + \sum_{\text{groups}} g^2 x_g x_g^T$$
 
     with what is allowed a, the signature f and its mean in a group, what is late t with `LATE` λ, what swings $f_w$,
-    the surge u, and the `Allowance` of changes c and $s_c$, spans s, groups g and swing w; the sum is over cycles.
+    the surge u of the average variance $\bar\sigma^2$, and the `Allowance` of changes c and $s_c$, spans s, groups g
+    and swing w; the sum is over cycles.
 
     Parameters
     ----------
@@ -127,7 +133,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     """
     own = allowance.changing
     changing = 0.5 * (
-        (own.offset * block.allowed) ** 2 + block.surge * block.variance + (allowance.swing * form.swinging) ** 2
+        (own.offset * block.allowed) ** 2 + block.surge * block.of_inflow + (allowance.swing * form.swinging) ** 2
     )
     variance, in_cycle = block.variance + changing + (own.form * form.signature) ** 2, np.sqrt(changing)
     span, each = allowance.span, allowance.own

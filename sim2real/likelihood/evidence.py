@@ -11,6 +11,7 @@ from scipy.special import logsumexp
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
+from wetwell.sim2real.likelihood.jumps import jumping
 from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
 from wetwell.sim2real.likelihood.ways import KNOWN, Ways, likeliest
 
@@ -242,9 +243,10 @@ def _rained_on(block: Block, residuals: Floats) -> Stirred:
     """A block with its likeliest rain, if it may have any."""
     if not block.may_rain:
         return Stirred(block=block)
+    block, log_jumps = jumping(block, residuals)
     is_rainy, log_rain = rainy_cells(block, residuals)
     if not is_rainy.any():
-        return Stirred(block=block, log_rain=log_rain)
+        return Stirred(block=block, log_rain=log_rain + log_jumps)
     wet = replace(block, surge=np.where(is_rainy, block.surge + RAIN, block.surge))
     log_dry = float(log_priors(block)[0].sum())
-    return Stirred(block=wet, log_rain=log_rain, dry=block, log_dry=log_dry)
+    return Stirred(block=wet, log_rain=log_rain + log_jumps, dry=block, log_dry=log_dry + log_jumps)

@@ -40,7 +40,7 @@ def log_priors(block: Block) -> tuple[Floats, Floats]:
 
 def _logs(block: Block, residuals: Floats, rain: float) -> Floats:
     """(cycles,) logarithms of the probability of the residuals of each, half of what surges do alike in its cells."""
-    surging = 0.5 * (block.surge + rain) * block.variance
+    surging = 0.5 * (block.surge + rain) * block.of_inflow
     weight = 1.0 / (expected_squares(block) + surging)
     shared = np.sqrt(surging)
     excess = 1.0 + block.cycle_sums(weight * shared**2)

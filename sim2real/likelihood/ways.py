@@ -86,7 +86,7 @@ def likeliest(
         block.group_sums(values) / counts
         for values in (
             residuals,
-            (1.0 + block.surge) * block.variance,
+            block.variance + block.surge * block.of_inflow,
             block.allowed**2,
             form.signature**2,
             form.swinging**2,

@@ -13,8 +13,7 @@ from wetwell.sim2real.recording.seconds import repeated
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer, level_noise_m
 from wetwell.sim2real.replay.replay import Doubt, Prediction
-from wetwell.sim2real.residuals.bins import LEVEL, NO_PUMP, Bins, Seconds, binned
-from wetwell.sim2real.residuals.pumped_inflow import alike_in_cycles
+from wetwell.sim2real.residuals.bins import LEVEL, NO_PUMP, Seconds, binned
 from wetwell.sim2real.residuals.signals import UNRESOLVED, SignalResiduals, steps
 from wetwell.sim2real.residuals.telemetry import Pattern
 
@@ -69,9 +68,9 @@ def level_residuals(
     if doubt.level_m is not None:
         off_m = np.hypot(off_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces, regime)[seconds.second]))
 
-    def bins_of(off_m: Floats) -> Bins:
-        deviation_m = np.sqrt(noise_m2 + off_m**2)
-        return seconds.bins(
+    deviation_m = np.sqrt(noise_m2 + off_m**2)
+    return SignalResiduals(
+        bins=seconds.bins(
             LEVEL,
             NO_PUMP,
             regime,
@@ -80,14 +79,7 @@ def level_residuals(
             floor=noise_m2 / deviation_m**2,
             tolerance=off_m / deviation_m,
             material=material_m / deviation_m,
-        )
-
-    bins = bins_of(off_m)
-    if traces.inflow_m3h is None:
-        alike = alike_in_cycles(bins, seconds.means(traces.level_m - plain.level_m) / bins.deviation)
-        bins = bins_of(np.hypot(off_m, alike * bins.deviation)) if alike > 0.0 else bins
-    return SignalResiduals(
-        bins=bins,
+        ),
         name="level_m",
         pump=NO_PUMP,
         seconds=seconds,

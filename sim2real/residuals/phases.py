@@ -2,17 +2,25 @@
 
 import numpy as np
 
-from wetwell.protocols.arrays import Integers
-from wetwell.sim2real.recording.regimes import REGIMES
+from wetwell.protocols.arrays import Flags, Integers
+from wetwell.sim2real.recording.regimes import IDLE, REGIMES
 from wetwell.sim2real.residuals.bins import Bins
 
 PHASES_S = np.array([2, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 60, 90, 150, 250, 400, 700, 1200])
 """Ends of spans of the time since a regime began. [s]"""
 
+FOLLOWED_S = 60
+"""Time at rest after which the level shows nothing of the pumps: the observer has followed it. [s]"""
+
 
 def phase(bins: Bins) -> Integers:
     """(bins,) number of the span of `PHASES_S` since the regime of a signal and pump began."""
     return np.asarray(np.searchsorted(PHASES_S, _since(bins, group_of(bins))))
+
+
+def settled_at_rest(bins: Bins) -> Flags:
+    """(bins,) whether no pump has run for `FOLLOWED_S`."""
+    return np.asarray((bins.regime == IDLE) & (phase(bins) > np.searchsorted(PHASES_S, FOLLOWED_S)))
 
 
 def group_of(bins: Bins) -> Integers:

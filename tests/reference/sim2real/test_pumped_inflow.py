@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
+from wetwell.sim2real.likelihood.cells import Jumps, cells_of
+from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.sim2real.residuals.bins import LEVEL, Bins
-from wetwell.sim2real.residuals.pumped_inflow import alike_in_cycles
+from wetwell.sim2real.residuals.bins import LEVEL
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.scenario import Scenario
@@ -33,23 +34,29 @@ def recorded(alpha, inflow, seed):
     return replace(recording, columns=columns)
 
 
-def alike(recording, alpha):
+def learnt(recording, alpha) -> Jumps | None:
     traces = traces_of(recording, alpha)
     replay = Replay(traces, alpha)
     residuals = StationResiduals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt())
-    rows = residuals.bins.signal == LEVEL
-    of_level = Bins(**{name: getattr(residuals.bins, name)[rows] for name in Bins.__dataclass_fields__})
-    return alike_in_cycles(of_level, residuals.of(replay.run())[rows])
+    bins = residuals.bins
+    cells = cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=False, is_each_second=True)
+    found = with_jumps(cells, bins, residuals.of(replay.run()))
+    return next(block.jumps for block in found.blocks if block.signal == LEVEL and block.may_jump)
 
 
-@pytest.mark.parametrize("seed", [971_101, 971_102])
-def test_a_station_behind_another_one_is_as_its_file_says(alpha, seed):
-    recording = recorded(alpha, pulses(np.random.default_rng(seed), 150.0, 5.0), seed)
-    assert diagnose(recording, alpha, only=["friction_bias", "sump_area_profile"]).verdict == "none"
+@pytest.mark.parametrize(
+    ("seed", "high_m3h", "low_m3h"),
+    [(971_101, 150.0, 5.0), (971_102, 150.0, 5.0), (971_103, 94.0, 4.0), (971_105, 220.0, 30.0)],
+)
+def test_a_station_behind_another_one_is_as_its_file_says(alpha, seed, high_m3h, low_m3h):
+    recording = recorded(alpha, pulses(np.random.default_rng(seed), high_m3h, low_m3h), seed)
+    assert diagnose(recording, alpha).verdict == "none"
 
 
-def test_errors_of_an_inflow_that_wanders_are_not_alike(alpha):
+def test_jumps_are_learnt_from_the_level_at_rest(alpha):
     even = RecordedInflow(time_s=[0.0], flow_m3h=[120.0])
-    steady = alike(recorded(alpha, even, 971_103), alpha)
-    jumping = alike(recorded(alpha, pulses(np.random.default_rng(971_101), 150.0, 5.0), 971_101), alpha)
-    assert steady < 0.05 < jumping
+    assert learnt(recorded(alpha, even, 971_103), alpha) is None
+    jumps = learnt(recorded(alpha, pulses(np.random.default_rng(971_101), 150.0, 5.0), 971_101), alpha)
+    assert jumps is not None
+    assert 0.05 < jumps.probability < 0.2
+    assert 10.0 * jumps.quiet < 1.0 < 0.1 * jumps.jumping
