@@ -1,6 +1,6 @@
 """What the likelihood is of: the mean of the residuals of a group in a cycle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,15 +86,21 @@ class Block:
 
     def group_sums(self, values: Floats) -> Floats:
         """(groups, ...) sums of (k, ...) values."""
-        return _sums(self.group, values)
+        return _sums(self.group, values, self.span.size)
 
     def group_means(self, values: Floats) -> Floats:
         """(groups,) means of (k,) values."""
-        return self.group_sums(values) / self.group_sums(np.ones(values.size))
+        return self.group_sums(values) / np.maximum(self.group_sums(np.ones(values.size)), 1.0)
 
     def cycle_sums(self, values: Floats) -> Floats:
         """(cycles, ...) sums of (k, ...) values."""
-        return _sums(self.cycle, values)
+        return _sums(self.cycle, values, self.in_storm.size)
+
+    def chosen(self, rows: Integers) -> "Block":
+        """Some of its cells, with the numbers of groups and cycles as they are."""
+        names = ("rows", "group", "cycle", "variance", "allowed", "of_inflow")
+        parts = {name: getattr(self, name)[rows] for name in names}
+        return replace(self, surge=np.asarray(self.surge)[rows] if np.ndim(self.surge) else self.surge, **parts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,8 +217,7 @@ def _first(group: Integers, values: Integers) -> Integers:
     return values[np.unique(group, return_index=True)[1]]
 
 
-def _sums(number: Integers, values: Floats) -> Floats:
-    count = int(number.max(initial=-1)) + 1
+def _sums(number: Integers, values: Floats, count: int) -> Floats:
     if values.ndim == 1:
         return np.asarray(np.bincount(number, values, count), dtype=np.float64)
     return np.array([np.bincount(number, column, count) for column in values.T]).T

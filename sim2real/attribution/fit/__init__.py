@@ -1,0 +1,1 @@
+"""Fits of candidates: where they stand, what a fit makes small, and the way there."""
