@@ -171,7 +171,8 @@ def next_volume_m3(volume_m3: float, inflow_m3h: float, overflow_m3h: float, flo
     $$\frac{dV}{dt} = Q_{in} - Q_\text{over} - \sum_i Q_i$$
 
     Where the pumps would take more than there is, their flows are reduced in place, all by the same factor, so that
-    the wet well runs dry and no water is invented.
+    the wet well runs dry and no water is invented. An inflow may be negative, as where an observer takes some away;
+    that takes no more than there is.
 
     Parameters
     ----------
@@ -196,7 +197,8 @@ def next_volume_m3(volume_m3: float, inflow_m3h: float, overflow_m3h: float, flo
     volume_after_m3 = volume_m3 + (inflow_m3h - overflow_m3h - outflow_m3h) / SECONDS_PER_HOUR
     if volume_after_m3 >= 0.0:
         return volume_after_m3
-    available_m3h = volume_m3 * SECONDS_PER_HOUR + inflow_m3h - overflow_m3h
-    for i in range(flow_m3h.size):
-        flow_m3h[i] *= available_m3h / outflow_m3h
+    if outflow_m3h > 0.0:
+        available_m3h = max(volume_m3 * SECONDS_PER_HOUR + inflow_m3h - overflow_m3h, 0.0)
+        for i in range(flow_m3h.size):
+            flow_m3h[i] *= available_m3h / outflow_m3h
     return 0.0

@@ -16,7 +16,7 @@ from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.inflow.surges import Surges
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
-from wetwell.simulator.wet_well import profile_of, volume_at_level_m3
+from wetwell.simulator.wet_well import next_volume_m3, profile_of, volume_at_level_m3
 
 SECONDS = 600
 SEEDS = st.integers(0, 2**32)
@@ -160,6 +160,17 @@ def test_mass_balance_closes_with_profile_weir_leak_and_level_controller(station
     assert pumped_m3h.min() >= 0
     assert truth["truth_overflow_m3h"].min() >= 0
     assert frequency_hz[frequency_hz > 0].min(initial=np.inf) >= station.control.min_frequency_hz
+
+
+@given(numbers(0, 5), numbers(-500, 500), numbers(0, 200), st.lists(numbers(0, 300), min_size=1, max_size=4))
+def test_nothing_takes_more_than_the_wet_well_holds(volume_m3, inflow_m3h, overflow_m3h, flows_m3h):
+    """Not an inflow under 0, either, which an observer of the level may suppose while no pump runs."""
+    taken_m3h = np.array(flows_m3h)
+    after_m3 = next_volume_m3(volume_m3, inflow_m3h, overflow_m3h, taken_m3h)
+    assert 0.0 <= after_m3 < np.inf
+    assert np.all((taken_m3h >= 0.0) & (taken_m3h <= flows_m3h))
+    balance_m3 = volume_m3 + (inflow_m3h - overflow_m3h - taken_m3h.sum()) / 3600.0
+    assert after_m3 == pytest.approx(max(balance_m3, 0.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("layout", ["individual", "common"])
