@@ -113,7 +113,8 @@ def attribute(
     condition = conditions_of(residuals.bins, traces, replay.station)
     has_inflow = traces.inflow_m3h is not None
     cells = cells_of(residuals.bins, condition, has_inflow=has_inflow, is_each_second=traces.is_each_second)
-    cells = with_jumps(cells, residuals.bins, residuals_of(plain))
+    if all(pattern.quantity != "level_m" for pattern in residuals.telemetry.patterns):
+        cells = with_jumps(cells, residuals.bins, residuals_of(plain))
     hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
