@@ -19,7 +19,7 @@ from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
-from wetwell.sim2real.likelihood.cells import cells_of
+from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import SetProbability, best_set, equivalents, posterior_of, verdict_of
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
@@ -109,13 +109,7 @@ def attribute(
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     trials = Trials(fitter, guesses, progress, each)
     singles = trials.singles()
-    traces = replay.traces
-    condition = conditions_of(residuals.bins, traces, replay.station)
-    has_inflow = traces.inflow_m3h is not None
-    cells = cells_of(residuals.bins, condition, has_inflow=has_inflow, is_each_second=traces.is_each_second)
-    if all(pattern.quantity != "level_m" for pattern in residuals.telemetry.patterns):
-        cells = with_jumps(cells, residuals.bins, residuals_of(plain))
-    hypotheses = Hypotheses(fitter, cells, each)
+    hypotheses = Hypotheses(fitter, weighed_cells(replay, residuals, residuals_of(plain)), each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses)
@@ -151,6 +145,26 @@ def attribute(
         possible=possible_sets(hypotheses, posterior),
         not_tested=not_tested,
     )
+
+
+def weighed_cells(replay: Replay, residuals: StationResiduals, plain: Floats) -> Cells:
+    """Cells of all bins, and how an inflow that nobody measures jumps.
+
+    What telemetry rounds or holds of a level is no error: such a level has hardly any at rest, and some in runs. So
+    its rests say nothing of jumps.
+
+    Parameters
+    ----------
+    replay : Replay
+    residuals : StationResiduals
+    plain : (bins,) array
+        Without any effect.
+    """
+    bins, traces = residuals.bins, replay.traces
+    condition, has_inflow = conditions_of(bins, traces, replay.station), traces.inflow_m3h is not None
+    cells = cells_of(bins, condition, has_inflow=has_inflow, is_each_second=traces.is_each_second)
+    is_coarse = any(pattern.quantity == "level_m" for pattern in residuals.telemetry.patterns)
+    return cells if is_coarse else with_jumps(cells, bins, plain)
 
 
 def halves(bins: Bins, pumps: int) -> tuple[Flags, Flags]:

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wetwell.sim2real.attribution.attribution import weighed_cells
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
-from wetwell.sim2real.likelihood.cells import Jumps, cells_of
-from wetwell.sim2real.likelihood.jumps import with_jumps
+from wetwell.sim2real.likelihood.cells import Jumps
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -38,9 +38,7 @@ def learnt(recording, alpha) -> Jumps | None:
     traces = traces_of(recording, alpha)
     replay = Replay(traces, alpha)
     residuals = StationResiduals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt())
-    bins = residuals.bins
-    cells = cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=False, is_each_second=True)
-    found = with_jumps(cells, bins, residuals.of(replay.run()))
+    found = weighed_cells(replay, residuals, residuals.of(replay.run()))
     return next(block.jumps for block in found.blocks if block.signal == LEVEL and block.may_jump)
 
 
@@ -60,3 +58,9 @@ def test_jumps_are_learnt_from_the_level_at_rest(alpha):
     assert jumps is not None
     assert 0.05 < jumps.probability < 0.2
     assert 10.0 * jumps.quiet < 1.0 < 0.1 * jumps.jumping
+
+
+def test_a_rounded_level_says_nothing_of_jumps(alpha):
+    recording = recorded(alpha, pulses(np.random.default_rng(971_101), 150.0, 5.0), 971_101)
+    level_m = np.round(recording.columns["level_m"] / 0.07) * 0.07
+    assert learnt(replace(recording, columns=recording.columns | {"level_m": level_m}), alpha) is None
