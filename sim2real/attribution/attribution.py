@@ -9,8 +9,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.changes import MOST_CHANGED, changed
-from wetwell.sim2real.attribution.fit.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.fit.refining import refined
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
@@ -119,7 +118,7 @@ def attribute(
     equal: dict[str, tuple[str, ...]] = {}
     while verdict_of(posterior := posterior_of(hypotheses.weights(), len(singles), log_share)) == "effect":
         names = best_set(posterior)
-        own = in_order(fitter, refined(fitter, hypotheses.of(names).fit))
+        own = in_order(fitter, hypotheses.of(names).fit)
         own_ends = ends = intervals_of(fitter, own, residuals.bins)
         if are_sized(own, own_ends):
             accepted = informed(fitter, own, priors)

@@ -1,12 +1,10 @@
 """Effects whose strength may differ from one recording to the next, tried beside those that stay as they are."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
-from wetwell.sim2real.attribution.fit.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.fit.refining import refined
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.simulator.effects import EFFECTS
 
@@ -33,7 +31,7 @@ def changed(fitter: Fitter, fits: Sequence[Fit], each: Each) -> list[Fit]:
     if periods < 2:
         return []
     started = [begun for fit in fits if (begun := _begun(fitter, fit, periods)) is not None]
-    return list(each(partial(refined, fitter), started))
+    return list(each(fitter.refine, started))
 
 
 def _begun(fitter: Fitter, fit: Fit, periods: int) -> Fit | None:

@@ -1,15 +1,12 @@
 """Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.attribution.fit.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.fit.objective import likely
-from wetwell.sim2real.attribution.fit.refining import refined
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.presence import (
     are_there,
     is_only_late,
@@ -20,7 +17,7 @@ from wetwell.sim2real.attribution.presence import (
 )
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import GOOD, LATE, POOR_FORM, Form
+from wetwell.sim2real.likelihood.covariance import GOOD, LATE, POOR_FORM, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, Member, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
@@ -29,18 +26,11 @@ from wetwell.sim2real.residuals.rates import rate_of
 from wetwell.simulator.effects.effect import Effect
 
 HOPELESS = (0.5, 50.0)
-"""Share of what the best of some sets explains, and sum of squares or logarithm beyond that, by which one may be
-behind it to be looked at."""
+"""Share of what the best of some fits explains, and sum of squares beyond that, by which a fit may be behind it."""
 MOST_COMPANIONS = 1
 """Effects of a set that are too small to be told: the inertia of the water beside a lag."""
 FLEXED = 4
 """Sets, the best first, beside which something unknown is weighed: it needs what explains most."""
-REFITTED = 12
-"""Sets of those that are added at once, the best first, that are fitted under the covariance by which they weigh."""
-REFITS = 6
-"""Fits under one covariance after another at the most."""
-LEAST_LOG_GAIN = 0.5
-"""In the logarithm, for which a set is fitted under another covariance once more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +40,8 @@ class Hypothesis:
     Attributes
     ----------
     fit : Fit
-    slopes : (cells, parameters) array
-        Change of the residuals over the range of each parameter; of no cells once it is kept, as it is large.
     evidence : Evidence
+    form : Form
     is_there : bool
         Whether none of its effects may be neutral, and none that is told could do another's work.
     told : tuple of str
@@ -60,8 +49,8 @@ class Hypothesis:
     """
 
     fit: Fit
-    slopes: Floats
     evidence: Evidence
+    form: Form
     is_there: bool
     told: tuple[str, ...]
 
@@ -92,8 +81,7 @@ class Hypotheses:
         self._fitter, self._cells, self._each = fitter, cells, each
         self._plain = self._means(fitter.plain)
         none = evidence_of_none(cells, self._plain)
-        no_slopes = np.zeros((self._plain.size, 0))
-        self._none = Hypothesis(fit=fitter.plain, slopes=no_slopes, evidence=none, is_there=True, told=())
+        self._none = Hypothesis(fit=fitter.plain, evidence=none, form=no_form(cells), is_there=True, told=())
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
         self._factors: dict[tuple[str, ...], float] = {}
 
@@ -120,20 +108,14 @@ class Hypotheses:
         least, plain = min(costs, default=0.0), self._fitter.cost(self._fitter.plain)
         most = min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain)
         hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
-        found = self._weighed_best(hopeful)
+        found = list(self._each(self._weighed, hopeful))
         is_known = {*self._best, *(one.effects for one in found)}
         alone = [self._fitter.only(one.fit, one.told) for one in found if one.is_there and one.told not in is_known]
-        refit = self._each(partial(refined, self._fitter), [fit for fit in alone if fit is not None])
-        self._keep([*found, *self._weighed_best(refit)])
-        best = self.weighed[0]
-        self._keep(list(self._each(partial(self._at_places_of, best), self._fewer(best))))
-
-    def _keep(self, found: Iterable[Hypothesis]) -> None:
-        """The best of each set of names."""
-        for one in found:
+        refined = self._each(self._fitter.refine, [fit for fit in alone if fit is not None])
+        for one in [*found, *self._each(self._weighed, refined)]:
             known = self._best.get(one.effects)
             if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
-                self._best[one.effects] = replace(one, slopes=one.slopes[:0])
+                self._best[one.effects] = one
 
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""
@@ -160,43 +142,8 @@ class Hypotheses:
             for one in weighed
         ]
 
-    def _weighed_best(self, fits: Iterable[Fit]) -> list[Hypothesis]:
-        """Fits as hypotheses, the best of them where they weigh most."""
-        found = sorted(self._each(self._weighed, fits), key=lambda one: -one.evidence.log)
-        most = max(one.evidence.log for one in [*found, *self._best.values()])
-        least = most - HOPELESS[0] * (most - self._none.evidence.log) - HOPELESS[1]
-        best = [one for one in found[:REFITTED] if one.evidence.log > least]
-        return [*self._each(self._refitted, best), *found[len(best) :]]
-
-    def _refitted(self, one: Hypothesis) -> Hypothesis:
-        """Where a set weighs most: the covariance follows the fit, and the fit the covariance."""
-        for other in self._fewer(one):
-            one = self._at_places_of(other, one)
-        for _ in range(REFITS):
-            objective = likely(self._cells, one.evidence, self._fitter.rows)
-            fit = refined(self._fitter, one.fit, objective, one.slopes)
-            if fit is one.fit or (again := self._weighed(fit)).evidence.log < one.evidence.log + LEAST_LOG_GAIN:
-                return one
-            one = again
-        return one
-
-    def _fewer(self, one: Hypothesis) -> list[Hypothesis]:
-        """Those that are known of a set without one of its effects."""
-        sets = (tuple(name for name in one.effects if name != gone) for gone in one.effects)
-        return [self._best[effects] for effects in sets if effects in self._best]
-
-    def _at_places_of(self, other: Hypothesis, one: Hypothesis) -> Hypothesis:
-        """A set where another one has the effects that both have, if it weighs more there."""
-        places = dict(zip(other.fit.candidates, other.fit.points, strict=True))
-        points = [places.get(its, point) for its, point in zip(one.fit.candidates, one.fit.points, strict=True)]
-        way = np.concatenate([*points, np.zeros(0)]) - one.fit.position
-        if way @ one.evidence.precision @ way < LEAST_LOG_GAIN:
-            return one
-        fit = self._fitter.at(one.fit.candidates, points)
-        return one if fit is None else max(one, self._weighed(fit), key=lambda each: each.evidence.log)
-
     def _flexible(self, one: Hypothesis) -> float:
-        return flexible_factor(one.evidence)
+        return flexible_factor(one.evidence, one.form)
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))
@@ -226,8 +173,8 @@ class Hypotheses:
         ]
         return Hypothesis(
             fit=fit,
-            slopes=slopes,
             evidence=found,
+            form=form,
             is_there=None not in fewer
             and are_there(found, [len(one.neutral) for one in members])
             and self._are_apart(fit.position, of_member, told, signatures, slopes),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wetwell.sim2real.attribution.fit.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.intervals import covariance_of
 from wetwell.sim2real.attribution.known import agreeing, known_of, narrowed
 from wetwell.sim2real.likelihood.priors import Priors

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.attribution.fit.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.known import agreeing, known_of, narrowed
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import REGIMES

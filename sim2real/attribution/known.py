@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.attribution.fit.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.likelihood.priors import Priors
 
 FAR = 3.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wetwell.sim2real.attribution.fit.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
 from wetwell.sim2real.likelihood.posterior import CREDIBLE, SetProbability
 from wetwell.simulator.effects.effect import Effect

@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 from scipy.special import gammaincinv
 
 from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.attribution.fit.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import LATE
 from wetwell.sim2real.likelihood.evidence import Evidence

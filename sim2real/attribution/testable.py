@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import PUMP_METERS, AnalogueQuantity
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.attribution.fit.fitting import Fitter
+from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay

@@ -8,8 +8,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
-from wetwell.sim2real.attribution.fit.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.fit.refining import refined
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Applies a function to items, in order, as `map` does: perhaps side by side."""
@@ -65,12 +64,12 @@ class Trials:
             self._progress(0.3 * (k + 1) / len(self._guesses))
         most = max((before - fitter.cost(fit) for fit in firsts), default=0.0)
 
-        def promising(fit: Fit) -> Fit:
+        def refined(fit: Fit) -> Fit:
             gain = before - fitter.cost(fit)
-            return refined(fitter, fit) if gain > PROMISING * most and gain > 0.0 else fit
+            return fitter.refine(fit) if gain > PROMISING * most and gain > 0.0 else fit
 
         best: dict[tuple[str, ...], Fit] = {}
-        for k, fit in enumerate(self._each(promising, firsts)):
+        for k, fit in enumerate(self._each(refined, firsts)):
             if fitter.cost(fit) < fitter.cost(best.get(fit.names)):
                 best[fit.names] = fit
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
@@ -100,12 +99,12 @@ class Trials:
         header would have to take back all that it explains. The other one is the best with the others as they stand.
         """
         fitter = self._fitter
-        found = [refined(fitter, fit)]
-        if fitter.cost(found[0]) <= fitter.cost(current):
-            return found[0]
+        refined = fitter.refine(fit)
+        if fitter.cost(refined) <= fitter.cost(current):
+            return refined
         last, nothing = fit.candidates[-1], np.zeros((int(fitter.rows.sum()), 0))
         again, _ = fitter.first(last, self._start_grids(last), current, nothing)
-        found += [] if again is None else [refined(fitter, again)]
+        found = [refined] if again is None else [refined, fitter.refine(again)]
         return min(found, key=fitter.cost)
 
     def _start_grids(self, candidate: Candidate, strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:

@@ -7,7 +7,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.attribution import Attribution
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.attribution.fit.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.diagnosis.report import FittedParameter, FoundEffect, NoiseCheck, RankedCandidate, Where
 from wetwell.sim2real.diagnosis.shrinkage import cell_gap, gap_of
 from wetwell.sim2real.likelihood.cells import cells_of

@@ -13,8 +13,8 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.covariance import Form
+from wetwell.sim2real.likelihood.evidence import weighed
 from wetwell.sim2real.likelihood.posterior import CREDIBLE
-from wetwell.sim2real.likelihood.stirred import weighed
 from wetwell.sim2real.likelihood.ways import KNOWN, Ways
 from wetwell.sim2real.recording.joining import joined
 from wetwell.sim2real.recording.regimes import regimes_of

@@ -1,6 +1,6 @@
 """What the likelihood is of: the mean of the residuals of a group in a cycle."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -86,21 +86,15 @@ class Block:
 
     def group_sums(self, values: Floats) -> Floats:
         """(groups, ...) sums of (k, ...) values."""
-        return _sums(self.group, values, self.span.size)
+        return _sums(self.group, values)
 
     def group_means(self, values: Floats) -> Floats:
         """(groups,) means of (k,) values."""
-        return self.group_sums(values) / np.maximum(self.group_sums(np.ones(values.size)), 1.0)
+        return self.group_sums(values) / self.group_sums(np.ones(values.size))
 
     def cycle_sums(self, values: Floats) -> Floats:
         """(cycles, ...) sums of (k, ...) values."""
-        return _sums(self.cycle, values, self.in_storm.size)
-
-    def chosen(self, rows: Integers) -> "Block":
-        """Some of its cells, with the numbers of groups and cycles as they are."""
-        names = ("rows", "group", "cycle", "variance", "allowed", "of_inflow")
-        parts = {name: getattr(self, name)[rows] for name in names}
-        return replace(self, surge=np.asarray(self.surge)[rows] if np.ndim(self.surge) else self.surge, **parts)
+        return _sums(self.cycle, values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,7 +211,8 @@ def _first(group: Integers, values: Integers) -> Integers:
     return values[np.unique(group, return_index=True)[1]]
 
 
-def _sums(number: Integers, values: Floats, count: int) -> Floats:
+def _sums(number: Integers, values: Floats) -> Floats:
+    count = int(number.max(initial=-1)) + 1
     if values.ndim == 1:
         return np.asarray(np.bincount(number, values, count), dtype=np.float64)
     return np.array([np.bincount(number, column, count) for column in values.T]).T

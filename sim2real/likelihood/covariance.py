@@ -33,10 +33,6 @@ class Errors:
         """A share of them."""
         return Errors(offset=share * self.offset, form=share * self.form)
 
-    def chosen(self, rows: Integers) -> "Errors":
-        """Some of them, where they are arrays."""
-        return Errors(offset=np.asarray(self.offset)[rows], form=np.asarray(self.form)[rows])
-
 
 GOOD = Errors(offset=OFFSET, form=GOOD_FORM)
 POOR = Errors(offset=1.0, form=POOR_FORM)
@@ -149,7 +145,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     if np.any(form.late):
         parts.append((form.late, *LATE))
     weight = 1.0 / variance
-    groups, cycles = block.span.size, block.in_storm.size
+    groups, cycles = block.span.size, int(block.cycle.max()) + 1
     size = groups * len(parts)
     cycle_weight = 1.0 / (1.0 + block.cycle_sums(weight * in_cycle**2))
     by_cycle = block.cycle_sums(columns * (weight * in_cycle)[:, None])

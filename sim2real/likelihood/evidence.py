@@ -1,7 +1,7 @@
 """How probable the cells are under a set of effects, its parameters and errors of form integrated out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, product
 
 import numpy as np
@@ -9,14 +9,39 @@ from scipy.linalg import solve
 from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import Form, no_form
-from wetwell.sim2real.likelihood.stirred import Stirred, weighed
+from wetwell.sim2real.likelihood.cells import Block, Cells
+from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
+from wetwell.sim2real.likelihood.jumps import jumping
+from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
+from wetwell.sim2real.likelihood.ways import KNOWN, Ways, likeliest
 
 TRUSTED = 0.01
-"""Share of the range of a parameter for which its slopes are taken to hold: half of the cycles were fitted. [1]"""
+"""Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
 WEIGHINGS = 2
 """Looks at what is wrong: at the fit, and at what is most probable under what was seen there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stirred:
+    """A block with a surge of the inflow and its rain, and the error of the course of what swings.
+
+    Attributes
+    ----------
+    block : Block
+    swing : float
+    log_rain : float
+        What not knowing where it rains adds to the logarithm of the probability.
+    dry : Block, optional
+        The block without its rain, where there is some.
+    log_dry : float
+        Logarithm of the probability that it is dry in all cycles.
+    """
+
+    block: Block
+    swing: float = SWINGS[0]
+    log_rain: float = 0.0
+    dry: Block | None = None
+    log_dry: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +80,7 @@ class Evidence:
     precision : (parameters, parameters) array
         Inverse of the covariance of the parameters, over their ranges.
     stirred : tuple of Stirred
-        Each block with what is likeliest to be wrong in it.
+        Each block with its likeliest surge and swing.
     needed : (effects,) array
         By how much each effect makes the recording likelier, twice the logarithm, under the same errors and with the
         parameters of the others at their best without it.
@@ -102,8 +127,7 @@ def evidence(
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
     count = slopes.shape[1]
-    columns = np.column_stack([residuals, slopes, *(one.absent for one in members)])
-    best = step = np.zeros(count)
+    columns, step = np.column_stack([residuals, slopes, *(one.absent for one in members)]), np.zeros(count)
     fitted = slice(0, 1 + count)
     for _ in range(WEIGHINGS if count else 1):
         left = residuals + slopes @ step
@@ -112,10 +136,9 @@ def evidence(
         ]
         inner = np.sum([products for _, products, _ in likely], axis=0)
         precision, slope = inner[1 : 1 + count, 1 : 1 + count], inner[1 : 1 + count, 0]
-        best = _step(precision, slope)
-        step = _trusted(best)
-    near, along = np.r_[1.0, step], np.r_[1.0, best]
-    by_block = np.array([log - 0.5 * float(near @ products[fitted, fitted] @ near) for log, products, _ in likely])
+        step = _step(precision, slope)
+    along = np.r_[1.0, step]
+    by_block = np.array([log - 0.5 * float(along @ products[fitted, fitted] @ along) for log, products, _ in likely])
     peak = float(along @ inner[fitted, fitted] @ along)
     logs = [
         _of_part(inner[fitted, fitted], fixed) + 0.5 * peak
@@ -136,15 +159,10 @@ def evidence(
 
 
 def _step(precision: Floats, slope: Floats) -> Floats:
-    """To the most probable parameters, by the slopes."""
+    """To the most probable parameters, within `TRUSTED` of the fit."""
     if slope.size == 0:
         return np.zeros(0)
     return np.asarray(-solve(precision + np.eye(slope.size) * TRUSTED**-2, slope, assume_a="pos"), dtype=np.float64)
-
-
-def _trusted(step: Floats) -> Floats:
-    """As much of a step as stays where the slopes hold."""
-    return step * min(1.0, TRUSTED / max(float(np.abs(step).max(initial=0.0)), TRUSTED))
 
 
 def _partly(neutral: Mapping[int, float]) -> list[dict[int, float]]:
@@ -182,3 +200,53 @@ def _least(inner: Floats, first: Floats, free: Sequence[int]) -> float:
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     """Evidence without any effect."""
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
+
+
+def weighed(
+    block: Block, columns: Floats, residuals: Floats, form: Form, ways: Ways = KNOWN
+) -> tuple[float, Floats, Stirred]:
+    """A block under what is likeliest to be wrong in it.
+
+    Parameters
+    ----------
+    block : Block
+    columns : (k, n) array
+        Of which products are made.
+    residuals : (k,) array
+        By which it is seen what is wrong.
+    form : Form
+        Of the block's cells.
+    ways : Ways
+        What may be wrong.
+
+    Returns
+    -------
+    log, products, stirred : float, (n, n) array, Stirred
+        Logarithm of volume and of what not knowing the ways adds, the products of the columns, and the likeliest
+        surge and swing.
+    """
+    tried = []
+    rained = [_rained_on(replace(block, surge=surge), residuals) for surge in block.surges]
+    for still, swing in product(rained, SWINGS if np.any(form.swinging) else SWINGS[:1]):
+        one = replace(still, swing=swing)
+        log_prior, allowance = likeliest(one.block, residuals, form, swing, ways)
+        products, log_det = projected(one.block, columns, form, allowance)
+        tried.append((one.log_rain + log_prior - 0.5 * log_det, products, one))
+    totals = np.array([log - 0.5 * float(products[0, 0]) for log, products, _ in tried])
+    best = int(np.argmax(totals))
+    log, products, stirred = tried[best]
+    unsure = float(logsumexp(totals) - totals[best] - np.log(len(tried)))
+    return log + unsure, products, stirred
+
+
+def _rained_on(block: Block, residuals: Floats) -> Stirred:
+    """A block with its likeliest rain, if it may have any."""
+    if not block.may_rain:
+        return Stirred(block=block)
+    block, log_jumps = jumping(block, residuals)
+    is_rainy, log_rain = rainy_cells(block, residuals)
+    if not is_rainy.any():
+        return Stirred(block=block, log_rain=log_rain + log_jumps)
+    wet = replace(block, surge=np.where(is_rainy, block.surge + RAIN, block.surge))
+    log_dry = float(log_priors(block)[0].sum())
+    return Stirred(block=wet, log_rain=log_rain + log_jumps, dry=block, log_dry=log_dry + log_jumps)

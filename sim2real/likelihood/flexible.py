@@ -5,9 +5,8 @@ from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import TIMES, Block
-from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, projected
-from wetwell.sim2real.likelihood.evidence import Evidence
-from wetwell.sim2real.likelihood.stirred import Stirred
+from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, projected
+from wetwell.sim2real.likelihood.evidence import Evidence, Stirred
 from wetwell.sim2real.likelihood.ways import KNOWN, Way, Ways, likeliest
 
 SCALES = TIMES[1:]
@@ -26,7 +25,7 @@ UNKNOWN_WAYS = (
 """What something unknown may be: alike for all pumps or in each, changing, or both; each as likely."""
 
 
-def flexible_factor(found: Evidence) -> float:
+def flexible_factor(found: Evidence, form: Form) -> float:
     r"""Logarithm of how much more probable the residuals are if something unknown may be in them.
 
     $$F = \prod_b \frac{\tfrac12\,p(r_b) + \tfrac12 \sum_k p_k\, p(r_b \mid \lambda_k, \mu_k)}{p(r_b)}$$
@@ -37,26 +36,28 @@ def flexible_factor(found: Evidence) -> float:
     Parameters
     ----------
     found : Evidence
+    form : Form
         Of the effects beside which it acts.
     """
     total = 0.0
     for one in found.stirred:
-        residuals = found.residuals[one.block.rows]
-        known, *unknown = (_log(one, residuals, ways) for ways in (KNOWN, *UNKNOWN_WAYS))
+        rows = one.block.rows
+        known, *unknown = (
+            _log(one, found.residuals[rows], form.chosen(rows), ways) for ways in (KNOWN, *UNKNOWN_WAYS)
+        )
         total += float(np.logaddexp(0.0, logsumexp(unknown) - np.log(len(unknown)) - known) - np.log(2.0))
     return total
 
 
-def _log(one: Stirred, residuals: Floats, ways: Ways) -> float:
+def _log(one: Stirred, residuals: Floats, form: Form, ways: Ways) -> float:
     """Logarithm of the probability of the residuals of a block, its surge and swing as they are, with rain or dry."""
-    rained = one.rained
-    wet = rained.log + _of_block(rained.block, residuals, one, ways)
-    if rained.dry is None:
+    wet = one.log_rain + _of_block(one.block, one.swing, residuals, form, ways)
+    if one.dry is None:
         return wet
-    return float(np.logaddexp(wet, rained.log_dry + _of_block(rained.dry, residuals, one, ways)))
+    return float(np.logaddexp(wet, one.log_dry + _of_block(one.dry, one.swing, residuals, form, ways)))
 
 
-def _of_block(block: Block, residuals: Floats, of: Stirred, ways: Ways) -> float:
-    log_prior, allowance = likeliest(block, residuals, of.form, of.allowance.swing, ways)
-    products, log_det = projected(block, residuals[:, None], of.form, allowance)
+def _of_block(block: Block, swing: float, residuals: Floats, form: Form, ways: Ways) -> float:
+    log_prior, allowance = likeliest(block, residuals, form, swing, ways)
+    products, log_det = projected(block, residuals[:, None], form, allowance)
     return log_prior - 0.5 * (float(products[0, 0]) + log_det)

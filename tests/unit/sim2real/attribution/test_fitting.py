@@ -4,15 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
 
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fit.fitting import Fitter
-from wetwell.sim2real.attribution.fit.objective import likely
-from wetwell.sim2real.attribution.fit.refining import refined
-from wetwell.sim2real.likelihood.cells import cells_of
-from wetwell.sim2real.likelihood.evidence import evidence_of_none
+from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.recording.regimes import STEADY, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -46,7 +41,7 @@ def fitter(alpha):
 def lag(fitter, alpha):
     """The lag of one filter alone, which has taken the place of the inertia as far as it can."""
     one = candidate(alpha, "flow_meter_lag")
-    return refined(fitter, fitter.at([replace(one, free=one.free[:1])], [np.array([0.05])]))
+    return fitter.refine(fitter.at([replace(one, free=one.free[:1])], [np.array([0.05])]))
 
 
 def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
@@ -55,28 +50,11 @@ def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
     start, promised = fitter.first(inertia, inertia.start_grids({}), lag, reach)
     assert fitter.cost(start) > fitter.cost(lag), "beside the lag as it stands nothing is gained"
     assert promised < 0.9 * fitter.cost(lag)
-    both = refined(fitter, start)
+    both = fitter.refine(start)
     assert fitter.cost(both) == pytest.approx(promised, rel=0.3)
     found = {effect.name: effect.model_dump() for effect in both.effects}
     assert found["flow_meter_lag"]["lag_s"] == pytest.approx(4.0, abs=0.2)
     assert found["water_inertia"]["inertia_s2_m2"] == pytest.approx(400.0, rel=0.2)
-
-
-def test_a_fit_under_a_covariance_is_its_least_sum_of_squares(fitter, lag):
-    """Inverted densely, of half of the cycles, and with what is likeliest to be wrong at the start."""
-    bins = fitter.bins
-    cells = cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=True, is_each_second=True)
-    objective = likely(cells, evidence_of_none(cells, cells.means(residuals_of(lag.residuals))), bins.cycle % 2 == 0)
-
-    def left(position):
-        seen = objective.seen(fitter.at(lag.candidates, lag.split(position)).residuals)
-        return float(objective.products(seen[:, None])[0, 0])
-
-    best = refined(fitter, lag, objective)
-    reference = minimize_scalar(lambda x: left(np.array([x])), bounds=(0.0, 0.3), method="bounded")
-    assert left(best.position) < left(lag.position) - 1.0
-    assert left(best.position) == pytest.approx(reference.fun, abs=1.0)
-    assert refined(fitter, best, objective) is best
 
 
 def test_reach_is_that_of_least_squares(fitter, lag):

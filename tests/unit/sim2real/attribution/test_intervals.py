@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fit.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.attribution.intervals import are_sized
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fit.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.attribution.known import FAR, Known, agreeing, known_of, narrowed
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
 

@@ -5,8 +5,7 @@ import pytest
 
 from wetwell.sim2real.attribution.attribution import halves
 from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fit.fitting import Fitter
-from wetwell.sim2real.attribution.fit.refining import refined
+from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.trials import Trials
 from wetwell.sim2real.recording.regimes import regimes_of
@@ -35,7 +34,7 @@ def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start()
         for name in ("common_header", "flow_low_cutoff")
     )
     guesses = {one: initial_guesses(one, replay, residuals, fitter.plain.residuals) for one in (header, cutoff)}
-    alone = refined(fitter, fitter.at([header], [np.array([0.8])]))
+    alone = fitter.refine(fitter.at([header], [np.array([0.8])]))
     (both,) = Trials(fitter, guesses, lambda _: None, map).with_one_more(alone)
     assert both.names == ("common_header", "flow_low_cutoff")
     assert fitter.cost(both) < 0.5 * fitter.cost(alone)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wetwell.sim2real.likelihood.cells import Jumps, cells_of
-from wetwell.sim2real.likelihood.covariance import expected_squares
+from wetwell.sim2real.likelihood.covariance import expected_squares, no_form
 from wetwell.sim2real.likelihood.evidence import evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.jumps import jumping, with_jumps
@@ -43,7 +43,7 @@ def errors(bins, seed, jumps=BETWEEN):
 
 
 def factor(cells, residuals):
-    return flexible_factor(evidence_of_none(cells, residuals))
+    return flexible_factor(evidence_of_none(cells, residuals), no_form(cells))
 
 
 def test_jumps_are_learnt_as_they_are():

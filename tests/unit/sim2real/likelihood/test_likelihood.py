@@ -24,7 +24,6 @@ from wetwell.sim2real.likelihood.covariance import (
 from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
-from wetwell.sim2real.likelihood.stirred import weighed
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, LEVEL, Bins
@@ -134,22 +133,6 @@ def test_products_are_those_of_the_dense_covariance(cells, errors, has_form, sur
         assert log_det == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-9)
 
 
-def test_some_cells_of_a_block_have_their_part_of_its_covariance(cells):
-    rng = np.random.default_rng(6)
-    columns, is_kept = rng.normal(size=(cells.group.size, 3)), rng.random(cells.group.size) < 0.5
-    is_kept[cells.blocks[0].rows[cells.blocks[0].group == 1]] = False  # a group of which nothing is left
-    form = replace(some_form(cells, rng), signature=np.full(cells.group.size, 0.7))
-    for block in cells.blocks:
-        of_block = form.chosen(block.rows)
-        one = weighed(block, columns[block.rows], columns[block.rows, 0], of_block)[2]
-        kept = np.flatnonzero(is_kept[block.rows])
-        whole = dense(one.block, of_block, one.allowance)[np.ix_(kept, kept)]
-        its = columns[block.rows][kept]
-        np.testing.assert_allclose(
-            one.within(is_kept).products(columns), its.T @ np.linalg.solve(whole, its), rtol=1e-9
-        )
-
-
 def log_densities(cells, residuals):
     """Of all ways to be wrong together, block by block, but for the factors of 2π: (blocks, ...)."""
     found = []
@@ -256,7 +239,7 @@ def test_only_what_is_far_over_the_allowed_size_asks_for_something_unknown(cells
     noise = np.sqrt(cells.variance) * rng.normal(size=cells.group.size)
 
     def factor(residuals):
-        return flexible_factor(evidence_of_none(cells, residuals))
+        return flexible_factor(evidence_of_none(cells, residuals), no_form(cells))
 
     assert factor(noise) < 0.0
     assert factor(noise + 0.7 * cells.allowed) < 0.0
@@ -282,7 +265,9 @@ def test_surges_of_an_inflow_without_a_meter_are_no_surprise_in_the_level_and_on
         residuals[rows] *= 2.5
         gain = evidence_of_none(without, residuals).log - evidence_of_none(with_meter, residuals).log
         assert (gain > 1.0) == gains
-        factors = [flexible_factor(evidence_of_none(each, residuals)) for each in (with_meter, without)]
+        factors = [
+            flexible_factor(evidence_of_none(each, residuals), no_form(each)) for each in (with_meter, without)
+        ]
         assert (factors[1] < factors[0] - 0.1) == gains
 
 
@@ -304,7 +289,7 @@ def test_what_no_surge_makes_is_no_likelier_unknown_where_there_may_be_one():
         residuals = 0.3 * noise * np.sqrt(cells.variance)
         for block in cells.blocks:
             residuals[block.rows] += (block.signal == LEVEL) * 3.0 * cells.allowed[block.rows]
-        factors.append(flexible_factor(evidence_of_none(cells, residuals)))
+        factors.append(flexible_factor(evidence_of_none(cells, residuals), no_form(cells)))
     assert 0.0 < factors[0] - 1.0 < factors[1] < factors[0] + 0.05
 
 
@@ -316,7 +301,7 @@ def test_rain_in_some_cycles_is_nothing_unknown_and_the_same_in_all_is():
         residuals = noise.copy()
         residuals[level.rows] += size * np.isin(level.cycle, cycles) * cells.allowed[level.rows]
         found = evidence_of_none(cells, residuals)
-        assert (flexible_factor(found) > 0.0) == is_unknown
+        assert (flexible_factor(found, no_form(cells)) > 0.0) == is_unknown
 
 
 def test_rain_is_summed_over_as_it_would_be_cycle_by_cycle():
@@ -350,6 +335,6 @@ def test_several_pumps_tell_of_rain():
         (level,) = [block for block in blocks if block.signal == LEVEL]
         residuals = noise.copy()
         residuals[level.rows] += 5.0 * cells.allowed[level.rows]
-        factors.append(flexible_factor(evidence_of_none(each, residuals)))
+        factors.append(flexible_factor(evidence_of_none(each, residuals), no_form(each)))
     assert factors[0] > 5.0
     assert factors[1] < 0.0

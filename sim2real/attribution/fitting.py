@@ -14,10 +14,16 @@ from wetwell.simulator.effects.effect import Effect
 
 SLOPE_STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
+ROUNDS = 12
+DAMPINGS = 5
+"""Steps of a round, each damped more, of which one has to lead down."""
+LONGEST_STEP = 0.3
+SETTLED = 1e-3
 LEAST_REACH = 1e-9
 """Of a direction, as a share of the largest: under it is rounding. [1]"""
 MOST_AWAY = 2
 """Points of a grid, each worse than the best before, after which it is left."""
+SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,28 +148,81 @@ class Fitter:
                     break
         return best, least
 
+    def refine(self, fit: Fit) -> Fit:
+        """Levenberg and Marquardt's method from where a fit stands, within the ranges."""
+        if fit.position.size == 0:
+            return fit
+        current, damping = fit, 1e-2
+        for _ in range(ROUNDS):
+            slopes = self._differences(current, np.asarray)[self.rows]
+            gradient = slopes.T @ current.residuals[self.rows]
+            squares = slopes.T @ slopes
+            x = current.position
+            is_bound = ((x <= 0.0) & (gradient > 0.0)) | ((x >= 1.0) & (gradient < 0.0)) | (np.diag(squares) <= 0.0)
+            if is_bound.all():
+                return self._scanned(fit)
+            moved, damping = self._moved(current, gradient, squares, ~is_bound, damping)
+            if moved is None:
+                return self._scanned(fit) if current is fit else current
+            gain = self.cost(current) - self.cost(moved)
+            current = moved
+            if gain < SETTLED * self.cost(current):
+                break
+        return current
+
+    def _moved(
+        self, fit: Fit, gradient: Floats, squares: Floats, is_free: Flags, damping: float
+    ) -> tuple[Fit | None, float]:
+        """First of some steps, each damped more, that leads down, and the damping of the next round."""
+        inner = squares[np.ix_(is_free, is_free)]
+        for _ in range(DAMPINGS):
+            step = np.zeros(is_free.size)
+            step[is_free] = -np.linalg.solve(inner + damping * np.diag(np.diag(inner)), gradient[is_free])
+            position = np.clip(fit.position + np.clip(step, -LONGEST_STEP, LONGEST_STEP), 0.0, 1.0)
+            tried = self.at(fit.candidates, fit.split(position))
+            if self.cost(tried) < self.cost(fit):
+                return tried, damping / 6.0
+            damping *= 6.0
+        return None, damping
+
+    def _scanned(self, fit: Fit) -> Fit:
+        """Fit with the last candidate's strengths tried nearer to neutral and further off: limits have no slope."""
+        best = fit
+        for k, free in enumerate(fit.candidates[-1].free):
+            if free.neutral is None:
+                continue
+            neutral = free.normalised(free.neutral)
+            for factors in SCANS:
+                start = best.points[-1]
+                for factor in factors:
+                    point = start.copy()
+                    point[k] = min(max(neutral + factor * (start[k] - neutral), 0.0), 1.0)
+                    tried = self.at(fit.candidates, (*fit.points[:-1], point))
+                    if tried is not None and self.cost(tried) < self.cost(best):
+                        best = tried
+        return best
+
     def slopes(self, fit: Fit) -> Floats:
         """(bins, parameters) change of the residuals themselves with each parameter, over its range.
 
         The noise is no part of it: what was measured is the same on both sides of a difference.
         """
-        return self.differences(fit, residuals_of)
+        return self._differences(fit, residuals_of)
 
     def loss_slopes(self, fit: Fit) -> Floats:
         """(bins, parameters) change of the losses with each parameter, over its range."""
         return np.asarray(self.slopes(fit) * steepness(fit.residuals)[:, None], dtype=np.float64)
 
-    def differences(self, fit: Fit, of: Callable[[Floats], Floats]) -> Floats:
+    def _differences(self, fit: Fit, of: Callable[[Floats], Floats]) -> Floats:
         """(bins, parameters) differences of something of the losses, over steps of the parameters."""
         x = fit.position
-        here = of(fit.residuals)
-        slopes = np.zeros((here.size, x.size))
+        slopes = np.zeros((self.rows.size, x.size))
         for k in range(x.size):
             for step in (SLOPE_STEP, -SLOPE_STEP) if x[k] < 0.5 else (-SLOPE_STEP, SLOPE_STEP):
                 moved = x.copy()
                 moved[k] += step
                 beside = self.at(fit.candidates, fit.split(moved))
                 if beside is not None:
-                    slopes[:, k] = (of(beside.residuals) - here) / step
+                    slopes[:, k] = (of(beside.residuals) - of(fit.residuals)) / step
                     break
         return slopes
