@@ -23,7 +23,7 @@ from wetwell.protocols.station.station_file import EffectTable
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.simulation import Simulation
 
-AIMS = {1.5: (15.0, None), 26.0: (90.0, 4.0)}
+AIMS = {1.5: (10.0, 2.0), 26.0: (60.0, 2.0)}
 """Most seconds and GB by days."""
 EFFECTS = ({"name": "friction_bias", "factor": 1.25}, {"name": "level_sensor_lag", "lag_s": 6.0})
 
