@@ -8,7 +8,7 @@ from scipy import ndimage
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.likelihood.covariance import DIFFERING, GOOD_FORM, POOR_FORM
 from wetwell.sim2real.recording.regimes import START_RAMP, STOP_RAMP
-from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.bins import Bins, allowed_size
 from wetwell.sim2real.residuals.phases import group_of, phase
 
 
@@ -110,7 +110,7 @@ def means_of(bins: Bins, plain: Floats) -> Means:
         counts=counts,
         group=group,
         weight=1.0 / (noise / counts + 1.0 - noise + (DIFFERING * material) ** 2),
-        allowed=np.hypot(material, np.sqrt(np.maximum(1.0 - noise, 0.0))),
+        allowed=allowed_size(material, noise),
         group_material=group_material,
         group_wrong=np.hypot(group_material, form * middle),
     )

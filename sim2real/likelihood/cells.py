@@ -6,7 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES, START_RAMP, STOP_RAMP
-from wetwell.sim2real.residuals.bins import LEVEL, Bins
+from wetwell.sim2real.residuals.bins import LEVEL, Bins, allowed_size
 from wetwell.sim2real.residuals.phases import group_of, phase
 
 SPANS = 32
@@ -53,7 +53,7 @@ class Block:
     of_inflow : (k,) array
         Variance by which surges and rain count: `variance` as it is on average.
     surges : tuple of float
-        Variance that surges of the inflow may add, over `variance`; each as likely.
+        Variance that surges of the inflow may add, over `of_inflow`; each as likely.
     may_rain : bool
         Whether the inflow may also move much faster in some cycles: nobody measures it.
     may_jump : bool
@@ -174,10 +174,7 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     )
     counts = np.bincount(of_bin).astype(np.float64)
     noise = np.bincount(of_bin, bins.floor) / counts
-    variance, allowed = (
-        noise / counts,
-        np.hypot(np.bincount(of_bin, bins.material) / counts, np.sqrt(np.maximum(1.0 - noise, 0.0))),
-    )
+    variance, allowed = noise / counts, allowed_size(np.bincount(of_bin, bins.material) / counts, noise)
     in_storm = np.bincount(bins.cycle, bins.regime == MULTI_PUMP) > 0.0
     block_of = (signal * len(REGIMES) + regime)[group]
     blocks = []

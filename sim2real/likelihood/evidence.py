@@ -30,11 +30,11 @@ class Stirred:
     block : Block
     swing : float
     log_rain : float
-        What not knowing where it rains adds to the logarithm of the probability.
+        What not knowing where it rains, and where the inflow jumps, adds to the logarithm of the probability.
     dry : Block, optional
         The block without its rain, where there is some.
     log_dry : float
-        Logarithm of the probability that it is dry in all cycles.
+        Logarithm of the probability that it is dry in all cycles, and what not knowing the jumps adds.
     """
 
     block: Block

@@ -9,7 +9,7 @@ from scipy.special import expit, log_expit
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import Block, Cells, Jumps
 from wetwell.sim2real.likelihood.covariance import expected_offset, expected_squares
-from wetwell.sim2real.residuals.bins import LEVEL, Bins
+from wetwell.sim2real.residuals.bins import LEVEL, Bins, allowed_size
 from wetwell.sim2real.residuals.phases import settled_at_rest
 
 SOUGHT_FROM = (0.1, 10.0)
@@ -39,8 +39,8 @@ def with_jumps(cells: Cells, bins: Bins, residuals: Floats) -> Cells:
     if not any(block.may_jump for block in cells.blocks):
         return cells
     rows = (bins.signal == LEVEL) & settled_at_rest(bins)
-    allowed = np.hypot(bins.material, np.sqrt(np.maximum(1.0 - bins.floor, 0.0)))
-    jumps = _learnt(residuals[rows] ** 2, bins.floor[rows], expected_offset(allowed[rows]))
+    off = expected_offset(allowed_size(bins.material[rows], bins.floor[rows]))
+    jumps = _learnt(residuals[rows] ** 2, bins.floor[rows], off)
     if jumps is None:
         return cells
     return replace(cells, blocks=tuple(replace(one, jumps=jumps) if one.may_jump else one for one in cells.blocks))

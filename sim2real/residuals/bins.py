@@ -60,6 +60,11 @@ class Bins:
                     yield signal, regime, cell
 
 
+def allowed_size(material: Floats, floor: Floats) -> Floats:
+    """Size under which a difference is none: what is material, and what a right model may be off; as of `Bins`."""
+    return np.asarray(np.hypot(material, np.sqrt(np.maximum(1.0 - floor, 0.0))), dtype=np.float64)
+
+
 def joined(parts: list[Bins]) -> Bins:
     """Bins one after the other."""
     return Bins(
