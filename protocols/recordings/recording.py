@@ -230,7 +230,8 @@ def _read_table(path: Path) -> tuple[pa.Table, Origin]:
     try:
         if suffix == ".parquet":
             _check_once(pa.parquet.read_schema(path).names, path)
-            table = pa.parquet.read_table(path)
+            with pa.parquet.ParquetFile(path) as file:  # `read_table` would load pandas, half a second
+                table = file.read()
             _ = [getattr(field.type, "tz", None) for field in table.schema]  # raises, as the names, if no UTF-8
             return table, Origin.of_metadata(table.schema.metadata or {})
         mark, header = _csv_header(path)

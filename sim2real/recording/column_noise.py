@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy import optimize, signal
+from scipy.optimize import minimize_scalar
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.recording.traces import Traces
@@ -57,9 +57,11 @@ def course_of(traces: Traces, column: Column) -> Floats:
     def unlikely(gain: float) -> float:
         return (1.0 - gain) * _surprise(values, gain) / column.noise**2 - float(np.log(1.0 - gain))
 
+    from scipy.signal import filtfilt  # noqa: PLC0415 - takes half a second, and most recordings have no column
+
     gain = _best(unlikely)
     ends = min(int(np.ceil(5.0 / gain)), values.size - 1)
-    smooth = signal.filtfilt([gain], [1.0, gain - 1.0], values, padtype="even", padlen=ends)[row_of_value]
+    smooth = filtfilt([gain], [1.0, gain - 1.0], values, padtype="even", padlen=ends)[row_of_value]
     place = np.flatnonzero(known)
     found = np.full(traces.seconds, np.nan)
     if traces.span_s > 1:
@@ -78,13 +80,15 @@ def _values(rows: Floats) -> tuple[Floats, Integers]:
 
 def _surprise(values: Floats, gain: float) -> float:
     """Mean square of what a filter of that gain did not predict."""
-    level, _ = signal.lfilter([gain], [1.0, gain - 1.0], values, zi=[(1.0 - gain) * values[0]])
+    from scipy.signal import lfilter  # noqa: PLC0415 - as above
+
+    level, _ = lfilter([gain], [1.0, gain - 1.0], values, zi=[(1.0 - gain) * values[0]])
     return float(np.mean((values[1:] - level[:-1]) ** 2))
 
 
 def _best(cost: Callable[[float], float]) -> float:
     """Gain of the least cost."""
-    found = optimize.minimize_scalar(
+    found = minimize_scalar(
         lambda log: cost(float(np.exp(log))), bounds=(np.log(SLOWEST_GAIN), -1e-9), method="bounded"
     )
     return float(np.exp(found.x))
