@@ -158,7 +158,10 @@ def read_recording(path: Path, time_zone: ZoneInfo | None = None) -> Recording:
         value is not of its column's kind, or a stamp has no zone; one line with file, column and rule.
     """
     table, origin = _read_table(path)
-    return recording_of(table, path, time_zone, origin)
+    recording = recording_of(table, path, time_zone, origin)
+    del table
+    pa.default_memory_pool().release_unused()  # Arrow keeps more than the recording is large
+    return recording
 
 
 def recording_of(

@@ -1,10 +1,12 @@
 """Validation of a station file: the simulator runs free under the measured inflow, beside the recording."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.quantities import pump_column
 from wetwell.protocols.recordings.kpi import kpis
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
@@ -17,6 +19,10 @@ from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
 MIN_KNOWN_SHARE = 0.5
+RUNNING = ("running", "frequency_hz")
+"""Quantities of a pump that show whether it runs."""
+BLOCK_S = 86_400
+"""Seconds that are simulated at a time: memory goes by it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +78,21 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
         If the numbers of pumps differ, no levels drive the station, or level or inflow are neither measured nor can
         be inferred.
     """
+    simulated, source = _free_run(recording, station, lambda _: True, seed)
+    return _compared(recording, simulated, source), simulated
+
+
+def validation_of(recording: Recording, station: Station, *, seed: int = 0) -> Validation:
+    """The comparison of `validate` alone: of a long simulation only what is compared is kept."""
+    compared = {"level_m", *(pump_column(i, name) for i in range(1, len(station.pump) + 1) for name in RUNNING)}
+    simulated, source = _free_run(recording, station, compared.__contains__, seed)
+    return _compared(recording, simulated, source)
+
+
+def _free_run(
+    recording: Recording, station: Station, is_kept: Callable[[str], bool], seed: int
+) -> tuple[Recording, str]:
+    """Simulated recording with the columns that are kept, and where its inflow is from."""
     if station.control.is_external:
         raise ValueError(f"station '{station.name}': control.mode 'external': no levels start pumps")
     check_pumps(recording, station)
@@ -97,29 +118,44 @@ def validate(recording: Recording, station: Station, *, seed: int = 0) -> tuple[
             flow_m3h=np.maximum(inflow_m3h[np.concatenate([known[:1], known[time_s[known] > 0.0]])], 0.0),
         ),
     )
-    begin_ns = int(recording.time_ns[0]) - (span_s - 1) * NS_PER_S
-    free = Simulation(station, scenario, seed, begin_ns).advance(seconds, truth=False)
+    simulation = Simulation(station, scenario, seed, int(recording.time_ns[0]) - (span_s - 1) * NS_PER_S)
+    columns: dict[str, list[Floats]] = {}
+    for begin in range(0, seconds, BLOCK_S):
+        block = simulation.advance(min(BLOCK_S, seconds - begin), truth=False)
+        for name, values in block.columns.items():
+            if is_kept(name):
+                columns.setdefault(name, []).append(values)
     rows = np.minimum(time_s.astype(np.int64) + span_s - 1, seconds - 1)
-    simulated = Recording(
-        time_ns=recording.time_ns,
-        columns={name: trailing_means(values, span_s)[rows] for name, values in free.columns.items()},
-        station=station.name,
-        value=recording.value,
+    return (
+        Recording(
+            time_ns=recording.time_ns,
+            columns={name: trailing_means(np.concatenate(blocks), span_s)[rows] for name, blocks in columns.items()},
+            station=station.name,
+            value=recording.value,
+        ),
+        source,
     )
+
+
+def _compared(recording: Recording, simulated: Recording, source: str) -> Validation:
+    level_m = recording.column("level_m")
     known_level = np.isfinite(level_m)
     spread_m = float(np.ptp(level_m[known_level]))
     error_m = np.abs(simulated.column("level_m") - level_m)[known_level]
-    measured_figures, simulated_figures = kpis(recording), kpis(simulated)
-    return (
-        Validation(
-            inflow=source,
-            level_nmae=float(error_m.mean()) / spread_m if spread_m > 0.0 else float("nan"),
-            days=tuple(to_iso(int(day_ns))[:10] for day_ns in measured_figures.day_ns),
-            starts=np.array([measured_figures.daily_starts.T, simulated_figures.daily_starts.T]),
-            run_h=np.array([measured_figures.daily_run_h.T, simulated_figures.daily_run_h.T]),
-        ),
-        simulated,
+    measured_figures, simulated_figures = (kpis(_running_of(one, recording.pumps)) for one in (recording, simulated))
+    return Validation(
+        inflow=source,
+        level_nmae=float(error_m.mean()) / spread_m if spread_m > 0.0 else float("nan"),
+        days=tuple(to_iso(int(day_ns))[:10] for day_ns in measured_figures.day_ns),
+        starts=np.array([measured_figures.daily_starts.T, simulated_figures.daily_starts.T]),
+        run_h=np.array([measured_figures.daily_run_h.T, simulated_figures.daily_run_h.T]),
     )
+
+
+def _running_of(recording: Recording, pumps: int) -> Recording:
+    """What shows that pumps run: sums of flow and power take long, and are not compared."""
+    names = [pump_column(i, name) for i in range(1, pumps + 1) for name in RUNNING]
+    return replace(recording, columns={name: recording.column(name) for name in names}, truth={})
 
 
 def _normalised(figures: Floats) -> Floats:

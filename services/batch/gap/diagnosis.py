@@ -17,7 +17,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.batch.field_data import prepared, write_station
 from wetwell.services.reports.gap.page import gap_page
-from wetwell.sim2real.calibration.validation import Validation, validate
+from wetwell.sim2real.calibration.validation import Validation, validate, validation_of
 from wetwell.sim2real.diagnosis.diagnosis import Diagnosis, diagnose
 from wetwell.sim2real.diagnosis.false_verdicts import false_verdicts
 from wetwell.sim2real.diagnosis.report import ClosedLoop, ClosedLoopComparison, DetectorVerdicts, GapReport
@@ -209,8 +209,8 @@ def _detector(rows: Recording, before: Station, after: Station) -> DetectorVerdi
 def _closed_loop(rows: Recording, before: Station, after: Station) -> ClosedLoopComparison | None:
     """Free runs under both stations; None where level or inflow do not allow one."""
     try:
-        first = validate(rows, before)[0]
-        second = first if after == before else validate(rows, after)[0]
+        first = validation_of(rows, before)
+        second = first if after == before else validation_of(rows, after)
     except ValueError:
         return None
     days = float(rows.time_ns[-1] - rows.time_ns[0]) / 86_400e9
