@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import pairwise
 from math import isfinite
 
 import numpy as np
@@ -158,15 +157,12 @@ def _thinned(
     if len(x) <= 2 * WIDTH:
         return x, y
     pixel = np.floor((x - scale.low) / (scale.high - scale.low) * (scale.end - scale.start)).astype(np.int64)
-    keep: set[int] = set()
-    for begin, stop in pairwise([0, *(np.flatnonzero(np.diff(pixel)) + 1), len(x)]):
-        part = y[begin:stop]
-        gap = np.isnan(part)
-        if gap.any():
-            keep.add(int(begin + np.argmax(gap)))
-        if not gap.all():
-            keep |= {int(begin + np.nanargmin(part)), int(begin + np.nanargmax(part))}
-    kept = sorted(keep)
+    begin = np.flatnonzero(np.diff(pixel, prepend=pixel[0] - 1))
+    order = np.lexsort((y, pixel))  # of each pixel the least first, gaps last
+    known = np.add.reduceat(~np.isnan(y), begin, dtype=np.int64)
+    some, all_known = known > 0, begin + known == np.append(begin[1:], len(x))
+    least, greatest = order[begin[some]], order[(begin + known - 1)[some]]
+    kept = np.unique(np.concatenate([least, greatest, order[(begin + known)[~all_known]]]))
     return x[kept], y[kept]
 
 
