@@ -21,7 +21,7 @@ from wetwell.simulator.simulation import Simulation
 MIN_KNOWN_SHARE = 0.5
 RUNNING = ("running", "frequency_hz")
 """Quantities of a pump that show whether it runs."""
-BLOCK_S = 86_400
+DAY_S = 86_400
 """Seconds that are simulated at a time: memory goes by it."""
 
 
@@ -120,8 +120,8 @@ def _free_run(
     )
     simulation = Simulation(station, scenario, seed, int(recording.time_ns[0]) - (span_s - 1) * NS_PER_S)
     columns: dict[str, list[Floats]] = {}
-    for begin in range(0, seconds, BLOCK_S):
-        block = simulation.advance(min(BLOCK_S, seconds - begin), truth=False)
+    for begin in range(0, seconds, DAY_S):
+        block = simulation.advance(min(DAY_S, seconds - begin), truth=False)
         for name, values in block.columns.items():
             if is_kept(name):
                 columns.setdefault(name, []).append(values)
