@@ -8,14 +8,13 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.attribution.changes import MOST_CHANGED, changed
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import are_sized, intervals_of
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
-from wetwell.sim2real.attribution.search import in_order, search
+from wetwell.sim2real.attribution.search import MOST_CHANGED, changed, in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.likelihood.cells import Cells, cells_of

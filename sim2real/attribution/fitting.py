@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
-from wetwell.sim2real.attribution.candidates import Candidate
+from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, steepness
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, steepness, weights_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects.effect import Effect
 
@@ -22,7 +22,7 @@ SETTLED = 1e-3
 LEAST_REACH = 1e-9
 """Of a direction, as a share of the largest: under it is rounding. [1]"""
 MOST_AWAY = 2
-"""Points of a grid, each worse than the best before, after which it is left."""
+"""Points of a grid, one after the other, that lead away, after which it is left."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
 
 
@@ -52,10 +52,6 @@ class Fit:
     def split(self, position: Floats) -> tuple[Floats, ...]:
         """Rows of each candidate, of points or of what there is for each parameter."""
         return tuple(np.split(position, np.cumsum([point.size for point in self.points])[:-1]))
-
-
-Start = tuple[Fit | None, float]
-"""A fit from which a search may begin, and the sum of squares that it promises; None where there is none."""
 
 
 class Fitter:
@@ -121,32 +117,30 @@ class Fitter:
         along = np.zeros(0) if fit is None else reach.T @ fit.residuals[self.rows]
         return self.cost(fit) - float(along @ along)
 
-    def first(
-        self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]], others: Fit, reach: Floats
-    ) -> Start:
-        """Best of several starts beside others, without refinement; a grid is left when it has led away.
+    def along(self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]]) -> list[Fit]:
+        """A candidate alone at several starts.
 
-        Parameters
-        ----------
-        candidate : Candidate
-        start_grids : sequence of sequence of (parameters,) array
-        others : Fit
-        reach : (fitted bins, directions) array
-            Of the others: `reach`.
+        Of a grid of rising strength those are left out that are far from what the one before makes likely, as if all
+        were linear; a grid that leads away is left.
         """
-        best, least = None, float("inf")
+        found = []
         for grid in start_grids:
-            lowest, away = float("inf"), 0
-            for start in grid:
-                tried = self.at((*others.candidates, candidate), (*others.points, start))
-                cost = self.cost_beside(tried, reach)
-                away = away + 1 if cost > lowest else 0
-                lowest = min(lowest, cost)
-                if tried is not None and cost < least:
-                    best, least = tried, cost
-                if away == MOST_AWAY:
-                    break
-        return best, least
+            place, away = 0, 0
+            while place < len(grid) and away < MOST_AWAY:
+                tried = self.at((candidate,), (grid[place],))
+                scale = np.inf if tried is None else self._best_scale(tried)
+                found += [] if tried is None else [tried]
+                away = away + 1 if scale <= 0.0 else 0
+                place = place + 1 if away else _next_place(place, scale, len(grid))
+        return found
+
+    def _best_scale(self, tried: Fit) -> float:
+        """Times the change that an effect makes alone at which it fits best, as if all were linear."""
+        plain = residuals_of(self.plain.residuals[self.rows])
+        change = residuals_of(tried.residuals[self.rows]) - plain
+        weighed = weights_of(plain) * change
+        squares = float(weighed @ change)
+        return -float(weighed @ plain) / squares if squares > 0.0 else np.inf
 
     def refine(self, fit: Fit) -> Fit:
         """Levenberg and Marquardt's method from where a fit stands, within the ranges."""
@@ -226,3 +220,10 @@ class Fitter:
                     slopes[:, k] = (of(beside.residuals) - of(fit.residuals)) / step
                     break
         return slopes
+
+
+def _next_place(place: int, scale: float, size: int) -> int:
+    """Of the strengths behind one in a grid the one nearest to so many times that; the end, where that is nearer."""
+    wanted = np.log(scale * STRENGTHS[place])
+    away = np.abs(np.log(STRENGTHS[place:size]) - wanted)
+    return size if np.argmin(away) == 0 else place + int(np.argmin(away))

@@ -1,25 +1,25 @@
 """The effects of the library, tried one by one: alone, and beside others."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
+from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.promise import Alone, Beside, Promise
+from wetwell.sim2real.residuals.asinh_loss import residuals_of
 
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Applies a function to items, in order, as `map` does: perhaps side by side."""
 
-PROBES = (0.002, 0.02)
-"""Strengths, as shares of the range, by which a further effect is judged before it is fitted."""
-MOST_FITTED = 8
-"""Further effects that are fitted, the most promising first."""
+MOST_TRIED = 8
+"""Further effects that are tried, the most promising first."""
 MOST_REFINED = 4
 LEAST_PROMISED = 10.0
-"""Drop of the sum of squares under which a further effect is not fitted: it could not pay for its place."""
+"""Drop of the sum of squares under which a further effect is not tried: it could not pay for its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -50,18 +50,33 @@ class Trials:
         self._progress = progress
         self._each = each
 
+    @cached_property
+    def _alone(self) -> dict[Candidate, tuple[Alone, Fit]]:
+        """Of each candidate what it does alone, and its best fit without refinement."""
+        found, plain = {}, self._rows_of(self._fitter.plain)
+        tried = self._each(self._tried, self._guesses)
+        for k, (candidate, fits) in enumerate(zip(self._guesses, tried, strict=True)):
+            if fits:
+                alone = Alone(
+                    candidate=candidate,
+                    points=tuple(fit.points[0] for fit in fits),
+                    changes=np.array([self._rows_of(fit) - plain for fit in fits]),
+                )
+                found[candidate] = alone, min(fits, key=self._fitter.cost)
+            self._progress(0.3 * (k + 1) / len(self._guesses))
+        return found
+
+    def _tried(self, candidate: Candidate) -> list[Fit]:
+        return self._fitter.along(candidate, self._start_grids(candidate))
+
+    def _rows_of(self, fit: Fit) -> Floats:
+        """(fitted bins,) residuals themselves."""
+        return residuals_of(fit.residuals[self._fitter.rows])
+
     def singles(self) -> list[Fit]:
         """Single effects, each with the pump or channel that fits best; the best effect first."""
         fitter, before = self._fitter, self._fitter.cost(self._fitter.plain)
-        firsts: list[Fit] = []
-        reach = fitter.reach(fitter.plain)
-        tried = self._each(
-            lambda candidate: fitter.first(candidate, self._start_grids(candidate), fitter.plain, reach),
-            self._guesses,
-        )
-        for k, (fit, _) in enumerate(tried):
-            firsts += [fit] if fit is not None else []
-            self._progress(0.3 * (k + 1) / len(self._guesses))
+        firsts = [fit for _, fit in self._alone.values()]
         most = max((before - fitter.cost(fit) for fit in firsts), default=0.0)
 
         def refined(fit: Fit) -> Fit:
@@ -75,22 +90,34 @@ class Trials:
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
         return sorted(best.values(), key=fitter.cost)
 
-    def with_one_more(self, current: Fit) -> list[Fit]:
-        """Fits of the current effects with one more, the most promising ones, each as the pump or channel it fits."""
+    def with_one_more(self, bases: Sequence[Fit]) -> list[Fit]:
+        """Each of some fits with one more effect, the most promising ones, each as the pump or channel it fits."""
+        likely = [(base, one) for base in bases for one in self._promising(base)]
+        tried = [fit for fit in self._each(lambda pair: self._at(*pair), likely) if fit is not None]
+        firsts = []
+        for base in bases:
+            reach = self._fitter.reach(base)
+            own = [fit for fit in tried if fit.candidates[:-1] == base.candidates]
+            own.sort(key=lambda fit: self._fitter.cost_beside(fit, reach))
+            firsts += [(base, fit) for fit in own[:MOST_REFINED]]
+        return list(self._each(lambda pair: self._refined(*pair), firsts))
+
+    def _promising(self, base: Fit) -> list[Promise]:
+        """Promises of the effects that may come beside a fit, the best first: each by its best pump or channel."""
         fitter = self._fitter
-        reach = fitter.reach(current)
-        free = [c for c in self._guesses if c.name not in current.names]
-        promises = list(self._each(lambda candidate: self._promise(candidate, current, reach), free))
-        promising: dict[str, tuple[float, Candidate]] = {}
-        for promise, candidate in zip(promises, free, strict=True):
-            if promise > max(LEAST_PROMISED, promising.get(candidate.name, (0.0, candidate))[0]):
-                promising[candidate.name] = (promise, candidate)
-        likely = [one for _, one in sorted(promising.values(), key=lambda pair: -pair[0])][:MOST_FITTED]
-        tried = self._each(
-            lambda candidate: fitter.first(candidate, self._start_grids(candidate), current, reach), likely
+        beside = Beside(
+            residuals=self._rows_of(base), slopes=fitter.slopes(base)[fitter.rows], position=base.position
         )
-        firsts = [fit for fit, _ in sorted(tried, key=lambda start: start[1]) if fit is not None]
-        return list(self._each(partial(self._refined, current), firsts[:MOST_REFINED]))
+        free = [alone for candidate, (alone, _) in self._alone.items() if candidate.name not in base.names]
+        best: dict[str, Promise] = {}
+        for one in map(beside.promise, free):
+            if one.candidate.name not in best or one.cost < best[one.candidate.name].cost:
+                best[one.candidate.name] = one
+        most = fitter.cost(base) - LEAST_PROMISED
+        return [one for one in sorted(best.values(), key=lambda one: one.cost)[:MOST_TRIED] if one.cost < most]
+
+    def _at(self, current: Fit, promise: Promise) -> Fit | None:
+        return self._fitter.at((*current.candidates, promise.candidate), (*current.points, promise.point))
 
     def _refined(self, current: Fit, fit: Fit) -> Fit:
         """A fit with one more effect, refined: where it ends worse than without that, from another start.
@@ -102,29 +129,14 @@ class Trials:
         refined = fitter.refine(fit)
         if fitter.cost(refined) <= fitter.cost(current):
             return refined
-        last, nothing = fit.candidates[-1], np.zeros((int(fitter.rows.sum()), 0))
-        again, _ = fitter.first(last, self._start_grids(last), current, nothing)
+        stays = Beside(
+            residuals=self._rows_of(current), slopes=np.zeros((int(fitter.rows.sum()), 0)), position=np.zeros(0)
+        )
+        again = self._at(current, stays.promise(self._alone[fit.candidates[-1]][0]))
         found = [refined] if again is None else [refined, fitter.refine(again)]
         return min(found, key=fitter.cost)
 
-    def _start_grids(self, candidate: Candidate, strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
+    def _start_grids(self, candidate: Candidate) -> list[list[Floats]]:
         """Points to begin at, each grid once: guesses that leave the strength open have the same ones."""
-        grids = [grid for guess in self._guesses[candidate] for grid in candidate.start_grids(guess, strengths)]
+        grids = [grid for guess in self._guesses[candidate] for grid in candidate.start_grids(guess)]
         return list({b"".join(point.tobytes() for point in grid): grid for grid in grids}.values())
-
-    def _promise(self, candidate: Candidate, current: Fit, reach: Floats) -> float:
-        """Drop of the sum of squares that small trials of each strength promise, as if all were linear.
-
-        What the current effects can reach they are fitted to again: a lag gives way to the inertia beside it.
-        """
-        rows = self._fitter.rows
-        before = current.residuals[rows]
-        most = 0.0
-        for start in (point for grid in self._start_grids(candidate, PROBES) for point in grid):
-            tried = self._fitter.at((*current.candidates, candidate), (*current.points, start))
-            if tried is not None:
-                change = tried.residuals[rows] - before
-                change -= reach @ (reach.T @ change)
-                along = max(-float(change @ before), 0.0)
-                most = max(most, along**2 / max(float(change @ change), 1e-12))
-        return most

@@ -31,3 +31,21 @@ def residuals_of(losses: Floats) -> Floats:
 def steepness(losses: Floats) -> Floats:
     """Change of the losses with the residuals themselves: 1 of a small one, less of a large one."""
     return np.asarray(1.0 / np.cosh(losses / ASINH_SCALE), dtype=np.float64)
+
+
+def weights_of(residuals: Floats) -> Floats:
+    r"""Weights by which least squares find the minimum of the squared losses: $w = \ell(r)\,\ell'(r) / r$.
+
+    References
+    ----------
+    P. W. Holland, R. E. Welsch, Robust regression using iteratively reweighted least-squares, Communications in
+    Statistics A 6, 1977.
+
+    Examples
+    --------
+    >>> weights_of(np.array([0.0, 0.01, -50.0])).round(3)
+    array([1.   , 1.   , 0.03 ])
+    """
+    losses = asinh_loss(residuals)
+    is_small = np.abs(residuals) < 1e-6
+    return np.where(is_small, 1.0, losses * steepness(losses) / np.where(is_small, 1.0, residuals))

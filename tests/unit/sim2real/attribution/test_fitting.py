@@ -8,6 +8,7 @@ import pytest
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fitter
+from wetwell.sim2real.attribution.promise import Alone, Beside
 from wetwell.sim2real.recording.regimes import STEADY, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -44,17 +45,44 @@ def lag(fitter, alpha):
     return fitter.refine(fitter.at([replace(one, free=one.free[:1])], [np.array([0.05])]))
 
 
+def alone(fitter, candidate):
+    fits = fitter.along(candidate, candidate.start_grids({}))
+    plain = residuals_of(fitter.plain.residuals)
+    return Alone(
+        candidate=candidate,
+        points=tuple(fit.points[0] for fit in fits),
+        changes=np.array([residuals_of(fit.residuals) - plain for fit in fits]),
+    )
+
+
+def beside(fitter, fit):
+    return Beside(residuals=residuals_of(fit.residuals), slopes=fitter.slopes(fit), position=fit.position)
+
+
 def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
-    inertia = candidate(alpha, "water_inertia")
-    reach = fitter.reach(lag)
-    start, promised = fitter.first(inertia, inertia.start_grids({}), lag, reach)
+    promise = beside(fitter, lag).promise(alone(fitter, candidate(alpha, "water_inertia")))
+    start = fitter.at((*lag.candidates, promise.candidate), (*lag.points, promise.point))
     assert fitter.cost(start) > fitter.cost(lag), "beside the lag as it stands nothing is gained"
-    assert promised < 0.9 * fitter.cost(lag)
+    assert promise.cost < 0.9 * fitter.cost(lag)
     both = fitter.refine(start)
-    assert fitter.cost(both) == pytest.approx(promised, rel=0.3)
+    assert fitter.cost(both) < promise.cost, "the inertia shortens the lag, which a sum does not know"
     found = {effect.name: effect.model_dump() for effect in both.effects}
     assert found["flow_meter_lag"]["lag_s"] == pytest.approx(4.0, abs=0.2)
     assert found["water_inertia"]["inertia_s2_m2"] == pytest.approx(400.0, rel=0.2)
+
+
+def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
+    """Small residuals, a known change and known slopes: strength and the other's move are those of lstsq."""
+    rng = np.random.default_rng(7)
+    slopes, change = rng.normal(size=(500, 1)), rng.normal(size=500)
+    wanted = 1e-3 * (rng.normal(size=500) - 1.4 * change + 0.2 * slopes[:, 0])
+    (lift,) = candidates_of(len(alpha.pump), 1, only=["static_head_bias"])
+    point = np.array([lift.free[0].normalised(1.0)])
+    one = Alone(candidate=lift, points=(point,), changes=1e-3 * change[None, :])
+    promise = Beside(residuals=wanted, slopes=1e-3 * slopes, position=np.array([0.5])).promise(one)
+    (scale, _), left, _, _ = np.linalg.lstsq(1e-3 * np.column_stack([change, slopes]), -wanted, rcond=None)
+    assert lift.free[0].value(promise.point[0]) == pytest.approx(scale, rel=1e-4)
+    assert promise.cost == pytest.approx(float(left[0]), rel=1e-4)
 
 
 def test_reach_is_that_of_least_squares(fitter, lag):

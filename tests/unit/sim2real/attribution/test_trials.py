@@ -35,7 +35,7 @@ def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start()
     )
     guesses = {one: initial_guesses(one, replay, residuals, fitter.plain.residuals) for one in (header, cutoff)}
     alone = fitter.refine(fitter.at([header], [np.array([0.8])]))
-    (both,) = Trials(fitter, guesses, lambda _: None, map).with_one_more(alone)
+    (both,) = Trials(fitter, guesses, lambda _: None, map).with_one_more([alone])
     assert both.names == ("common_header", "flow_low_cutoff")
     assert fitter.cost(both) < 0.5 * fitter.cost(alone)
     (limit,) = (effect for effect in both.effects if effect.name == "flow_low_cutoff")
