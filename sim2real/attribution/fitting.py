@@ -19,8 +19,6 @@ DAMPINGS = 5
 """Steps of a round, each damped more, of which one has to lead down."""
 LONGEST_STEP = 0.3
 SETTLED = 1e-3
-LEAST_REACH = 1e-9
-"""Of a direction, as a share of the largest: under it is rounding. [1]"""
 MOST_AWAY = 2
 """Points of a grid, one after the other, that lead away, after which it is left."""
 SCANS = ((0.4, 0.55, 0.75, 1.35, 1.8, 2.5), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05))
@@ -106,16 +104,6 @@ class Fitter:
     def cost(self, fit: Fit | None) -> float:
         """Sum of squares over the bins that are fitted."""
         return float("inf") if fit is None else float(np.sum(fit.residuals[self.rows] ** 2))
-
-    def reach(self, fit: Fit) -> Floats:
-        """(fitted bins, directions) orthonormal: where the parameters of a fit can move its residuals."""
-        left, sizes, _ = np.linalg.svd(self.loss_slopes(fit)[self.rows], full_matrices=False)
-        return np.asarray(left[:, sizes > LEAST_REACH * sizes.max(initial=0.0)], dtype=np.float64)
-
-    def cost_beside(self, fit: Fit | None, reach: Floats) -> float:
-        """Sum of squares that is left once what others can reach is fitted again, as if all were linear."""
-        along = np.zeros(0) if fit is None else reach.T @ fit.residuals[self.rows]
-        return self.cost(fit) - float(along @ along)
 
     def along(self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]]) -> list[Fit]:
         """A candidate alone at several starts.

@@ -1,15 +1,19 @@
 """What a further effect promises beside others, as if what each does alone were added: no replay is needed."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.residuals.asinh_loss import asinh_loss, weights_of
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, steepness, weights_of
 
 MOST_SCALED = 2.0
 """Times what an effect did alone that it may do beside others: the starts of a grid are further apart. [1]"""
+
+LEAST_REACH = 1e-9
+"""Of a direction, as a share of the largest: under it is rounding. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,23 +42,40 @@ class Promise:
     cost: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Beside:
     """What further effects come beside.
 
     Attributes
     ----------
-    residuals : (fitted bins,) array
-        Themselves, in units of noise.
+    losses : (fitted bins,) array
+        As `asinh_loss` makes them.
     slopes : (fitted bins, parameters) array
         Change of the residuals with each parameter of the others, over its range; no columns where the others stay.
     position : (parameters,) array
         Of the others.
     """
 
-    residuals: Floats
+    losses: Floats
     slopes: Floats
     position: Floats
+
+    @cached_property
+    def reach(self) -> Floats:
+        """(fitted bins, directions) orthonormal: where the parameters of the others can move the losses."""
+        moved = self.slopes * steepness(self.losses)[:, None]
+        left, sizes, _ = np.linalg.svd(moved, full_matrices=False)
+        return np.asarray(left[:, sizes > LEAST_REACH * sizes.max(initial=0.0)], dtype=np.float64)
+
+    def left_of(self, losses: Floats) -> float:
+        """Sum of squares that is left once what the others can reach is fitted again, as if all were linear.
+
+        Parameters
+        ----------
+        losses : (fitted bins,) array
+        """
+        along = self.reach.T @ losses
+        return float(losses @ losses) - float(along @ along)
 
     def promise(self, alone: Alone) -> Promise:
         r"""What is left by the best of a candidate's points, its strength and the others' parameters fitted again.
@@ -64,9 +85,10 @@ class Beside:
 
         with r the residuals, d what the candidate changes alone, S the slopes of the others, and ℓ the loss.
         """
-        root = np.sqrt(weights_of(self.residuals))
+        residuals = residuals_of(self.losses)
+        root = np.sqrt(weights_of(residuals))
         basis, triangle = np.linalg.qr(root[:, None] * self.slopes)
-        left = root * self.residuals
+        left = root * residuals
         changed = root * alone.changes
         along_others = changed @ basis
         apart = changed - along_others @ basis.T
@@ -76,7 +98,7 @@ class Beside:
         best = int(np.argmin(scale * (2.0 * along + scale * squares)))
         moved = np.linalg.lstsq(triangle, -(basis.T @ left + scale[best] * along_others[best]), rcond=None)[0]
         moved = np.clip(moved, -self.position, 1.0 - self.position)
-        after = self.residuals + scale[best] * alone.changes[best] + self.slopes @ moved
+        after = residuals + scale[best] * alone.changes[best] + self.slopes @ moved
         return Promise(
             candidate=alone.candidate,
             point=_scaled(alone.candidate, alone.points[best], float(scale[best])),

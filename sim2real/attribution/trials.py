@@ -77,6 +77,7 @@ class Trials:
         """Single effects, each with the pump or channel that fits best; the best effect first."""
         fitter, before = self._fitter, self._fitter.cost(self._fitter.plain)
         firsts = [fit for _, fit in self._alone.values()]
+        firsts.sort(key=lambda fit: -fit.position.size)  # the longest first, so that all cores end together
         most = max((before - fitter.cost(fit) for fit in firsts), default=0.0)
 
         def refined(fit: Fit) -> Fit:
@@ -92,28 +93,30 @@ class Trials:
 
     def with_one_more(self, bases: Sequence[Fit]) -> list[Fit]:
         """Each of some fits with one more effect, the most promising ones, each as the pump or channel it fits."""
-        likely = [(base, one) for base in bases for one in self._promising(base)]
-        tried = [fit for fit in self._each(lambda pair: self._at(*pair), likely) if fit is not None]
+        besides = list(self._each(self._beside, bases))
+        promises = self._each(lambda pair: self._promising(*pair), zip(bases, besides, strict=True))
+        likely = [(base, one) for base, its in zip(bases, promises, strict=True) for one in its]
+        tried = list(self._each(lambda pair: self._at(*pair), likely))
         firsts = []
-        for base in bases:
-            reach = self._fitter.reach(base)
-            own = [fit for fit in tried if fit.candidates[:-1] == base.candidates]
-            own.sort(key=lambda fit: self._fitter.cost_beside(fit, reach))
+        for base, beside in zip(bases, besides, strict=True):
+            own = [fit for (its, _), fit in zip(likely, tried, strict=True) if its is base and fit is not None]
+            own.sort(key=lambda fit: beside.left_of(fit.residuals[self._fitter.rows]))
             firsts += [(base, fit) for fit in own[:MOST_REFINED]]
+        firsts.sort(key=lambda pair: -pair[1].position.size)  # the longest first, so that all cores end together
         return list(self._each(lambda pair: self._refined(*pair), firsts))
 
-    def _promising(self, base: Fit) -> list[Promise]:
+    def _beside(self, base: Fit) -> Beside:
+        rows = self._fitter.rows
+        return Beside(losses=base.residuals[rows], slopes=self._fitter.slopes(base)[rows], position=base.position)
+
+    def _promising(self, base: Fit, beside: Beside) -> list[Promise]:
         """Promises of the effects that may come beside a fit, the best first: each by its best pump or channel."""
-        fitter = self._fitter
-        beside = Beside(
-            residuals=self._rows_of(base), slopes=fitter.slopes(base)[fitter.rows], position=base.position
-        )
         free = [alone for candidate, (alone, _) in self._alone.items() if candidate.name not in base.names]
         best: dict[str, Promise] = {}
         for one in map(beside.promise, free):
             if one.candidate.name not in best or one.cost < best[one.candidate.name].cost:
                 best[one.candidate.name] = one
-        most = fitter.cost(base) - LEAST_PROMISED
+        most = self._fitter.cost(base) - LEAST_PROMISED
         return [one for one in sorted(best.values(), key=lambda one: one.cost)[:MOST_TRIED] if one.cost < most]
 
     def _at(self, current: Fit, promise: Promise) -> Fit | None:
@@ -129,9 +132,8 @@ class Trials:
         refined = fitter.refine(fit)
         if fitter.cost(refined) <= fitter.cost(current):
             return refined
-        stays = Beside(
-            residuals=self._rows_of(current), slopes=np.zeros((int(fitter.rows.sum()), 0)), position=np.zeros(0)
-        )
+        losses = current.residuals[fitter.rows]
+        stays = Beside(losses=losses, slopes=np.zeros((losses.size, 0)), position=np.zeros(0))
         again = self._at(current, stays.promise(self._alone[fit.candidates[-1]][0]))
         found = [refined] if again is None else [refined, fitter.refine(again)]
         return min(found, key=fitter.cost)

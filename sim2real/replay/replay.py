@@ -29,7 +29,7 @@ from wetwell.sim2real.replay.observer import (
 from wetwell.simulator.corrections.parts import Column
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.forcing import Forcing, healthy_forcing
-from wetwell.simulator.parameters import PlantParameters, SensorParameters, plant_parameters
+from wetwell.simulator.parameters import PlantParameters, PlantRecords, SensorParameters, plant_parameters
 from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels_of
 
@@ -104,6 +104,7 @@ class Replay:
         inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
         self._forcing = self._healthy(inflow_m3h, None)
         self._courses: dict[Column, Floats] = {}
+        self._configured = plant_parameters(station)
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
         self._lagging: _Lagging | None = None
@@ -161,7 +162,7 @@ class Replay:
             return Doubt(level_m=self.observer.deviation_m, signals={}, observer=self.observer)
         plant = self._plant(self.own)
         early, late, long, short = (
-            self._predicted(plant, *self._computed(self.own, plant, placement, self.observer))
+            self._predicted(plant, *self._computed(self.own, plant, _records(plant), placement, self.observer))
             for placement in placements
         )
 
@@ -178,7 +179,7 @@ class Replay:
         return Doubt(level_m=level_m, signals=signals, observer=self.observer)
 
     def _plant(self, acting: Sequence[Effect]) -> PlantParameters:
-        plant = plant_parameters(self.station)
+        plant = self._configured
         for effect in acting:
             plant = effect.modify(plant)
         return plant
@@ -199,7 +200,7 @@ class Replay:
         is_held = plant.sensors[LEVEL].deadband > 0.0
         frequency_delay_s = _delay_s(plant, "frequency_hz")
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
-        records = replace(plant, control_delay_s=0.0).records()
+        records = _records(plant)
         read = tuple(
             (
                 *(sensor.gain, sensor.offset, sensor.followed, sensor.followed_again, sensor.carried),
@@ -215,13 +216,18 @@ class Replay:
             if run.key == key:
                 return run
         observer = self._observer_of_changes if is_held else self.observer
-        level_m, reading = self._computed(acting, plant, self.traces.frequency_hz, observer)
+        level_m, reading = self._computed(acting, plant, records, self.traces.frequency_hz, observer)
         run = _Run(key=key, level_m=level_m, reading=reading)
         self._kept = (*self._kept[1 - KEPT_RUNS :], run)
         return run
 
     def _computed(
-        self, acting: Sequence[Effect], plant: PlantParameters, frequency_hz: Floats, observer: Observer
+        self,
+        acting: Sequence[Effect],
+        plant: PlantParameters,
+        records: PlantRecords,
+        frequency_hz: Floats,
+        observer: Observer,
     ) -> tuple[Floats, Floats]:
         """(n,) level and (3, pumps, n) flow, head and power as the sensors read them, by the kernel."""
         traces, pumps = self.traces, self.traces.pumps
@@ -235,7 +241,7 @@ class Replay:
         level_m = np.empty(traces.seconds)
         reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
         replay_seconds(
-            replace(plant, control_delay_s=0.0).records(),
+            records,
             first_state(plant, max(first_level_m, plant.profile["level_m"][0])),
             self._forced(forces, plant),
             np.zeros((3, len(PUMP_METERS), pumps)),
@@ -290,7 +296,7 @@ class Replay:
         traces = self.traces
         if observer.deviation_m is None or not rows.any():
             return observer
-        level_m = self._computed(self.own, plant, traces.frequency_hz, observer)[0]
+        level_m = self._computed(self.own, plant, _records(plant), traces.frequency_hz, observer)[0]
         squares = ((traces.level_m - trailing_means(level_m, traces.span_s)) / observer.deviation_m)[rows] ** 2
         scale = np.sqrt(max(float(np.mean(np.minimum(squares, MOST_SQUARE))), 1.0))
         return replace(observer, deviation_m=scale * observer.deviation_m)
@@ -352,6 +358,11 @@ def later(values: Floats, delay_s: float) -> Floats:
     near = values[..., np.clip(place, 0, place.size - 1)]
     far = values[..., np.clip(place - 1, 0, place.size - 1)]
     return np.asarray((1.0 - share) * near + share * far, dtype=np.float64)
+
+
+def _records(plant: PlantParameters) -> PlantRecords:
+    """What the kernel reads: it has the frequencies, and no controller."""
+    return replace(plant, control_delay_s=0.0).records()
 
 
 def _delay_s(plant: PlantParameters, quantity: AnalogueQuantity) -> float:

@@ -74,10 +74,10 @@ def joined(parts: list[Bins]) -> Bins:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seconds:
-    """Seconds that count, the bin that each goes to, and how many go to each bin."""
+    """Seconds that count, in order, where each bin begins among them, and how many are in it."""
 
     second: Integers
-    bin: Integers
+    begin: Integers
     counts: Floats
 
     def means(self, values: Floats) -> Floats:
@@ -86,12 +86,11 @@ class Seconds:
 
     def means_of(self, values: Floats) -> Floats:
         """(bins,) means of values of the seconds that count."""
-        return np.asarray(np.bincount(self.bin, values, self.counts.size) / self.counts, dtype=np.float64)
+        return np.asarray(np.add.reduceat(values, self.begin) / self.counts, dtype=np.float64)
 
     def middle(self, values: Integers) -> Integers:
         """(bins,) value of (n,) ones, all seconds of a recording, in the middle of each bin."""
-        counts = self.counts.astype(np.int64)
-        return np.asarray(values[self.second[np.cumsum(counts) - counts + (counts - 1) // 2]])
+        return np.asarray(values[self.second[self.begin + (self.counts.astype(np.int64) - 1) // 2]])
 
     def bins(
         self,
@@ -133,5 +132,5 @@ def binned(counted: Flags, key: Integers, length_s: Integers) -> Seconds:
     """
     number = np.cumsum(since_changes(key) % length_s == 0)
     second = np.flatnonzero(counted)
-    _, inverse = np.unique(number[second], return_inverse=True)
-    return Seconds(second=second, bin=inverse.ravel(), counts=np.bincount(inverse.ravel()).astype(np.float64))
+    _, begin, counts = np.unique(number[second], return_index=True, return_counts=True)
+    return Seconds(second=second, begin=begin, counts=counts.astype(np.float64))

@@ -1,7 +1,7 @@
 """Residuals of the controller: the level at which it starts and stops pumps, against its thresholds."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.special import ndtr
@@ -29,7 +29,7 @@ TOLERANCE_M = 0.002
 EVENT_FLOOR = 0.5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Stretches:
     """Straight stretches of the level before each event, to be read at other times than they were recorded.
 
@@ -47,7 +47,7 @@ class Stretches:
         Where too few values are left the line of the unshifted stretch is gone on with.
         """
         if shift_s == 0.0:
-            return self._fitted(0)
+            return self._unshifted
         whole = int(np.floor(shift_s))
         share = shift_s - whole
         near = self._fitted(whole)
@@ -56,9 +56,13 @@ class Stretches:
         is_known = np.isfinite(shifted_m)
         if is_known.all():
             return shifted_m, shifted_m_s
-        level_m, slope_m_s = self._fitted(0)
+        level_m, slope_m_s = self._unshifted
         level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
         return level_m, np.where(is_known, shifted_m_s, slope_m_s)
+
+    @cached_property
+    def _unshifted(self) -> tuple[Floats, Floats]:
+        return self._fitted(0)
 
     def _fitted(self, later_s: int) -> tuple[Floats, Floats]:
         place = self.counted + later_s

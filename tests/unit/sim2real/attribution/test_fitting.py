@@ -56,7 +56,7 @@ def alone(fitter, candidate):
 
 
 def beside(fitter, fit):
-    return Beside(residuals=residuals_of(fit.residuals), slopes=fitter.slopes(fit), position=fit.position)
+    return Beside(losses=fit.residuals, slopes=fitter.slopes(fit), position=fit.position)
 
 
 def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
@@ -79,7 +79,7 @@ def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
     (lift,) = candidates_of(len(alpha.pump), 1, only=["static_head_bias"])
     point = np.array([lift.free[0].normalised(1.0)])
     one = Alone(candidate=lift, points=(point,), changes=1e-3 * change[None, :])
-    promise = Beside(residuals=wanted, slopes=1e-3 * slopes, position=np.array([0.5])).promise(one)
+    promise = Beside(losses=wanted, slopes=1e-3 * slopes, position=np.array([0.5])).promise(one)
     (scale, _), left, _, _ = np.linalg.lstsq(1e-3 * np.column_stack([change, slopes]), -wanted, rcond=None)
     assert lift.free[0].value(promise.point[0]) == pytest.approx(scale, rel=1e-4)
     assert promise.cost == pytest.approx(float(left[0]), rel=1e-4)
@@ -89,9 +89,8 @@ def test_reach_is_that_of_least_squares(fitter, lag):
     rng = np.random.default_rng(4)
     slopes = fitter.loss_slopes(lag)[fitter.rows]
     wanted = lag.residuals + slopes @ np.array([0.01]) + rng.normal(0.0, 0.1, lag.residuals.size)
-    moved = type(lag)(candidates=lag.candidates, points=lag.points, residuals=wanted)
     _, left, _, _ = np.linalg.lstsq(slopes, wanted, rcond=None)
-    assert fitter.cost_beside(moved, fitter.reach(lag)) == pytest.approx(float(left[0]))
+    assert beside(fitter, lag).left_of(wanted) == pytest.approx(float(left[0]))
 
 
 def test_slopes_of_residuals_know_nothing_of_the_noise(fitter, alpha):
@@ -114,4 +113,4 @@ def test_the_size_of_the_noise_knows_nothing_of_the_noise(fitter):
 
 
 def test_nothing_can_be_reached_without_effects(fitter):
-    assert fitter.reach(fitter.plain).shape == (int(fitter.rows.sum()), 0)
+    assert beside(fitter, fitter.plain).reach.shape == (int(fitter.rows.sum()), 0)
