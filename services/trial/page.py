@@ -111,7 +111,7 @@ def _reliability(groups: Mapping[str, Any]) -> str:
         y_label="share right",
     )
     rows = [
-        [f"{one['from']:.1f} to {one['to']:.1f}", one["cases"], f"{one['said']:.2f}", f"{one['right']:.2f}"]
+        [f"{one['from']:.2f} to {one['to']:.2f}", one["cases"], f"{one['said']:.2f}", f"{one['right']:.2f}"]
         for one in bins
     ]
     errors = [

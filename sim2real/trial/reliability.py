@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 BINS = 10
+"""Bins of equal width around the tenths; the first and the last are half as wide. Most answers are told with .8, as
+nobody is surer that what is known is all there is: an edge there would part what is the same."""
 
 
 def reliability(told: Sequence[tuple[float, bool]]) -> dict[str, Any] | None:
@@ -13,7 +15,7 @@ def reliability(told: Sequence[tuple[float, bool]]) -> dict[str, Any] | None:
 
     $$\mathrm{ECE} = \sum_b \frac{n_b}{n} \left| \overline{y}_b - \overline{p}_b \right|$$
 
-    over bins of equal width. Range 0 to 1, best 0; of n answers that are calibrated it is about
+    over `BINS` and one. Range 0 to 1, best 0; of n answers that are calibrated it is about
     $\sqrt{2 / \pi} \sum_b \sqrt{n_b\, p_b (1 - p_b)} / n$ by chance alone, given as `chance`.
 
     Parameters
@@ -36,13 +38,14 @@ def reliability(told: Sequence[tuple[float, bool]]) -> dict[str, Any] | None:
         return None
     said = np.array([probability for probability, _ in told])
     right = np.array([is_right for _, is_right in told], dtype=np.float64)
-    of_bin = np.minimum((said * BINS).astype(np.int64), BINS - 1)
+    of_bin = np.rint(said * BINS).astype(np.int64)
     bins, error, chance = [], 0.0, 0.0
     for k in np.unique(of_bin).tolist():
         own = of_bin == k
         cases, mean, share = int(own.sum()), float(said[own].mean()), float(right[own].mean())
         error += cases / said.size * abs(share - mean)
         chance += float(np.sqrt(2.0 / np.pi * cases * mean * (1.0 - mean))) / said.size
-        bins.append({"from": k / BINS, "to": (k + 1) / BINS, "cases": cases, "said": mean, "right": share})
+        ends = max((k - 0.5) / BINS, 0.0), min((k + 0.5) / BINS, 1.0)
+        bins.append({"from": ends[0], "to": ends[1], "cases": cases, "said": mean, "right": share})
     brier = float(np.mean((said - right) ** 2))
     return {"cases": said.size, "calibration_error": error, "chance": chance, "brier": brier, "bins": bins}

@@ -62,7 +62,7 @@ def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
         "calibration_error": 0.0,
         "chance": 0.0,
         "brier": 0.0,
-        "bins": [{"from": 0.9, "to": 1.0, "cases": COUNT, "said": 1.0, "right": 1.0}],
+        "bins": [{"from": 0.95, "to": 1.0, "cases": COUNT, "said": 1.0, "right": 1.0}],
     }
     assert result["all"]["false_attribution"]["value"] == 0.0
     assert result["all"]["shrinkage"] == {"median": 1.0, "mean": 1.0}

@@ -79,6 +79,13 @@ def test_answers_that_are_as_often_right_as_they_say_have_no_more_error_than_cha
     assert reliability([]) is None
 
 
+def test_what_is_told_with_the_same_probability_but_for_rounding_is_in_one_bin():
+    found = reliability([(0.8, True)] * 3 + [(0.799999, False)])
+    (only,) = found["bins"]
+    assert (only["from"], only["to"], only["cases"], only["right"]) == (0.75, 0.85, 4, 0.75)
+    assert found["calibration_error"] == pytest.approx(0.05, abs=1e-5)
+
+
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_triple_lies_in_three_components(plant):
     for number in range(12):
