@@ -87,7 +87,7 @@ def _log_probability(cells: Cells, residuals: Floats, moved: Floats, form: Form,
     inner, log = np.zeros((columns.shape[1], columns.shape[1])), 0.0
     for block in cells.blocks:
         rows = block.rows
-        likelier, products, _ = weighed(block, columns[rows], residuals[rows], form.chosen(rows), (ways,))
+        likelier, products, _ = weighed(block, columns[rows], residuals[rows], form.chosen(rows), ways)
         inner += products
         log += likelier
     precision, crossed = inner[1:, 1:] + np.eye(moved.shape[1]), inner[1:, 0]

@@ -1,15 +1,13 @@
 """What no effect of the library does: discrepancies of any size, in any signal and regime."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import TIMES, Block
-from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form
-from wetwell.sim2real.likelihood.evidence import Evidence, Stirred, under
-from wetwell.sim2real.likelihood.ways import RIGHT, Way, Ways
+from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, projected
+from wetwell.sim2real.likelihood.evidence import Evidence, Stirred
+from wetwell.sim2real.likelihood.ways import KNOWN, Way, Ways, likeliest
 
 SCALES = TIMES[1:]
 """Times what is allowed that something unknown may be in a block, each as likely."""
@@ -17,14 +15,13 @@ SCALES = TIMES[1:]
 
 _LARGE = [(Way(errors=Errors(offset=scale, form=POOR.form), is_poor=True),) for scale in SCALES]
 _SMALLER = [(Way(errors=one.errors.times(DIFFERING), is_poor=True),) for (one,) in _LARGE]
-_UNKNOWN = (
+UNKNOWN_WAYS = (
     *(Ways(span=large) for large in _LARGE),
     *(Ways(own=large) for large in _LARGE),
     *(Ways(changing=smaller) for smaller in _SMALLER),
     *(Ways(span=large, changing=smaller) for large, smaller in zip(_LARGE, _SMALLER, strict=True)),
     *(Ways(own=large, changing=smaller) for large, smaller in zip(_LARGE, _SMALLER, strict=True)),
 )
-UNKNOWN_WAYS = tuple((one,) for one in _UNKNOWN)
 """What something unknown may be: alike for all pumps or in each, changing, or both; each as likely."""
 
 
@@ -46,13 +43,13 @@ def flexible_factor(found: Evidence, form: Form) -> float:
     for one in found.stirred:
         rows = one.block.rows
         known, *unknown = (
-            _log(one, found.residuals[rows], form.chosen(rows), ways) for ways in (RIGHT, *UNKNOWN_WAYS)
+            _log(one, found.residuals[rows], form.chosen(rows), ways) for ways in (KNOWN, *UNKNOWN_WAYS)
         )
         total += float(np.logaddexp(0.0, logsumexp(unknown) - np.log(len(unknown)) - known) - np.log(2.0))
     return total
 
 
-def _log(one: Stirred, residuals: Floats, form: Form, ways: Sequence[Ways]) -> float:
+def _log(one: Stirred, residuals: Floats, form: Form, ways: Ways) -> float:
     """Logarithm of the probability of the residuals of a block, its surge and swing as they are, with rain or dry."""
     wet = one.log_rain + _of_block(one.block, one.swing, residuals, form, ways)
     if one.dry is None:
@@ -60,6 +57,7 @@ def _log(one: Stirred, residuals: Floats, form: Form, ways: Sequence[Ways]) -> f
     return float(np.logaddexp(wet, one.log_dry + _of_block(one.dry, one.swing, residuals, form, ways)))
 
 
-def _of_block(block: Block, swing: float, residuals: Floats, form: Form, ways: Sequence[Ways]) -> float:
-    log, products = under(block, residuals[:, None], residuals, form, swing, ways)
-    return log - 0.5 * float(products[0, 0])
+def _of_block(block: Block, swing: float, residuals: Floats, form: Form, ways: Ways) -> float:
+    log_prior, allowance = likeliest(block, residuals, form, swing, ways)
+    products, log_det = projected(block, residuals[:, None], form, allowance)
+    return log_prior - 0.5 * (float(products[0, 0]) + log_det)

@@ -51,30 +51,20 @@ CHANGING_WAYS = tuple(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ways:
-    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle.
-
-    `log_block` and `log_span` are logarithms of the probabilities that a block has these ways, and each of its spans.
-    """
+    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle."""
 
     span: Sequence[Way] = SPAN_WAYS
     own: Sequence[Way] = OWN_WAYS
     changing: Sequence[Way] = CHANGING_WAYS
-    log_block: float = 0.0
-    log_span: float = 0.0
 
 
 KNOWN = Ways()
-PRONE = Ways(span=SPAN_WAYS[1:], log_block=float(np.log(POORLY)), log_span=float(np.log1p(-POORLY)))
-"""All spans of a block that is prone to be poor are so."""
-RIGHT = (KNOWN, PRONE)
-"""Of a right model. By means and scatter a span may look good that is poor: a shift in time, which is no offset, may
-explain how cells differ from cycle to cycle once they may be off alike. So both are weighed."""
 
 
-def likeliest(block: Block, residuals: Floats, form: Form, swing: float, ways: Ways) -> tuple[float, Allowance]:
+def likeliest(
+    block: Block, residuals: Floats, form: Form, swing: float, ways: Ways = KNOWN
+) -> tuple[float, Allowance]:
     """What may be wrong, most probably, by the means of groups and their scatter over the cycles.
-
-    A cell counts by its variance in both: what moves much from cycle to cycle says little of what all have alike.
 
     Parameters
     ----------
@@ -92,19 +82,25 @@ def likeliest(block: Block, residuals: Floats, form: Form, swing: float, ways: W
         What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow.
     """
     counts = block.group_sums(np.ones(residuals.size))
-    allowed, signature, late = (
-        block.group_sums(one**2) / counts for one in (block.allowed, form.signature, form.late)
+    mean, noise, allowed, signature, swinging, late = (
+        block.group_sums(values) / counts
+        for values in (
+            residuals,
+            block.variance + block.surge * block.of_inflow,
+            block.allowed**2,
+            form.signature**2,
+            form.swinging**2,
+            form.late**2,
+        )
     )
-    noise = block.variance + block.surge * block.of_inflow + (swing * form.swinging) ** 2
-    changes = noise[:, None] + np.column_stack([_square(one, block.allowed, form.signature) for one in ways.changing])
-    precision = block.group_sums(1.0 / changes)
-    means = block.group_sums(residuals[:, None] / changes) / precision
-    scatter = block.group_sums((residuals[:, None] - means[block.group]) ** 2 / changes + np.log(changes))
-    changing, log_prior = _chosen(-0.5 * (scatter + np.log(precision)).T, ways.changing)
-    mean, of_mean = _picked(means.T, changing), 1.0 / _picked(precision.T, changing)
 
     def variances(of: Sequence[Way]) -> Floats:
         return np.array([one.errors.offset**2 * allowed + one.errors.form**2 * signature for one in of])
+
+    scatter = block.group_sums((residuals - mean[block.group]) ** 2)
+    changes = noise + swing**2 * swinging + variances(ways.changing)
+    changing, log_prior = _chosen(-0.5 * ((counts - 1.0) * np.log(changes) + scatter / changes), ways.changing)
+    of_mean = _picked(changes, changing) / counts
 
     spans = np.bincount(block.span)
     apart = of_mean + (LATE[2] ** 2) * late + variances(ways.own)
@@ -118,7 +114,7 @@ def likeliest(block: Block, residuals: Floats, form: Form, swing: float, ways: W
     left = np.bincount(block.span, _picked(apart, own)) / spans**2 + np.bincount(block.span, late) / spans
     alike = left + np.array([np.bincount(block.span, one) / spans for one in variances(ways.span)])
     span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span)
-    log_prior += prior + ways.log_block + spans.size * ways.log_span
+    log_prior += prior
     return log_prior, Allowance(
         span=_errors(ways.span, span[block.span]),
         own=_errors(ways.own, own),
@@ -143,10 +139,6 @@ def _chosen(logs: Floats, ways: Sequence[Way]) -> tuple[Integers, float]:
         tried.append((float(np.logaddexp.reduce(joint, axis=0).sum()) + log_prone, np.argmax(joint, axis=0)))
     _, best = max(tried, key=lambda one: one[0])
     return best, float(np.logaddexp.reduce([total for total, _ in tried]) - _picked(logs, best).sum())
-
-
-def _square(way: Way, allowed: Floats, signature: Floats) -> Floats:
-    return np.asarray((way.errors.offset * allowed) ** 2 + (way.errors.form * signature) ** 2, dtype=np.float64)
 
 
 def _picked(values: Floats, chosen: Integers) -> Floats:
