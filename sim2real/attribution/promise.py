@@ -11,7 +11,6 @@ from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, stee
 
 MOST_SCALED = 2.0
 """Times what an effect did alone that it may do beside others: the starts of a grid are further apart. [1]"""
-
 LEAST_REACH = 1e-9
 """Of a direction, as a share of the largest: under it is rounding. [1]"""
 
