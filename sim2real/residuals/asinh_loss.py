@@ -44,7 +44,7 @@ def weights_of(residuals: Floats) -> Floats:
     Examples
     --------
     >>> weights_of(np.array([0.0, 0.01, -50.0])).round(3)
-    array([1.   , 1.   , 0.03 ])
+    array([1.  , 1.  , 0.03])
     """
     losses = asinh_loss(residuals)
     is_small = np.abs(residuals) < 1e-6
