@@ -15,7 +15,7 @@ def reliability(told: Sequence[tuple[float, bool]]) -> dict[str, Any] | None:
 
     $$\mathrm{ECE} = \sum_b \frac{n_b}{n} \left| \overline{y}_b - \overline{p}_b \right|$$
 
-    over `BINS` and one. Range 0 to 1, best 0; of n answers that are calibrated it is about
+    over bins around the tenths. Range 0 to 1, best 0; of n answers that are calibrated it is about
     $\sqrt{2 / \pi} \sum_b \sqrt{n_b\, p_b (1 - p_b)} / n$ by chance alone, given as `chance`.
 
     Parameters
