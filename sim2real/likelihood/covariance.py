@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
+from wetwell.sim2real.likelihood.marginal import eliminated
 
 OFFSET = 0.3
 """Standard deviation of the error of a good model, over what is allowed: in a block, and in a span of time. [1]"""
@@ -144,29 +144,26 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
         parts.append((block.group_means(form.signature)[block.group], GOOD_FORM, span.form, each.form))
     if np.any(form.late):
         parts.append((form.late, *LATE))
-    weight = 1.0 / variance
-    groups, cycles = block.span.size, int(block.cycle.max()) + 1
-    size = groups * len(parts)
-    cycle_weight = 1.0 / (1.0 + block.cycle_sums(weight * in_cycle**2))
-    by_cycle = block.cycle_sums(columns * (weight * in_cycle)[:, None])
-    products = columns.T @ (columns * weight[:, None]) - by_cycle.T @ (by_cycle * cycle_weight[:, None])
-    loaded = np.zeros((cycles, size))
-    inner, crossed = np.zeros((size, size)), np.zeros((size, columns.shape[1]))
-    log_det = float(np.sum(np.log(variance)) - np.sum(np.log(cycle_weight)))
-    for i, (load, of_block, of_span, of_group) in enumerate(parts):
+    groups, count = block.span.size, columns.shape[1]
+    unknown = groups * len(parts)
+    joint = np.zeros((unknown + count, unknown + count))
+    log_det = float(np.sum(np.log(variance)))
+    for i, (_, of_block, of_span, of_group) in enumerate(parts):
         place = slice(i * groups, (i + 1) * groups)
-        loaded[block.cycle, i * groups + block.group] = weight * in_cycle * load
-        crossed[place] = block.group_sums(columns * (weight * load)[:, None])
-        for j, (other, *_) in enumerate(parts):
-            inner[place, j * groups : (j + 1) * groups] += np.diag(block.group_sums(weight * load * other))
-        precision, log_volume = _alike(block.span, of_block, of_span, of_group)
-        inner[place, place] += precision
+        joint[place, place], log_volume = _alike(block.span, of_block, of_span, of_group)
         log_det += log_volume
-    inner -= loaded.T @ (loaded * cycle_weight[:, None])
-    crossed -= loaded.T @ (by_cycle * cycle_weight[:, None])
-    factor = cho_factor(inner, lower=True)
-    log_det += 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
-    return np.asarray(products - crossed.T @ cho_solve(factor, crossed), dtype=np.float64), log_det
+    log_det += eliminated(
+        np.ascontiguousarray(columns),
+        1.0 / variance,
+        in_cycle,
+        np.array([load for load, *_ in parts]),
+        block.group,
+        block.cycle,
+        joint,
+        np.zeros((int(block.cycle.max()) + 1, unknown + count + 1)),
+    )
+    left = np.triu(joint[unknown:, unknown:])
+    return np.asarray(left + np.triu(left, 1).T, dtype=np.float64), log_det
 
 
 def _alike(span: Integers, of_block: float, of_span: float | Floats, own: float | Floats) -> tuple[Floats, float]:
