@@ -82,7 +82,9 @@ class Beside:
         $$\min_{\alpha, \beta} \sum_i w_i (r_i + \alpha d_i + S_i \beta)^2, \qquad
         w = \frac{\ell(r)\,\ell'(r)}{r}, \qquad 0 \le \alpha \le 2$$
 
-        with r the residuals, d what the candidate changes alone, S the slopes of the others, and ℓ the loss.
+        with r the residuals, d what the candidate changes alone, S the slopes of the others, and ℓ the loss. Where
+        the others are not at their best, their slopes may not reach as far as they would go by themselves: then they
+        only give way.
         """
         residuals = residuals_of(self.losses)
         root = np.sqrt(weights_of(residuals))
@@ -95,14 +97,21 @@ class Beside:
         has_strength = any(free.neutral is not None for free in alone.candidate.free)
         scale = np.clip(-along / squares, 0.0, MOST_SCALED) if has_strength else np.ones(along.size)
         best = int(np.argmin(scale * (2.0 * along + scale * squares)))
-        moved = np.linalg.lstsq(triangle, -(basis.T @ left + scale[best] * along_others[best]), rcond=None)[0]
-        moved = np.clip(moved, -self.position, 1.0 - self.position)
-        after = residuals + scale[best] * alone.changes[best] + self.slopes @ moved
+        strength, given = float(scale[best]), basis.T @ left
+        moves = [
+            np.linalg.lstsq(triangle, -(own + strength * along_others[best]), rcond=None)[0]
+            for own in (given, np.zeros_like(given))
+        ]
         return Promise(
             candidate=alone.candidate,
-            point=_scaled(alone.candidate, alone.points[best], float(scale[best])),
-            cost=float(np.sum(asinh_loss(after) ** 2)),
+            point=_scaled(alone.candidate, alone.points[best], strength),
+            cost=min(self._cost(strength * alone.changes[best], moved) for moved in moves),
         )
+
+    def _cost(self, change: Floats, moved: Floats) -> float:
+        """Sum of squares with a change, and the others moved as far as their ranges go."""
+        moved = np.clip(moved, -self.position, 1.0 - self.position)
+        return float(np.sum(asinh_loss(residuals_of(self.losses) + change + self.slopes @ moved) ** 2))
 
 
 def _scaled(candidate: Candidate, point: Floats, scale: float) -> Floats:

@@ -26,16 +26,20 @@ def candidate(alpha, name):
     return next(one for one in candidates_of(len(alpha.pump), 1, only=[name]) if set(dict(one.fixed).values()) <= {0})
 
 
-@pytest.fixture(scope="module")
-def fitter(alpha):
+def fitter_of(alpha, truth):
     station = alpha.model_copy(
-        update={"effect": tuple(EffectTable.model_validate(one.model_dump()) for one in TRUTH)}
+        update={"effect": tuple(EffectTable.model_validate(one.model_dump()) for one in truth)}
     )
     traces = traces_of(Simulation(station, Scenario(name="plain"), 5, 0).advance(14_400), alpha)
     regimes = regimes_of(traces, alpha)
     replay = Replay(traces, alpha)
     residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt())
     return Fitter(replay, residuals, np.ones(residuals.bins.signal.size, dtype=np.bool_))
+
+
+@pytest.fixture(scope="module")
+def fitter(alpha):
+    return fitter_of(alpha, TRUTH)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +79,9 @@ def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
     """Small residuals, a known change and known slopes: strength and the other's move are those of lstsq."""
     rng = np.random.default_rng(7)
     slopes, change = rng.normal(size=(500, 1)), rng.normal(size=500)
-    wanted = 1e-3 * (rng.normal(size=500) - 1.4 * change + 0.2 * slopes[:, 0])
+    change += 0.2 * slopes[:, 0]
+    wanted = 1e-3 * (rng.normal(size=500) - 1.4 * change)
+    wanted -= slopes[:, 0] * (slopes[:, 0] @ wanted) / (slopes[:, 0] @ slopes[:, 0])
     (lift,) = candidates_of(len(alpha.pump), 1, only=["static_head_bias"])
     point = np.array([lift.free[0].normalised(1.0)])
     one = Alone(candidate=lift, points=(point,), changes=1e-3 * change[None, :])
@@ -83,6 +89,20 @@ def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
     (scale, _), left, _, _ = np.linalg.lstsq(1e-3 * np.column_stack([change, slopes]), -wanted, rcond=None)
     assert lift.free[0].value(promise.point[0]) == pytest.approx(scale, rel=1e-4)
     assert promise.cost == pytest.approx(float(left[0]), rel=1e-4)
+
+
+def test_others_that_are_not_at_their_best_only_give_way(alpha):
+    """Here a lift that grows with the level stands for a lift and a late head: it does not go as far as it would."""
+    truth = (
+        EFFECTS["channel_delay"](channel="head_m", delay_s=9.0),
+        EFFECTS["static_head_bias"](offset_m=-1.1),
+        EFFECTS["control_delay"](delay_s=13.0),
+    )
+    fitter = fitter_of(alpha, truth)
+    (grows,) = candidates_of(len(alpha.pump), 1, only=["level_dependent_static_head"])
+    growing = fitter.refine(fitter.at([grows], [np.array([0.33, 0.0])]))
+    promise = beside(fitter, growing).promise(alone(fitter, candidate(alpha, "control_delay")))
+    assert promise.cost < fitter.cost(growing)
 
 
 def test_reach_is_that_of_least_squares(fitter, lag):
