@@ -14,6 +14,7 @@ from wetwell.sim2real.recording.seconds import repeated, since_changes, trailing
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, NO_PUMP, POWER, Bins, Seconds, binned
+from wetwell.sim2real.residuals.drained import is_drained
 from wetwell.sim2real.residuals.noise import BLOCK_S, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import PlantParameters
@@ -124,6 +125,7 @@ def pump_residuals(
     switched = _switched(traces, plain)
     has_lost = traces.is_each_second and traces.value != "held"
     block = max(round(BLOCK_S / traces.rate_s), 1)
+    has_water = ~is_drained(traces, station, plain)
     found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
@@ -134,7 +136,7 @@ def pump_residuals(
                 open_ = np.hypot(open_, doubt.signals[name][pump])
             if traces.span_s > 1:
                 open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
-            known = np.where(is_shown[pump], recorded[pump], np.nan)
+            known = np.where(is_shown[pump] & has_water, recorded[pump], np.nan)
             one = _one_pump(
                 name, pump, known, expected[pump], open_, regimes, noise, station.materiality, patterns.get(name)
             )

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from wetwell.sim2real.residuals.signals import _cut, _since, _unresolved
+from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.signals import _cut, _since, _unresolved, pump_residuals
+from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
 
 
 def test_a_jump_is_open_by_half_when_it_happens_and_by_less_and_less_afterwards():
@@ -40,3 +46,17 @@ def test_a_value_that_waits_may_be_any_that_it_had_since():
     low, high = _since(np.array([3.0, 5.0, 4.0, 9.0, 2.0]), 2)
     np.testing.assert_array_equal(low, [3.0, 3.0, 3.0, 4.0, 2.0])
     np.testing.assert_array_equal(high, [3.0, 5.0, 5.0, 9.0, 9.0])
+
+
+def test_what_pumps_take_from_a_drained_wet_well_is_not_compared(alpha):
+    """A controller that is late pumps it empty: what a pump does then is air and water, and no curve."""
+    late = alpha.model_copy(update={"effect": (EFFECTS["control_delay"](delay_s=100.0),)})
+    traces = traces_of(Simulation(late, Scenario(name="plain"), 7, 0).advance(14_400, truth=False), alpha)
+    is_low = (traces.level_m < 0.02) & np.any(traces.frequency_hz > 0.0, axis=0)
+    assert is_low.sum() > 60
+    replay = Replay(traces, alpha)
+    found = pump_residuals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt(), {})
+    compared = np.unique(np.concatenate([one.seconds.second for one in found]))
+    assert not is_low[compared].any()
+    is_running = np.any(traces.frequency_hz > 0.0, axis=0)
+    assert is_running[compared].sum() > 0.8 * (is_running & (traces.level_m > 0.1)).sum()
