@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
@@ -82,9 +83,8 @@ class Beside:
         $$\min_{\alpha, \beta} \sum_i w_i (r_i + \alpha d_i + S_i \beta)^2, \qquad
         w = \frac{\ell(r)\,\ell'(r)}{r}, \qquad 0 \le \alpha \le 2$$
 
-        with r the residuals, d what the candidate changes alone, S the slopes of the others, and ℓ the loss. Where
-        the others are not at their best, their slopes may not reach as far as they would go by themselves: then they
-        only give way.
+        with r the residuals, d what the candidate changes alone, S the slopes of the others, and ℓ the loss. The
+        others stay within their ranges.
         """
         residuals = residuals_of(self.losses)
         root = np.sqrt(weights_of(residuals))
@@ -97,21 +97,27 @@ class Beside:
         has_strength = any(free.neutral is not None for free in alone.candidate.free)
         scale = np.clip(-along / squares, 0.0, MOST_SCALED) if has_strength else np.ones(along.size)
         best = int(np.argmin(scale * (2.0 * along + scale * squares)))
-        strength, given = float(scale[best]), basis.T @ left
-        moves = [
-            np.linalg.lstsq(triangle, -(own + strength * along_others[best]), rcond=None)[0]
-            for own in (given, np.zeros_like(given))
-        ]
+        strength = float(scale[best])
+        wanted = basis.T @ left + strength * along_others[best]
+        moved = _bounded(triangle, wanted, -self.position, 1.0 - self.position)
+        after = residuals + strength * alone.changes[best] + self.slopes @ moved
         return Promise(
             candidate=alone.candidate,
             point=_scaled(alone.candidate, alone.points[best], strength),
-            cost=min(self._cost(strength * alone.changes[best], moved) for moved in moves),
+            cost=float(np.sum(asinh_loss(after) ** 2)),
         )
 
-    def _cost(self, change: Floats, moved: Floats) -> float:
-        """Sum of squares with a change, and the others moved as far as their ranges go."""
-        moved = np.clip(moved, -self.position, 1.0 - self.position)
-        return float(np.sum(asinh_loss(residuals_of(self.losses) + change + self.slopes @ moved) ** 2))
+
+def _bounded(triangle: Floats, wanted: Floats, low: Floats, high: Floats) -> Floats:
+    """Moves within the ranges that take most of what is wanted away.
+
+    Two that do nearly the same, such as a friction and its exponent, go far against each other: cut one by one they
+    would do anything.
+    """
+    moved = np.linalg.lstsq(triangle, -wanted, rcond=None)[0]
+    if np.all((low <= moved) & (moved <= high)):
+        return np.asarray(moved, dtype=np.float64)
+    return np.asarray(lsq_linear(triangle, -wanted, (low, high)).x, dtype=np.float64)
 
 
 def _scaled(candidate: Candidate, point: Floats, scale: float) -> Floats:

@@ -91,8 +91,8 @@ def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
     assert promise.cost == pytest.approx(float(left[0]), rel=1e-4)
 
 
-def test_others_that_are_not_at_their_best_only_give_way(alpha):
-    """Here a lift that grows with the level stands for a lift and a late head: it does not go as far as it would."""
+def test_others_that_do_nearly_the_same_stay_within_their_ranges_together(alpha):
+    """A slope and its reference go far against each other: each cut by itself, they would do anything."""
     truth = (
         EFFECTS["channel_delay"](channel="head_m", delay_s=9.0),
         EFFECTS["static_head_bias"](offset_m=-1.1),
