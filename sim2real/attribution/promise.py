@@ -1,24 +1,21 @@
 """What a further effect promises beside others, as if what each does alone were added: no replay is needed."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, steepness, weights_of
+from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, weights_of
 
 MOST_SCALED = 2.0
 """Times what an effect did alone that it may do beside others: the starts of a grid are further apart. [1]"""
-LEAST_REACH = 1e-9
-"""Of a direction, as a share of the largest: under it is rounding. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alone:
-    """What a candidate does alone at some points.
+    """What a candidate does at some points: alone, or beside others where it was replayed.
 
     Attributes
     ----------
@@ -59,23 +56,6 @@ class Beside:
     losses: Floats
     slopes: Floats
     position: Floats
-
-    @cached_property
-    def reach(self) -> Floats:
-        """(fitted bins, directions) orthonormal: where the parameters of the others can move the losses."""
-        moved = self.slopes * steepness(self.losses)[:, None]
-        left, sizes, _ = np.linalg.svd(moved, full_matrices=False)
-        return np.asarray(left[:, sizes > LEAST_REACH * sizes.max(initial=0.0)], dtype=np.float64)
-
-    def left_of(self, losses: Floats) -> float:
-        """Sum of squares that is left once what the others can reach is fitted again, as if all were linear.
-
-        Parameters
-        ----------
-        losses : (fitted bins,) array
-        """
-        along = self.reach.T @ losses
-        return float(losses @ losses) - float(along @ along)
 
     def promise(self, alone: Alone) -> Promise:
         r"""What is left by the best of a candidate's points, its strength and the others' parameters fitted again.

@@ -100,10 +100,15 @@ class Trials:
         firsts = []
         for base, beside in zip(bases, besides, strict=True):
             own = [fit for (its, _), fit in zip(likely, tried, strict=True) if its is base and fit is not None]
-            own.sort(key=lambda fit: beside.left_of(fit.residuals[self._fitter.rows]))
+            own.sort(key=lambda fit: beside.promise(self._doing(base, fit)).cost)
             firsts += [(base, fit) for fit in own[:MOST_REFINED]]
         firsts.sort(key=lambda pair: -pair[1].position.size)  # the longest first, so that all cores end together
         return list(self._each(lambda pair: self._refined(*pair), firsts))
+
+    def _doing(self, base: Fit, fit: Fit) -> Alone:
+        """What the last effect of a fit does beside the others, as it was replayed."""
+        change = self._rows_of(fit) - self._rows_of(base)
+        return Alone(candidate=fit.candidates[-1], points=fit.points[-1:], changes=change[None, :])
 
     def _beside(self, base: Fit) -> Beside:
         rows = self._fitter.rows

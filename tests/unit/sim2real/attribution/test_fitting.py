@@ -105,14 +105,6 @@ def test_others_that_do_nearly_the_same_stay_within_their_ranges_together(alpha)
     assert promise.cost < fitter.cost(growing)
 
 
-def test_reach_is_that_of_least_squares(fitter, lag):
-    rng = np.random.default_rng(4)
-    slopes = fitter.loss_slopes(lag)[fitter.rows]
-    wanted = lag.residuals + slopes @ np.array([0.01]) + rng.normal(0.0, 0.1, lag.residuals.size)
-    _, left, _, _ = np.linalg.lstsq(slopes, wanted, rcond=None)
-    assert beside(fitter, lag).left_of(wanted) == pytest.approx(float(left[0]))
-
-
 def test_slopes_of_residuals_know_nothing_of_the_noise(fitter, alpha):
     """Else a lift up and a friction down, which cancel each other, leave some of the noise, and explain it."""
     bins, lift = fitter.bins, candidate(alpha, "static_head_bias")
@@ -130,7 +122,3 @@ def test_the_size_of_the_noise_knows_nothing_of_the_noise(fitter):
     steady = (bins.signal == FLOW) & (bins.regime == STEADY) & (bins.pump == 0)
     usual = np.median(bins.deviation[steady])
     assert np.mean(np.isclose(bins.deviation[steady], usual, rtol=1e-6)) > 0.5
-
-
-def test_nothing_can_be_reached_without_effects(fitter):
-    assert beside(fitter, fitter.plain).reach.shape == (int(fitter.rows.sum()), 0)
