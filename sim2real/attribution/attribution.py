@@ -12,7 +12,7 @@ from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.intervals import are_sized, intervals_of
+from wetwell.sim2real.attribution.intervals import are_sized, intervals_of, sharpened
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import MOST_CHANGED, changed, in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
@@ -117,10 +117,11 @@ def attribute(
     equal: dict[str, tuple[str, ...]] = {}
     while verdict_of(posterior := posterior_of(hypotheses.weights(), len(singles), log_share)) == "effect":
         names = best_set(posterior)
-        own = in_order(fitter, hypotheses.of(names).fit)
-        own_ends = ends = intervals_of(fitter, own, residuals.bins)
-        if are_sized(own, own_ends):
-            accepted = informed(fitter, own, priors)
+        likely = hypotheses.of(names)
+        its_ends = sharpened(likely.fit, intervals_of(fitter, likely.fit, residuals.bins), likely.evidence)
+        if are_sized(likely.fit, its_ends):
+            own, own_ends = in_order(fitter, likely.fit, its_ends)
+            ends, accepted = own_ends, informed(fitter, own, priors)
             equal = equivalents(posterior, accepted.names)
             break
         hypotheses.rule_out(names)

@@ -3,8 +3,11 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.known import agreeing, known_of, narrowed
+from wetwell.sim2real.attribution.undetermined import elsewhere
+from wetwell.sim2real.likelihood.evidence import Evidence
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.bins import Bins
@@ -67,6 +70,8 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
     ends = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
     for flat in np.flatnonzero(~np.any(slopes, axis=0)):
         ends[flat] = _profile(fitter, fit, x, int(flat))
+    for open_ in np.flatnonzero(np.all(ends == (0.0, 1.0), axis=1) & np.any(slopes, axis=0)):
+        ends = _with_others(fitter, fit, ends, covariance, slopes, int(open_))
     frees = [(free, candidate) for candidate in fit.candidates for free in candidate.free]
     for k, (free, candidate) in enumerate(frees):
         form = FORM[0] if EFFECTS[candidate.name].has_one_form else FORM[1]
@@ -75,6 +80,35 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
         low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
         ends[k] = min(ends[k, 0], free.normalised(low)), max(ends[k, 1], free.normalised(high))
     return np.asarray(ends, dtype=np.float64)
+
+
+def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
+    """Ends that the likelihood brings away from neutral, for an only strength whose interval holds it.
+
+    The fit counts all bins alike: what a right level may be off in all steady seconds may be as much as a lag does
+    there, though its ramps need the lag. The likelihood weighs them so, and it decided that the effect is there.
+
+    Parameters
+    ----------
+    fit : Fit
+    ends : (parameters, 2) array
+        As `intervals_of` makes them.
+    found : Evidence
+        Of the same fit, its candidates in the same order.
+    """
+    x = fit.position + found.step
+    spread = TWO_SIDED * np.sqrt(np.diag(np.linalg.inv(found.precision + np.eye(x.size))))
+    likely = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
+    sharp, first = ends.copy(), 0
+    for candidate in fit.candidates:
+        place = slice(first, first + len(candidate.free))
+        if _may_be_neutral(candidate, ends[place]) == [True]:
+            (k,) = np.flatnonzero([free.neutral is not None for free in candidate.free])
+            neutral = candidate.free[k].neutral or 0.0
+            side = int(fit.position[first + k] < candidate.free[k].normalised(neutral))
+            sharp[first + k, side] = likely[first + k, side]
+        first = place.stop
+    return sharp
 
 
 def are_sized(fit: Fit, ends: Floats) -> bool:
@@ -89,15 +123,31 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
     ends : (parameters, 2) array
         As `intervals_of` makes them.
     """
-    for candidate, its in zip(fit.candidates, fit.split(ends), strict=False):  # of no candidates it is one empty part
-        may_be_neutral = [
-            low <= free.normalised(free.neutral) <= high
-            for free, (low, high) in zip(candidate.free, its, strict=True)
-            if free.neutral is not None
-        ]
-        if may_be_neutral == [True]:
-            return False
-    return True
+    parts = zip(fit.candidates, fit.split(ends), strict=False)  # of no candidates it is one empty part
+    return all(_may_be_neutral(candidate, its) != [True] for candidate, its in parts)
+
+
+def _may_be_neutral(candidate: Candidate, ends: Floats) -> list[bool]:
+    """Of each strength."""
+    return [
+        bool(low <= free.normalised(free.neutral) <= high)
+        for free, (low, high) in zip(candidate.free, ends, strict=True)
+        if free.neutral is not None
+    ]
+
+
+def _with_others(
+    fitter: Fitter, fit: Fit, ends: Floats, covariance: Floats, slopes: Floats, parameter: int
+) -> Floats:
+    """Ends that hold what the others would be at the ends of the range of one that may have any value."""
+    variance = covariance[parameter, parameter]
+    alone = np.diag(covariance) - covariance[parameter] ** 2 / variance
+    spread = TWO_SIDED * np.sqrt(np.maximum(alone, 0.0))
+    rise = TWO_SIDED**2 * variance / np.linalg.pinv(slopes.T @ slopes)[parameter, parameter]
+    points = elsewhere(fitter, fit, parameter, float(rise))
+    low, high = ([ends[:, side], *(x + sign * spread for x in points)] for side, sign in ((0, -1.0), (1, 1.0)))
+    ends = np.column_stack([np.min(low, axis=0), np.max(high, axis=0)])
+    return np.asarray(np.clip(ends, 0.0, 1.0), dtype=np.float64)
 
 
 def _sums(values: Floats, group: Integers) -> Floats:

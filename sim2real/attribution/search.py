@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.trials import Each, Trials
@@ -42,15 +43,17 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
         hypotheses.add(trials.with_one_more(bases))
 
 
-def in_order(fitter: Fitter, fit: Fit) -> Fit:
-    """The fit with its effects in order, the one without which most is left first."""
+def in_order(fitter: Fitter, fit: Fit, ends: Floats) -> tuple[Fit, Floats]:
+    """The fit with its effects in order, the one without which most is left first, and the ends of its intervals."""
     left = [fitter.cost(fitter.without(fit, member)) for member in range(len(fit.names))]
     order = sorted(range(len(fit.names)), key=lambda member: -left[member])
-    return Fit(
+    parts = fit.split(ends)
+    ordered = Fit(
         candidates=tuple(fit.candidates[k] for k in order),
         points=tuple(fit.points[k] for k in order),
         residuals=fit.residuals,
     )
+    return ordered, np.concatenate([parts[k] for k in order])
 
 
 def changed(fitter: Fitter, fits: Sequence[Fit], each: Each) -> list[Fit]:

@@ -1,11 +1,14 @@
-"""Whether an interval says how large an effect is."""
+"""Intervals of parameters, and whether one says how large an effect is."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fit
-from wetwell.sim2real.attribution.intervals import are_sized
+from wetwell.sim2real.attribution.intervals import are_sized, intervals_of, sharpened
 
 
 def fit_of(*names):
@@ -32,5 +35,78 @@ def test_of_several_strengths_one_may_be_neutral_and_what_is_no_strength_may_be_
     assert not are_sized(fit, np.array([*wear, [0.0, 0.3], *leak[1:]]))
 
 
+def likelihood(size, precision):
+    return SimpleNamespace(step=np.zeros(size), precision=precision * np.eye(size))
+
+
+@pytest.mark.parametrize(
+    ("precision", "low", "is_sized"), [(400.0, 0.5 - 1.96 / np.sqrt(401.0), True), (1.0, 0.0, False)]
+)
+def test_an_end_at_neutral_is_as_near_as_the_likelihood_lets_it_be(precision, low, is_sized):
+    """It knows that what a level may be off in all steady seconds says nothing of ramps. The other end stays."""
+    fit = fit_of("check_valve_leak")
+    ends = np.array([[0.0, 0.9] if free.neutral is not None else [0.0, 1.0] for free in fit.candidates[0].free])
+    sharp = sharpened(fit, ends, likelihood(len(ends), precision))
+    assert sharp[0] == pytest.approx([low, 0.9])
+    assert are_sized(fit, sharp) is is_sized
+
+
+def test_what_the_fit_knows_stays_as_it_is():
+    fit = fit_of("check_valve_leak", "pump_wear")
+    ends = np.array([[0.3, 0.9]] + [[0.0, 1.0]] * (fit.position.size - 1))
+    assert sharpened(fit, ends, likelihood(len(ends), 400.0)) == pytest.approx(ends)
+
+
 def test_nothing_has_no_size_to_be_told():
     assert are_sized(Fit(candidates=(), points=(), residuals=np.zeros(0)), np.zeros((0, 2)))
+
+
+class Valley:
+    """A fitter of two parameters: the one is so far off a parabola of the other, which hardly anything shows."""
+
+    rows = np.ones(400, dtype=np.bool_)
+    noise = np.random.default_rng(3).normal(size=400)
+
+    def residuals(self, x):
+        away = 50.0 * (x[0] - 0.2 - 0.5 * (x[1] - 0.9) ** 2)
+        return self.noise + away + np.where(np.arange(400) < 4, 0.01 * (x[1] - 0.9), 0.0)
+
+    def whole(self, candidates, points):
+        """Both parameters, whichever is free."""
+        values, left = dict(candidates[0].fixed), iter(points[0])
+        known = {one.name: one for one in self.free}
+        return np.array(
+            [known[n].normalised(values[n]) if n in values else float(next(left)) for n in known], dtype=np.float64
+        )
+
+    def at(self, candidates, points):
+        residuals = self.residuals(self.whole(candidates, points))
+        return Fit(candidates=tuple(candidates), points=tuple(points), residuals=residuals)
+
+    def refine(self, fit):
+        def left(x):
+            return self.residuals(self.whole(fit.candidates, [x]))
+
+        found = least_squares(left, fit.points[0], bounds=(0.0, 1.0)).x
+        return self.at(fit.candidates, (found,))
+
+    def cost(self, fit):
+        return float(np.sum(fit.residuals**2))
+
+    def loss_slopes(self, fit):
+        x, step = self.whole(fit.candidates, fit.points), 1e-6
+        return np.column_stack([(self.residuals(x + step * one) - self.residuals(x)) / step for one in np.eye(2)])
+
+
+def test_beside_a_parameter_that_may_have_any_value_the_others_have_what_they_would_have_there():
+    """Its slope is nothing at the fit: straight lines would say that the other one is known well."""
+    fitter = Valley()
+    (wear,) = candidates_of(1, 1, only=["pump_wear"])
+    fitter.free = wear.free
+    fit = fitter.at((wear,), (np.array([0.2, 0.9]),))
+    bins = SimpleNamespace(**{name: np.zeros(400, dtype=int) for name in ("signal", "regime")})
+    bins.cycle, bins.tolerance = np.arange(400) // 10, np.zeros(400)
+    ends = intervals_of(fitter, fit, bins)
+    assert ends[1] == pytest.approx([0.0, 1.0])
+    assert ends[0, 0] == pytest.approx(0.2, abs=0.01)
+    assert ends[0, 1] == pytest.approx(0.2 + 0.5 * 0.81, abs=0.01)
