@@ -182,12 +182,16 @@ class Hypotheses:
         )
 
     def _form(self, fit: Fit, signatures: Sequence[Floats], explained: Floats, late: Sequence[Floats]) -> Form:
-        swings = np.zeros(self._cells.group.size)
+        swings, fixed = np.zeros((2, self._cells.group.size))
         for effect, signature in zip(fit.effects, signatures, strict=True):
             if type(effect).force is not Effect.force:
                 swings += self._cells.block_squares(signature)
+            if effect.has_one_form:
+                fixed += signature**2
+        squares = np.sum(np.square(signatures), axis=0)
         return Form(
-            signature=np.maximum(np.sqrt(np.sum(np.square(signatures), axis=0)), np.abs(explained)),
+            signature=np.maximum(np.sqrt(squares), np.abs(explained)),
+            fixed=np.divide(fixed, squares, out=np.zeros_like(fixed), where=squares > 0.0),
             swinging=np.sqrt(swings),
             late=np.sum(late, axis=0),
         )

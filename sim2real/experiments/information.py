@@ -12,7 +12,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.attribution.possible import PossibleSet
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
-from wetwell.sim2real.likelihood.covariance import Form
+from wetwell.sim2real.likelihood.covariance import Form, no_form
 from wetwell.sim2real.likelihood.evidence import weighed
 from wetwell.sim2real.likelihood.posterior import CREDIBLE
 from wetwell.sim2real.likelihood.ways import KNOWN, Ways
@@ -76,7 +76,7 @@ def evidences(
         best = means(one.effects)
         moved = [means(effects) - best for effects in one.spread]
         signature = np.abs(without - best)
-        form = Form(signature=signature, swinging=np.zeros(signature.size), late=np.zeros(signature.size))
+        form = replace(no_form(cells), signature=signature)
         moved_by = np.array([*moved]).reshape(len(moved), best.size).T
         found.append([_log_probability(cells, best - shown, moved_by, form, ways) for ways in (KNOWN, POOR_ALIKE)])
     return np.array(found).T

@@ -71,6 +71,8 @@ class Form:
     signature : (cells,) array
         What the effects explain, in one number: the root of the sum of squares of what each does, or what they do
         together where that is more: one effect that is split into two has no better form.
+    fixed : (cells,) array
+        Share of its square that is of effects whose name fixes their equation: these are never poor in form. [1]
     swinging : (cells,) array
         Root mean square, within its block, of what those do that swing in time.
     late : (cells,) array
@@ -78,18 +80,29 @@ class Form:
     """
 
     signature: Floats
+    fixed: Floats
     swinging: Floats
     late: Floats
 
     def chosen(self, rows: Integers) -> "Form":
         """Of some of the cells."""
-        return Form(signature=self.signature[rows], swinging=self.swinging[rows], late=self.late[rows])
+        return Form(
+            signature=self.signature[rows],
+            fixed=self.fixed[rows],
+            swinging=self.swinging[rows],
+            late=self.late[rows],
+        )
 
 
 def no_form(cells: Cells) -> Form:
     """Where there are no effects."""
     nothing = np.zeros(cells.group.size)
-    return Form(signature=nothing, swinging=nothing, late=nothing)
+    return Form(signature=nothing, fixed=nothing, swinging=nothing, late=nothing)
+
+
+def of_form(share: float | Floats, fixed: Floats) -> Floats:
+    """Error of form where some of what the effects explain has but one: of that it is no larger than a good one's."""
+    return np.sqrt((1.0 - fixed) * np.square(share) + fixed * np.square(np.minimum(share, GOOD_FORM)))
 
 
 def expected_squares(block: Block) -> Floats:
@@ -135,13 +148,18 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     changing = 0.5 * (
         (own.offset * block.allowed) ** 2 + block.surge * block.of_inflow + (allowance.swing * form.swinging) ** 2
     )
-    variance, in_cycle = block.variance + changing + (own.form * form.signature) ** 2, np.sqrt(changing)
+    variance, in_cycle = (
+        block.variance + changing + (of_form(own.form, form.fixed) * form.signature) ** 2,
+        np.sqrt(changing),
+    )
     span, each = allowance.span, allowance.own
     parts: list[tuple[Floats, float, float | Floats, float | Floats]] = [
         (block.allowed, OFFSET, span.offset, each.offset)
     ]
     if np.any(form.signature):
-        parts.append((block.group_means(form.signature)[block.group], GOOD_FORM, span.form, each.form))
+        fixed = block.group_means(form.fixed)
+        load = block.group_means(form.signature)[block.group]
+        parts.append((load, GOOD_FORM, of_form(span.form, fixed), of_form(each.form, fixed)))
     if np.any(form.late):
         parts.append((form.late, *LATE))
     groups, count = block.span.size, columns.shape[1]

@@ -13,7 +13,7 @@ from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
 from wetwell.sim2real.likelihood.jumps import jumping
 from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
-from wetwell.sim2real.likelihood.ways import KNOWN, Ways, likeliest
+from wetwell.sim2real.likelihood.ways import RIGHT, Ways, likeliest
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -203,7 +203,7 @@ def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
 
 
 def weighed(
-    block: Block, columns: Floats, residuals: Floats, form: Form, ways: Ways = KNOWN
+    block: Block, columns: Floats, residuals: Floats, form: Form, ways: Ways = RIGHT
 ) -> tuple[float, Floats, Stirred]:
     """A block under what is likeliest to be wrong in it.
 
@@ -229,14 +229,32 @@ def weighed(
     rained = [_rained_on(replace(block, surge=surge), residuals) for surge in block.surges]
     for still, swing in product(rained, SWINGS if np.any(form.swinging) else SWINGS[:1]):
         one = replace(still, swing=swing)
-        log_prior, allowance = likeliest(one.block, residuals, form, swing, ways)
-        products, log_det = projected(one.block, columns, form, allowance)
-        tried.append((one.log_rain + log_prior - 0.5 * log_det, products, one))
+        log, products = under(one.block, columns, residuals, form, swing, ways)
+        tried.append((one.log_rain + log, products, one))
     totals = np.array([log - 0.5 * float(products[0, 0]) for log, products, _ in tried])
     best = int(np.argmax(totals))
     log, products, stirred = tried[best]
     unsure = float(logsumexp(totals) - totals[best] - np.log(len(tried)))
     return log + unsure, products, stirred
+
+
+def under(
+    block: Block, columns: Floats, residuals: Floats, form: Form, swing: float, ways: Ways
+) -> tuple[float, Floats]:
+    """Logarithm of volume and of what not knowing the ways adds, and products of columns, under the likeliest ways.
+
+    Parameters
+    ----------
+    block, columns, residuals, form, ways
+        As of `weighed`; the first column is what is left.
+    swing : float
+        Of `SWINGS`.
+    """
+    found = []
+    for log_prior, allowance in likeliest(block, residuals, form, swing, ways):
+        products, log_det = projected(block, columns, form, allowance)
+        found.append((log_prior - 0.5 * log_det, products))
+    return max(found, key=lambda pair: pair[0] - 0.5 * float(pair[1][0, 0]))
 
 
 def _rained_on(block: Block, residuals: Floats) -> Stirred:

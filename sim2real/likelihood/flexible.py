@@ -5,9 +5,9 @@ from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.likelihood.cells import TIMES, Block
-from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, projected
-from wetwell.sim2real.likelihood.evidence import Evidence, Stirred
-from wetwell.sim2real.likelihood.ways import KNOWN, Way, Ways, likeliest
+from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form
+from wetwell.sim2real.likelihood.evidence import Evidence, Stirred, under
+from wetwell.sim2real.likelihood.ways import RIGHT, Way, Ways
 
 SCALES = TIMES[1:]
 """Times what is allowed that something unknown may be in a block, each as likely."""
@@ -43,7 +43,7 @@ def flexible_factor(found: Evidence, form: Form) -> float:
     for one in found.stirred:
         rows = one.block.rows
         known, *unknown = (
-            _log(one, found.residuals[rows], form.chosen(rows), ways) for ways in (KNOWN, *UNKNOWN_WAYS)
+            _log(one, found.residuals[rows], form.chosen(rows), ways) for ways in (RIGHT, *UNKNOWN_WAYS)
         )
         total += float(np.logaddexp(0.0, logsumexp(unknown) - np.log(len(unknown)) - known) - np.log(2.0))
     return total
@@ -58,6 +58,5 @@ def _log(one: Stirred, residuals: Floats, form: Form, ways: Ways) -> float:
 
 
 def _of_block(block: Block, swing: float, residuals: Floats, form: Form, ways: Ways) -> float:
-    log_prior, allowance = likeliest(block, residuals, form, swing, ways)
-    products, log_det = projected(block, residuals[:, None], form, allowance)
-    return log_prior - 0.5 * (float(products[0, 0]) + log_det)
+    log, products = under(block, residuals[:, None], residuals, form, swing, ways)
+    return log - 0.5 * float(products[0, 0])

@@ -17,7 +17,9 @@ from wetwell.sim2real.likelihood.covariance import (
     Allowance,
     Errors,
     Form,
+    of_form,
 )
+from wetwell.sim2real.likelihood.scatter import scatter_of
 
 POORLY = 0.1
 """Probability that a right model is poor in a span or group; and that a block is one where it mostly is. [1]"""
@@ -51,20 +53,27 @@ CHANGING_WAYS = tuple(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ways:
-    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle."""
+    """What may be wrong in a block: alike in a span, in a group by itself, and changing from cycle to cycle.
+
+    `may_be_prone` says that a block which is poor in all its spans is looked at besides. By means and scatter a span
+    may look good that is poor: a shift in time, which is no offset, may explain how cells differ from cycle to cycle
+    once they may be off alike.
+    """
 
     span: Sequence[Way] = SPAN_WAYS
     own: Sequence[Way] = OWN_WAYS
     changing: Sequence[Way] = CHANGING_WAYS
+    may_be_prone: bool = False
 
 
-KNOWN = Ways()
+KNOWN, RIGHT = Ways(), Ways(may_be_prone=True)
+"""Of a right model."""
 
 
-def likeliest(
-    block: Block, residuals: Floats, form: Form, swing: float, ways: Ways = KNOWN
-) -> tuple[float, Allowance]:
+def likeliest(block: Block, residuals: Floats, form: Form, swing: float, ways: Ways) -> list[tuple[float, Allowance]]:
     """What may be wrong, most probably, by the means of groups and their scatter over the cycles.
+
+    A cell counts by its variance in both: what moves much from cycle to cycle says little of what all have alike.
 
     Parameters
     ----------
@@ -78,29 +87,35 @@ def likeliest(
 
     Returns
     -------
-    log_prior, allowance : float, Allowance
-        What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow.
+    found : list of (float, Allowance)
+        What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow; the
+        second, if there is one, where all spans are poor.
     """
     counts = block.group_sums(np.ones(residuals.size))
-    mean, noise, allowed, signature, swinging, late = (
-        block.group_sums(values) / counts
-        for values in (
-            residuals,
-            block.variance + block.surge * block.of_inflow,
-            block.allowed**2,
-            form.signature**2,
-            form.swinging**2,
-            form.late**2,
-        )
+    allowed, signature, late = (
+        block.group_sums(one**2) / counts for one in (block.allowed, form.signature, form.late)
     )
+    fixed = block.group_means(form.fixed)
+    noise = block.variance + block.surge * block.of_inflow + (swing * form.swinging) ** 2
+    precision, means, logs = np.zeros((3, len(ways.changing), counts.size))
+    scatter_of(
+        residuals,
+        noise,
+        block.allowed,
+        np.array([of_form(one.errors.form, form.fixed) * form.signature for one in ways.changing]),
+        block.group,
+        np.array([one.errors.offset for one in ways.changing]),
+        precision,
+        means,
+        logs,
+    )
+    changing, log_prior = _chosen(logs, ways.changing)
+    mean, of_mean = _picked(means, changing), 1.0 / _picked(precision, changing)
 
     def variances(of: Sequence[Way]) -> Floats:
-        return np.array([one.errors.offset**2 * allowed + one.errors.form**2 * signature for one in of])
-
-    scatter = block.group_sums((residuals - mean[block.group]) ** 2)
-    changes = noise + swing**2 * swinging + variances(ways.changing)
-    changing, log_prior = _chosen(-0.5 * ((counts - 1.0) * np.log(changes) + scatter / changes), ways.changing)
-    of_mean = _picked(changes, changing) / counts
+        return np.array(
+            [one.errors.offset**2 * allowed + of_form(one.errors.form, fixed) ** 2 * signature for one in of]
+        )
 
     spans = np.bincount(block.span)
     apart = of_mean + (LATE[2] ** 2) * late + variances(ways.own)
@@ -114,13 +129,22 @@ def likeliest(
     left = np.bincount(block.span, _picked(apart, own)) / spans**2 + np.bincount(block.span, late) / spans
     alike = left + np.array([np.bincount(block.span, one) / spans for one in variances(ways.span)])
     span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span)
-    log_prior += prior
-    return log_prior, Allowance(
-        span=_errors(ways.span, span[block.span]),
-        own=_errors(ways.own, own),
-        changing=_errors(ways.changing, changing[block.group]),
-        swing=swing,
-    )
+    chosen = [(log_prior + prior, span)]
+    if ways.may_be_prone and not span.all():
+        prone = np.log(POORLY) + spans.size * np.log1p(-POORLY)
+        chosen.append((log_prior + prone, np.ones_like(span)))
+    return [
+        (
+            log,
+            Allowance(
+                span=_errors(ways.span, of_span[block.span]),
+                own=_errors(ways.own, own),
+                changing=_errors(ways.changing, changing[block.group]),
+                swing=swing,
+            ),
+        )
+        for log, of_span in chosen
+    ]
 
 
 def _chosen(logs: Floats, ways: Sequence[Way]) -> tuple[Integers, float]:

@@ -26,7 +26,6 @@ class ChannelDelay(Effect):
     """
 
     component: ClassVar[Component] = "telemetry"
-    has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"delay_s": 0.0}
 
     name: Literal["channel_delay"] = "channel_delay"

@@ -57,20 +57,26 @@ def made(*, has_inflow, is_each_second=True):
     return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=has_inflow, is_each_second=is_each_second)
 
 
+def never_poor(share, fixed):
+    """Two parts that are independent: one of any form, and one of a form that is known, or nearly."""
+    return np.hypot(np.sqrt(1.0 - fixed) * share, np.sqrt(fixed) * np.minimum(share, GOOD.form))
+
+
 def dense(block, form, allowance):
     """The covariance, written down."""
     f, allowed, late = form.signature, block.allowed, form.late
+    fixed = block.group_means(form.fixed)
     span, own, changing = allowance.span, allowance.own, allowance.changing
     changed = (changing.offset * allowed) ** 2 + block.surge * block.variance + (allowance.swing * form.swinging) ** 2
     in_cycle = np.sqrt(0.5 * changed)
-    whole = np.diag(block.variance + 0.5 * changed + (changing.form * f) ** 2)
+    whole = np.diag(block.variance + 0.5 * changed + (never_poor(changing.form, form.fixed) * f) ** 2)
     same_cycle = block.cycle[:, None] == block.cycle[None, :]
     whole += same_cycle * np.outer(in_cycle, in_cycle)
     group, of_cell = block.group, block.span[block.group]
     same_group, same_span = group[:, None] == group[None, :], of_cell[:, None] == of_cell[None, :]
     for load, of_block, of_span, each in (
         (allowed, GOOD.offset, span.offset, own.offset),
-        (block.group_means(f)[group], GOOD.form, span.form, own.form),
+        (block.group_means(f)[group], GOOD.form, never_poor(span.form, fixed), never_poor(own.form, fixed)),
     ):
         spans, groups = of_span[group], each[group]
         alike = of_block**2 + np.outer(spans, spans) * same_span + np.outer(groups, groups) * same_group
@@ -82,6 +88,7 @@ def dense(block, form, allowance):
 def some_form(cells, rng):
     return Form(
         signature=rng.normal(size=cells.group.size),
+        fixed=rng.random(cells.group.size),
         swinging=rng.random(cells.group.size),
         late=rng.normal(size=cells.group.size),
     )
@@ -133,9 +140,9 @@ def test_products_are_those_of_the_dense_covariance(cells, errors, has_form, sur
         assert log_det == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-9)
 
 
-def log_densities(cells, residuals):
+def log_densities(cells, residuals, form=None):
     """Of all ways to be wrong together, block by block, but for the factors of 2π: (blocks, ...)."""
-    found = []
+    found, form = [], form or no_form(cells)
     for block in cells.blocks:
         groups = block.span.size
         spans = block.span.max() + 1
@@ -156,7 +163,7 @@ def log_densities(cells, residuals):
                     (changing, CHANGING_WAYS),
                 )
             )
-            density = multivariate_normal(cov=dense(block, no_form(cells).chosen(block.rows), allowance))
+            density = multivariate_normal(cov=dense(block, form.chosen(block.rows), allowance))
             log = density.logpdf(residuals[..., block.rows]) + 0.5 * block.rows.size * np.log(2.0 * np.pi)
             logs.append(log + prior)
         found.append(logsumexp(logs, axis=0))
@@ -187,6 +194,20 @@ def test_the_evidence_of_none_is_nearly_that_of_all_ways_to_be_wrong(cells, poor
     residuals = 0.5 * np.sqrt(cells.variance) * np.random.default_rng(6).normal(size=cells.group.size)
     residuals += poor * cells.allowed * (cells.group == 1)
     assert evidence_of_none(cells, residuals).log == pytest.approx(log_densities(cells, residuals).sum(), abs=2.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_cells_whose_form_may_be_off_by_much_say_little_of_what_all_have_alike(cells, seed):
+    """Effects explain 30 times what is allowed in every second cycle; the others are off alike."""
+    rng = np.random.default_rng(seed)
+    cells = replace(cells, blocks=tuple(replace(block, variance=0.01 * block.allowed**2) for block in cells.blocks))
+    is_explained = np.concatenate([block.cycle for block in cells.blocks]) % 2 == 0
+    signature = np.where(is_explained, 30.0, 0.0) * cells.allowed
+    residuals = (0.1 * rng.normal(size=signature.size) + np.where(is_explained, 0.0, 1.5)) * cells.allowed
+    residuals += 0.175 * signature * rng.normal(size=signature.size)
+    form = replace(no_form(cells), signature=signature)
+    found = evidence(cells, residuals, np.zeros((signature.size, 0)), form)
+    assert found.log == pytest.approx(log_densities(cells, residuals, form).sum(), abs=1.0)
 
 
 def test_a_parameter_is_integrated_over_its_range(cells):
@@ -228,9 +249,7 @@ def test_an_offset_under_the_allowed_size_gains_little_and_one_over_it_does(cell
     noise = np.sqrt(cells.variance) * np.random.default_rng(8).normal(size=cells.group.size)
     for size, least, most in ((0.3, -np.inf, 1.0), (8.0, 10.0, np.inf)):
         offset = size * cells.allowed
-        with_effect = evidence(
-            cells, noise, offset[:, None], Form(signature=offset, swinging=0.0 * offset, late=0.0 * offset)
-        ).log
+        with_effect = evidence(cells, noise, offset[:, None], replace(no_form(cells), signature=offset)).log
         assert least < with_effect - evidence_of_none(cells, noise + offset).log < most, size
 
 
