@@ -1,12 +1,13 @@
 """Intervals of fitted parameters: noise of every kind, and what a model that is right may still be off."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.known import agreeing, known_of, narrowed
-from wetwell.sim2real.attribution.undetermined import elsewhere
 from wetwell.sim2real.likelihood.evidence import Evidence
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import REGIMES
@@ -22,6 +23,8 @@ HALF_SCAN_S = 0.5
 """Least half width of a time: a sample may stand for the begin or the end of its second."""
 FORM = (0.01, 0.03)
 """Least half width, as a share of the way from neutral, where a name fixes the equation, and where it does not."""
+HALVES = (1.0, 0.5, 0.25)
+"""Shares of the way to an end of its range at which a parameter is tried, while the recording speaks against it."""
 STRIDES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6, 0.8)
 """Steps to such ends, as shares of the way to neutral, or of as far on the other side."""
 
@@ -144,10 +147,49 @@ def _with_others(
     alone = np.diag(covariance) - covariance[parameter] ** 2 / variance
     spread = TWO_SIDED * np.sqrt(np.maximum(alone, 0.0))
     rise = TWO_SIDED**2 * variance / np.linalg.pinv(slopes.T @ slopes)[parameter, parameter]
-    points = elsewhere(fitter, fit, parameter, float(rise))
+    points = _elsewhere(fitter, fit, parameter, float(rise))
     low, high = ([ends[:, side], *(x + sign * spread for x in points)] for side, sign in ((0, -1.0), (1, 1.0)))
     ends = np.column_stack([np.min(low, axis=0), np.max(high, axis=0)])
     return np.asarray(np.clip(ends, 0.0, 1.0), dtype=np.float64)
+
+
+def _elsewhere(fitter: Fitter, fit: Fit, parameter: int, rise: float) -> list[Floats]:
+    """(parameters,) points of all, fitted again with one of them held near either end of its range.
+
+    Straight lines from the fit do not reach so far: an area at the floor goes with the exponent of the walls. A
+    recording speaks against a point by a rise of the sum of squares.
+    """
+    here, limit, found = float(fit.position[parameter]), fitter.cost(fit) + rise, []
+    for end in (0.0, 1.0):
+        for share in HALVES:
+            at = here + share * (end - here)
+            held = _held(fitter, fit, parameter, at)
+            if held is not None and fitter.cost(held) < limit:
+                found.append(np.insert(held.position, parameter, at))
+                break
+    return found
+
+
+def _held(fitter: Fitter, fit: Fit, parameter: int, at: float) -> Fit | None:
+    """The fit with one of its parameters held at a point, the others refined; None where that cannot work."""
+    candidates, points, first = [], [], 0
+    for candidate, point in zip(fit.candidates, fit.points, strict=True):
+        k = parameter - first
+        is_its = 0 <= k < point.size
+        candidates.append(_fixed(candidate, k, at) if is_its else candidate)
+        points.append(np.delete(point, k) if is_its else point)
+        first += point.size
+    begun = fitter.at(candidates, points)
+    return None if begun is None else fitter.refine(begun)
+
+
+def _fixed(candidate: Candidate, parameter: int, at: float) -> Candidate:
+    free = candidate.free[parameter]
+    return replace(
+        candidate,
+        fixed=(*candidate.fixed, (free.name, free.value(at))),
+        free=(*candidate.free[:parameter], *candidate.free[parameter + 1 :]),
+    )
 
 
 def _sums(values: Floats, group: Integers) -> Floats:
