@@ -201,7 +201,7 @@ def test_a_replayed_rig_without_head_and_frequency_gets_no_confident_fault(
         listener(port, "wetwell/rig/status/detector") as statuses,
     ):
         next(statuses)  # the detector is there
-        with wetwell("replay", "--recording", str(recording), "--speed", "2000", *common) as replay:
+        with wetwell("replay", "--recording", str(recording), "--speed", "500", *common) as replay:
             rows = len(recording.read_text().splitlines()) - 1
             _figures(statuses, "detector", least_samples=0.9 * rows)
             assert replay.wait(timeout=60) == 0
