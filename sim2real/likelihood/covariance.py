@@ -148,10 +148,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     changing = 0.5 * (
         (own.offset * block.allowed) ** 2 + block.surge * block.of_inflow + (allowance.swing * form.swinging) ** 2
     )
-    variance, in_cycle = (
-        block.variance + changing + (of_form(own.form, form.fixed) * form.signature) ** 2,
-        np.sqrt(changing),
-    )
+    variance = block.variance + changing + (of_form(own.form, form.fixed) * form.signature) ** 2
     span, each = allowance.span, allowance.own
     parts: list[tuple[Floats, float, float | Floats, float | Floats]] = [
         (block.allowed, OFFSET, span.offset, each.offset)
@@ -173,7 +170,7 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     log_det += eliminated(
         np.ascontiguousarray(columns),
         1.0 / variance,
-        in_cycle,
+        np.sqrt(changing),
         np.array([load for load, *_ in parts]),
         block.group,
         block.cycle,
