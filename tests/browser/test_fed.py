@@ -156,6 +156,14 @@ def fed(tmp_path_factory):
         for alarm in alarms():
             bus.publisher(alarm_key(alarm.station, alarm.id)).put(alarm.encode())
         bus.publisher(gap_key(f"s-{WATCHED:04}")).put(watched_gap().encode())
+
+        def all_is_told():
+            shown = httpx.get(f"{place.url}/api/stations", timeout=10).json()["stations"].values()
+            told = {station["name"]: station for station in shown}
+            is_judged = len(told) == STATIONS and all(station["state"] != "unknown" for station in shown)
+            return is_judged and told[f"s-{CALLS:04}"]["alarms"] == len(alarms()) and told[f"s-{WATCHED:04}"]["gap"]
+
+        until(all_is_told)
         place.tell = lambda number, time_ns: samples[number].put(sample(number, time_ns).encode())
         yield place
 
