@@ -1,5 +1,6 @@
 """Intervals of fitted parameters: noise of every kind, and what a model that is right may still be off."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -115,10 +116,11 @@ def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
 
 
 def are_sized(fit: Fit, ends: Floats) -> bool:
-    """Whether the recording says how large each effect of a fit is.
+    """Whether the recording says how large each effect of a fit is, and that it is none that has another name.
 
     The interval of an only strength must not hold neutral, as that of all its range does. Those of several may: one
-    may act alone, and wear by head takes the place of wear by leak.
+    may act alone, and wear by head takes the place of wear by leak. No interval may hold an end of a range at which
+    the effect is another one: a pocket of air that no flow carries away is a lift.
 
     Parameters
     ----------
@@ -126,16 +128,25 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
     ends : (parameters, 2) array
         As `intervals_of` makes them.
     """
-    parts = zip(fit.candidates, fit.split(ends), strict=False)  # of no candidates it is one empty part
-    return all(_may_be_neutral(candidate, its) != [True] for candidate, its in parts)
+    parts = list(zip(fit.candidates, fit.split(ends), strict=False))  # of no candidates it is one empty part
+    return all(
+        _may_be_neutral(candidate, its) != [True]
+        and not any(_hold(candidate, its, EFFECTS[candidate.name].another_at))
+        for candidate, its in parts
+    )
 
 
 def _may_be_neutral(candidate: Candidate, ends: Floats) -> list[bool]:
     """Of each strength."""
+    return _hold(candidate, ends, {free.name: free.neutral for free in candidate.free})
+
+
+def _hold(candidate: Candidate, ends: Floats, values: Mapping[str, float | None]) -> list[bool]:
+    """Of each parameter for which there is a value, whether its interval holds that."""
     return [
-        bool(low <= free.normalised(free.neutral) <= high)
+        bool(low <= free.normalised(value) <= high)
         for free, (low, high) in zip(candidate.free, ends, strict=True)
-        if free.neutral is not None
+        if (value := values.get(free.name)) is not None
     ]
 
 

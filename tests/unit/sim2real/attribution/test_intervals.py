@@ -35,6 +35,17 @@ def test_of_several_strengths_one_may_be_neutral_and_what_is_no_strength_may_be_
     assert not are_sized(fit, np.array([*wear, [0.0, 0.3], *leak[1:]]))
 
 
+@pytest.mark.parametrize(("name", "parameter"), [("ragging", "growth_s"), ("air_pocket", "purge_s")])
+def test_what_may_be_another_effect_by_its_form_is_not_told(name, parameter):
+    """Rags that are there at once are wear; a pocket of air that no flow carries away is a lift."""
+    fit = fit_of(name)
+    (number,) = (k for k, free in enumerate(fit.candidates[0].free) if free.name == parameter)
+    ends = np.array([[0.2, 0.3] for _ in fit.candidates[0].free])
+    assert are_sized(fit, ends)
+    ends[number] = [0.0, 1.0]
+    assert not are_sized(fit, ends)
+
+
 def likelihood(size, precision):
     return SimpleNamespace(step=np.zeros(size), precision=precision * np.eye(size))
 
