@@ -110,7 +110,8 @@ def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
             (k,) = np.flatnonzero([free.neutral is not None for free in candidate.free])
             neutral = candidate.free[k].neutral or 0.0
             side = int(fit.position[first + k] < candidate.free[k].normalised(neutral))
-            sharp[first + k, side] = likely[first + k, side]
+            nearest = min if side == 0 else max  # what the fit tells is in its own interval
+            sharp[first + k, side] = nearest(likely[first + k, side], fit.position[first + k])
         first = place.stop
     return sharp
 

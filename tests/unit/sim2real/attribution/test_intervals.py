@@ -46,8 +46,8 @@ def test_what_may_be_another_effect_by_its_form_is_not_told(name, parameter):
     assert not are_sized(fit, ends)
 
 
-def likelihood(size, precision):
-    return SimpleNamespace(step=np.zeros(size), precision=precision * np.eye(size))
+def likelihood(size, precision, step=0.0):
+    return SimpleNamespace(step=np.full(size, step), precision=precision * np.eye(size))
 
 
 @pytest.mark.parametrize(
@@ -60,6 +60,13 @@ def test_an_end_at_neutral_is_as_near_as_the_likelihood_lets_it_be(precision, lo
     sharp = sharpened(fit, ends, likelihood(len(ends), precision))
     assert sharp[0] == pytest.approx([low, 0.9])
     assert are_sized(fit, sharp) is is_sized
+
+
+def test_an_interval_holds_what_is_told_though_the_likelihood_has_it_larger():
+    """A lag of 1 s beside a delay was told with an interval from 3.6 to 3.5 s."""
+    fit = fit_of("check_valve_leak")
+    ends = np.array([[0.0, 0.52] if free.neutral is not None else [0.0, 1.0] for free in fit.candidates[0].free])
+    assert sharpened(fit, ends, likelihood(len(ends), 1e6, step=0.1))[0] == pytest.approx([0.5, 0.52])
 
 
 def test_what_the_fit_knows_stays_as_it_is():
