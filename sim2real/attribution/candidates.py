@@ -96,7 +96,8 @@ class Candidate:
     def start_grids(self, guess: Mapping[str, float], strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
         """Points to begin at: the guess, and grids of rising strength, each strength on both sides of neutral.
 
-        A strength that is neutral by the guess has no grid.
+        The other strengths are neutral in a grid, as its scale is that of one. One that is neutral by the guess has
+        no grid.
         """
         base = np.array(
             [free.normalised(min(max(guess.get(free.name, free.start), free.low), free.high)) for free in self.free]
@@ -104,13 +105,19 @@ class Candidate:
         if not any(free.neutral is not None for free in self.free):
             return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
         grids = [[base]] if any(free.name in guess for free in self.free) else []
+        still = np.array(
+            [
+                one if free.neutral is None else free.normalised(free.neutral)
+                for free, one in zip(self.free, base, strict=True)
+            ]
+        )
         for k, free in enumerate(self.free):
             if free.neutral is None or guess.get(free.name) == free.neutral:
                 continue
             neutral = free.normalised(free.neutral)
             for end in (0.0, 1.0):
                 if abs(end - neutral) > 1e-9:
-                    grid = [base.copy() for _ in strengths]
+                    grid = [still.copy() for _ in strengths]
                     for point, strength in zip(grid, strengths, strict=True):
                         point[k] = neutral + strength * (end - neutral)
                     grids.append(grid)

@@ -18,3 +18,13 @@ def test_the_mains_of_a_station_are_tried_together_and_one_by_one():
     fixed = [candidate.fixed for candidate in candidates_of(4, 2, only=["friction_bias"])]
     assert fixed == [(("main", 0),), (("main", 1),), (("main", 2),)]
     assert [candidate.fixed for candidate in candidates_of(4, 1, only=["friction_bias"])] == [()]
+
+
+def test_in_the_grid_of_a_strength_the_others_are_neutral():
+    """A guess of fast swings that is wrong would hide how well a daily one does, however strong."""
+    (supply,) = candidates_of(1, 1, only=["supply_voltage_variation"])
+    daily, fast = ([free.name for free in supply.free].index(name) for name in ("daily_amplitude", "fast_amplitude"))
+    (guess,), *grids = supply.start_grids({"fast_amplitude": 0.002, "fast_period_s": 400.0})
+    assert guess[fast] > 0.0
+    assert all(point[fast] == 0.0 for grid in grids for point in grid if point[daily] > 0.0)
+    assert any(point[daily] > 0.0 for grid in grids for point in grid)
