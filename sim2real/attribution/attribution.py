@@ -105,9 +105,10 @@ def attribute(
     plain = fitter.plain.residuals
     tested, not_tested = shown_by(candidates, fitter, replay, regimes, each)
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
-    trials = Trials(fitter, guesses, progress, each)
+    cells = weighed_cells(replay, residuals, residuals_of(plain))
+    trials = Trials(fitter, cells, guesses, progress, each)
     singles = trials.singles()
-    hypotheses = Hypotheses(fitter, weighed_cells(replay, residuals, residuals_of(plain)), each)
+    hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses)

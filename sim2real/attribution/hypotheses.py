@@ -15,10 +15,11 @@ from wetwell.sim2real.attribution.presence import (
     time_constant_s,
     unshifted,
 )
+from wetwell.sim2real.attribution.promise import Beside
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import GOOD, LATE, POOR_FORM, Form, no_form
-from wetwell.sim2real.likelihood.evidence import Evidence, Member, evidence, evidence_of_none
+from wetwell.sim2real.likelihood.evidence import Evidence, Member, evidence, evidence_of_none, weights_of
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
@@ -63,6 +64,21 @@ class Hypothesis:
     def is_possible(self) -> bool:
         """Whether it may be the answer: each of its effects is there and matters."""
         return self.is_there and self.told == self.effects
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Shown:
+    """Cells of a fit: what is left, its slopes, what each effect explains and what it does late, and their form.
+
+    `may_each_lack` says that the station can be without each of them.
+    """
+
+    residuals: Floats
+    slopes: Floats
+    signatures: Sequence[Floats]
+    late: Sequence[Floats]
+    form: Form
+    may_each_lack: bool
 
 
 class Hypotheses:
@@ -142,13 +158,26 @@ class Hypotheses:
             for one in weighed
         ]
 
+    def beside(self, fits: Sequence[Fit]) -> list[Beside]:
+        """Fits as what further effects come beside."""
+        return list(self._each(self._beside, fits))
+
+    def _beside(self, fit: Fit) -> Beside:
+        shown = self._shown(fit)
+        return Beside(
+            weights=weights_of(evidence(self._cells, shown.residuals, shown.slopes, shown.form), shown.form),
+            residuals=shown.residuals,
+            slopes=shown.slopes,
+            position=fit.position,
+        )
+
     def _flexible(self, one: Hypothesis) -> float:
         return flexible_factor(one.evidence, one.form)
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))
 
-    def _weighed(self, fit: Fit) -> Hypothesis:
+    def _shown(self, fit: Fit) -> _Shown:
         cells, residuals = self._cells, self._means(fit)
         fewer = [self._fitter.without(fit, member) for member in range(len(fit.names))]
         signatures = [np.zeros(residuals.size) if one is None else self._means(one) - residuals for one in fewer]
@@ -157,27 +186,36 @@ class Hypotheses:
             for member, one in enumerate(fewer)
         ]
         slopes = self._fitter.slopes(fit)
+        return _Shown(
+            residuals=residuals,
+            slopes=np.array([cells.means(column) for column in slopes.T]).reshape(-1, residuals.size).T,
+            signatures=signatures,
+            late=late,
+            form=self._form(fit, signatures, self._plain - residuals, late),
+            may_each_lack=None not in fewer,
+        )
+
+    def _weighed(self, fit: Fit) -> Hypothesis:
+        shown = self._shown(fit)
         of_member = np.repeat(np.arange(len(fit.points)), [point.size for point in fit.points])
-        form = self._form(fit, signatures, self._plain - residuals, late)
-        slopes = np.array([cells.means(column) for column in slopes.T]).T
         members = [
             Member(parameters=np.flatnonzero(of_member == k), neutral=neutral, absent=signature)
-            for k, (neutral, signature) in enumerate(zip(strengths_of(fit), signatures, strict=True))
+            for k, (neutral, signature) in enumerate(zip(strengths_of(fit), shown.signatures, strict=True))
         ]
-        found = evidence(cells, residuals, slopes, form, members)
+        found = evidence(self._cells, shown.residuals, shown.slopes, shown.form, members)
         told = [
             member
-            for member, (signature, its) in enumerate(zip(signatures, late, strict=True))
+            for member, (signature, late) in enumerate(zip(shown.signatures, shown.late, strict=True))
             if not is_only_late(fit, member, self._fitter.station.materiality.time_s)
-            and self._matters(signature, form, form.late - its)
+            and self._matters(signature, shown.form, shown.form.late - late)
         ]
         return Hypothesis(
             fit=fit,
             evidence=found,
-            form=form,
-            is_there=None not in fewer
+            form=shown.form,
+            is_there=shown.may_each_lack
             and are_there(found, [len(one.neutral) for one in members])
-            and self._are_apart(fit.position, of_member, told, signatures, slopes),
+            and self._are_apart(fit.position, of_member, told, shown.signatures, shown.slopes),
             told=tuple(sorted(fit.names[member] for member in told)),
         )
 

@@ -1,16 +1,22 @@
 """What a further effect promises beside others, as if what each does alone were added: no replay is needed."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import cholesky
 from scipy.optimize import lsq_linear
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.residuals.asinh_loss import asinh_loss, residuals_of, weights_of
+from wetwell.sim2real.likelihood.evidence import Weights
 
 MOST_SCALED = 2.0
 """Times what an effect did alone that it may do beside others: the starts of a grid are further apart. [1]"""
+MOST_COLUMNS = 24
+"""That are weighed together: the products of what candidates do with each other are of no use."""
+ROUNDED = 1e-9
+"""Share of its square by which a column of products is rounded at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,8 +27,8 @@ class Alone:
     ----------
     candidate : Candidate
     points : tuple of (parameters,) array
-    changes : (points, fitted bins) array
-        Of the residuals themselves, in units of noise.
+    changes : (points, cells) array
+        Of the residuals.
     """
 
     candidate: Candidate
@@ -32,60 +38,89 @@ class Alone:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Promise:
-    """A point at which a candidate may do well beside others, and the sum of squares that would be left."""
+    """A point at which a candidate may do well beside others, and the drop of the weighed squares."""
 
     candidate: Candidate
     point: Floats
-    cost: float
+    gain: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Beside:
     """What further effects come beside.
 
     Attributes
     ----------
-    losses : (fitted bins,) array
-        As `asinh_loss` makes them.
-    slopes : (fitted bins, parameters) array
+    weights : Weights
+    residuals : (cells,) array
+    slopes : (cells, parameters) array
         Change of the residuals with each parameter of the others, over its range; no columns where the others stay.
     position : (parameters,) array
         Of the others.
     """
 
-    losses: Floats
+    weights: Weights
+    residuals: Floats
     slopes: Floats
     position: Floats
 
-    def promise(self, alone: Alone) -> Promise:
-        r"""What is left by the best of a candidate's points, its strength and the others' parameters fitted again.
+    @property
+    def still(self) -> "Beside":
+        """The same, with the others as they stand."""
+        return replace(self, slopes=self.slopes[:, :0], position=self.position[:0])
 
-        $$\min_{\alpha, \beta} \sum_i w_i (r_i + \alpha d_i + S_i \beta)^2, \qquad
-        w = \frac{\ell(r)\,\ell'(r)}{r}, \qquad 0 \le \alpha \le 2$$
+    def promises(self, alones: Sequence[Alone]) -> list[list[Promise]]:
+        r"""Of each candidate what it makes likelier, its strength and the others' parameters fitted again.
 
-        with r the residuals, d what the candidate changes alone, S the slopes of the others, and ℓ the loss. The
-        others stay within their ranges.
+        $$\max_{\alpha, \beta} r^T C^{-1} r - (r + \alpha d + S \beta)^T C^{-1} (r + \alpha d + S \beta),
+        \qquad 0 \le \alpha \le 2$$
+
+        with r the residuals, d what the candidate changes alone, S the slopes of the others, and the covariance C of
+        the cells by what the others leave: what is explained by an error of their form promises little. The others
+        stay within their ranges. Of points that differ in strength alone there is the best one, the best form first.
         """
-        residuals = residuals_of(self.losses)
-        root = np.sqrt(weights_of(residuals))
-        basis, triangle = np.linalg.qr(root[:, None] * self.slopes)
-        left = root * residuals
-        changed = root * alone.changes
+        found: list[list[Promise]] = []
+        few: list[Alone] = []
+        for one in alones:
+            if few and sum(len(each.points) for each in few) + len(one.points) > MOST_COLUMNS:
+                found += self._of_few(few)
+                few = []
+            few.append(one)
+        return found + (self._of_few(few) if few else [])
+
+    def _of_few(self, alones: Sequence[Alone]) -> list[list[Promise]]:
+        columns = np.column_stack([self.residuals, self.slopes, *(one.changes.T for one in alones)])
+        inner = self.weights.products(columns)
+        root = cholesky(inner + np.diag(ROUNDED * np.diag(inner) + np.finfo(float).tiny))
+        count = self.slopes.shape[1]
+        left, slopes, changed = root[:, 0], root[:, 1 : 1 + count], root[:, 1 + count :].T
+        basis, triangle = np.linalg.qr(slopes)
+        ends = np.cumsum([len(one.points) for one in alones])[:-1]
+        return [
+            self._of(one, its, left, basis, triangle)
+            for one, its in zip(alones, np.split(changed, ends), strict=True)
+        ]
+
+    def _of(self, alone: Alone, changed: Floats, left: Floats, basis: Floats, triangle: Floats) -> list[Promise]:
+        """Promises of one candidate, by columns that were made independent."""
         along_others = changed @ basis
         apart = changed - along_others @ basis.T
         along, squares = apart @ left, np.maximum(np.sum(apart**2, axis=1), np.finfo(float).tiny)
-        has_strength = any(free.neutral is not None for free in alone.candidate.free)
-        scale = np.clip(-along / squares, 0.0, MOST_SCALED) if has_strength else np.ones(along.size)
-        best = int(np.argmin(scale * (2.0 * along + scale * squares)))
-        strength = float(scale[best])
-        wanted = basis.T @ left + strength * along_others[best]
-        moved = _bounded(triangle, wanted, -self.position, 1.0 - self.position)
-        after = residuals + strength * alone.changes[best] + self.slopes @ moved
-        return Promise(
-            candidate=alone.candidate,
-            point=_scaled(alone.candidate, alone.points[best], strength),
-            cost=float(np.sum(asinh_loss(after) ** 2)),
-        )
+        is_strength = np.array([free.neutral is not None for free in alone.candidate.free], dtype=bool)
+        scale = np.clip(-along / squares, 0.0, MOST_SCALED) if is_strength.any() else np.ones(along.size)
+        best: dict[bytes, int] = {}
+        for place in np.argsort(scale * (2.0 * along + scale * squares)).tolist():
+            best.setdefault(alone.points[place][~is_strength].tobytes(), place)
+        found = []
+        for place in best.values():
+            strength = float(scale[place])
+            wanted = basis.T @ left + strength * along_others[place]
+            moved = _bounded(triangle, wanted, -self.position, 1.0 - self.position)
+            after = left + strength * changed[place] + basis @ (triangle @ moved)
+            point = _scaled(alone.candidate, alone.points[place], strength)
+            gain = float(left @ left - after @ after)
+            found.append(Promise(candidate=alone.candidate, point=point, gain=gain))
+        return sorted(found, key=lambda one: -one.gain)
 
 
 def _bounded(triangle: Floats, wanted: Floats, low: Floats, high: Floats) -> Floats:

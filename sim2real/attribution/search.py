@@ -40,7 +40,7 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
         if not bases:
             return
         tried |= {frozenset(base.names) for base in bases}
-        hypotheses.add(trials.with_one_more(bases))
+        hypotheses.add(trials.with_one_more(bases, hypotheses.beside(bases)))
 
 
 def in_order(fitter: Fitter, fit: Fit, ends: Floats) -> tuple[Fit, Floats]:

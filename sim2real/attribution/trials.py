@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.promise import Alone, Beside, Promise
+from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
@@ -17,9 +19,11 @@ Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 MOST_TRIED = 8
 """Further effects that are tried, the most promising first."""
+MOST_STARTS = 3
+"""Starts of each that are replayed: what it does is not linear in how fast it grows, or where its edge is."""
 MOST_REFINED = 4
 LEAST_PROMISED = 10.0
-"""Drop of the sum of squares under which a further effect is not tried: it could not pay for its place."""
+"""Drop of the weighed squares under which a further effect is not tried: it could not pay for its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -30,6 +34,8 @@ class Trials:
     Parameters
     ----------
     fitter : Fitter
+    cells : Cells
+        Of the residuals that it fits.
     guesses : mapping of Candidate to list of dict
         Where the search for each begins.
     progress : callable
@@ -41,11 +47,13 @@ class Trials:
     def __init__(
         self,
         fitter: Fitter,
+        cells: Cells,
         guesses: Mapping[Candidate, Sequence[Mapping[str, float]]],
         progress: Callable[[float], None],
         each: Each,
     ) -> None:
         self._fitter = fitter
+        self._cells = cells
         self._guesses = guesses
         self._progress = progress
         self._each = each
@@ -53,14 +61,14 @@ class Trials:
     @cached_property
     def _alone(self) -> dict[Candidate, tuple[Alone, Fit]]:
         """Of each candidate what it does alone, and its best fit without refinement."""
-        found, plain = {}, self._rows_of(self._fitter.plain)
+        found, plain = {}, self._means(self._fitter.plain)
         tried = self._each(self._tried, self._guesses)
         for k, (candidate, fits) in enumerate(zip(self._guesses, tried, strict=True)):
             if fits:
                 alone = Alone(
                     candidate=candidate,
                     points=tuple(fit.points[0] for fit in fits),
-                    changes=np.array([self._rows_of(fit) - plain for fit in fits]),
+                    changes=np.array([self._means(fit) - plain for fit in fits]),
                 )
                 found[candidate] = alone, min(fits, key=self._fitter.cost)
             self._progress(0.3 * (k + 1) / len(self._guesses))
@@ -69,9 +77,9 @@ class Trials:
     def _tried(self, candidate: Candidate) -> list[Fit]:
         return self._fitter.along(candidate, self._start_grids(candidate))
 
-    def _rows_of(self, fit: Fit) -> Floats:
-        """(fitted bins,) residuals themselves."""
-        return residuals_of(fit.residuals[self._fitter.rows])
+    def _means(self, fit: Fit) -> Floats:
+        """(cells,) residuals themselves."""
+        return self._cells.means(residuals_of(fit.residuals))
 
     def singles(self) -> list[Fit]:
         """Single effects, each with the pump or channel that fits best; the best effect first."""
@@ -91,55 +99,64 @@ class Trials:
             self._progress(0.3 + 0.4 * (k + 1) / len(firsts))
         return sorted(best.values(), key=fitter.cost)
 
-    def with_one_more(self, bases: Sequence[Fit]) -> list[Fit]:
-        """Each of some fits with one more effect, the most promising ones, each as the pump or channel it fits."""
-        besides = list(self._each(self._beside, bases))
-        promises = self._each(lambda pair: self._promising(*pair), zip(bases, besides, strict=True))
+    def with_one_more(self, bases: Sequence[Fit], besides: Sequence[Beside]) -> list[Fit]:
+        """Each of some fits with one more effect, the most promising ones, each as the pump or channel it fits.
+
+        Parameters
+        ----------
+        bases : sequence of Fit
+        besides : sequence of Beside
+            The same, as what the others come beside.
+        """
+        pairs = list(zip(bases, besides, strict=True))
+        promises = self._each(lambda pair: self._promising(*pair), pairs)
         likely = [(base, one) for base, its in zip(bases, promises, strict=True) for one in its]
         tried = list(self._each(lambda pair: self._at(*pair), likely))
         firsts = []
-        for base, beside in zip(bases, besides, strict=True):
+        for base, beside in pairs:
             own = [fit for (its, _), fit in zip(likely, tried, strict=True) if its is base and fit is not None]
-            own.sort(key=lambda fit: beside.promise(self._doing(base, fit)).cost)
-            firsts += [(base, fit) for fit in own[:MOST_REFINED]]
-        firsts.sort(key=lambda pair: -pair[1].position.size)  # the longest first, so that all cores end together
-        return list(self._each(lambda pair: self._refined(*pair), firsts))
+            promised = beside.promises([self._doing(base, fit) for fit in own])
+            best: dict[str, tuple[Fit, Promise]] = {}
+            for k in sorted(range(len(own)), key=lambda k: -promised[k][0].gain):
+                best.setdefault(own[k].candidates[-1].name, (own[k], promised[k][0]))
+            firsts += [(base, beside, *one) for one in list(best.values())[:MOST_REFINED]]
+        firsts.sort(key=lambda one: -one[2].position.size)  # the longest first, so that all cores end together
+        return list(self._each(lambda one: self._refined(*one), firsts))
 
     def _doing(self, base: Fit, fit: Fit) -> Alone:
         """What the last effect of a fit does beside the others, as it was replayed."""
-        change = self._rows_of(fit) - self._rows_of(base)
-        return Alone(candidate=fit.candidates[-1], points=fit.points[-1:], changes=change[None, :])
-
-    def _beside(self, base: Fit) -> Beside:
-        rows = self._fitter.rows
-        return Beside(losses=base.residuals[rows], slopes=self._fitter.slopes(base)[rows], position=base.position)
+        return Alone(
+            candidate=fit.candidates[-1], points=fit.points[-1:], changes=(self._means(fit) - self._means(base))[None]
+        )
 
     def _promising(self, base: Fit, beside: Beside) -> list[Promise]:
-        """Promises of the effects that may come beside a fit, the best first: each by its best pump or channel."""
+        """Starts of the effects that may come beside a fit, the most promising effects first."""
         free = [alone for candidate, (alone, _) in self._alone.items() if candidate.name not in base.names]
-        best: dict[str, Promise] = {}
-        for one in map(beside.promise, free):
-            if one.candidate.name not in best or one.cost < best[one.candidate.name].cost:
-                best[one.candidate.name] = one
-        most = self._fitter.cost(base) - LEAST_PROMISED
-        return [one for one in sorted(best.values(), key=lambda one: one.cost)[:MOST_TRIED] if one.cost < most]
+        of_name: dict[str, list[Promise]] = {}
+        for one in chain.from_iterable(beside.promises(free)):
+            if one.gain > LEAST_PROMISED:
+                of_name.setdefault(one.candidate.name, []).append(one)
+        starts = [sorted(its, key=lambda one: -one.gain)[:MOST_STARTS] for its in of_name.values()]
+        starts.sort(key=lambda its: -its[0].gain)
+        return list(chain.from_iterable(starts[:MOST_TRIED]))
 
     def _at(self, current: Fit, promise: Promise) -> Fit | None:
         return self._fitter.at((*current.candidates, promise.candidate), (*current.points, promise.point))
 
-    def _refined(self, current: Fit, fit: Fit) -> Fit:
+    def _refined(self, current: Fit, beside: Beside, fit: Fit, promise: Promise) -> Fit:
         """A fit with one more effect, refined: where it ends worse than without that, from another start.
 
+        What it does as it was replayed says how strong it should be: a limit does little more until it is passed.
         The first start counts on what the others can reach, as if all were linear: a limit may promise much where a
         header would have to take back all that it explains. The other one is the best with the others as they stand.
         """
         fitter = self._fitter
-        refined = fitter.refine(fit)
+        nearer = self._at(current, promise)
+        refined = fitter.refine(fit if nearer is None else min(fit, nearer, key=fitter.cost))
         if fitter.cost(refined) <= fitter.cost(current):
             return refined
-        losses = current.residuals[fitter.rows]
-        stays = Beside(losses=losses, slopes=np.zeros((losses.size, 0)), position=np.zeros(0))
-        again = self._at(current, stays.promise(self._alone[fit.candidates[-1]][0]))
+        ((stays, *_),) = beside.still.promises([self._alone[fit.candidates[-1]][0]])
+        again = self._at(current, stays)
         found = [refined] if again is None else [refined, fitter.refine(again)]
         return min(found, key=fitter.cost)
 

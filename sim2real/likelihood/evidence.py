@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
-from wetwell.sim2real.likelihood.covariance import SWINGS, Form, no_form, projected
+from wetwell.sim2real.likelihood.covariance import SWINGS, Allowance, Form, no_form, projected
 from wetwell.sim2real.likelihood.jumps import jumping
 from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
 from wetwell.sim2real.likelihood.ways import RIGHT, Ways, likeliest
@@ -197,6 +197,27 @@ def _least(inner: Floats, first: Floats, free: Sequence[int]) -> float:
     return float(first @ inner @ first + 2.0 * slope @ step + step @ precision @ step)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """How cells count beside some effects: blocks, form of the effects, and what is likeliest to be wrong in each."""
+
+    blocks: tuple[tuple[Block, Form, Allowance], ...]
+
+    def products(self, columns: Floats) -> Floats:
+        """(n, n) products of (cells, n) columns."""
+        parts = [projected(block, columns[block.rows], form, its)[0] for block, form, its in self.blocks]
+        return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
+
+
+def weights_of(found: Evidence, form: Form) -> Weights:
+    """How cells count beside the effects of an evidence, of which the form is given."""
+    blocks = []
+    for one in found.stirred:
+        left, its = found.residuals[one.block.rows], form.chosen(one.block.rows)
+        blocks.append((one.block, its, _under(one.block, left[:, None], left, its, one.swing, RIGHT)[2]))
+    return Weights(blocks=tuple(blocks))
+
+
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     """Evidence without any effect."""
     return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
@@ -250,11 +271,19 @@ def under(
     swing : float
         Of `SWINGS`.
     """
+    log, products, _ = _under(block, columns, residuals, form, swing, ways)
+    return log, products
+
+
+def _under(
+    block: Block, columns: Floats, residuals: Floats, form: Form, swing: float, ways: Ways
+) -> tuple[float, Floats, Allowance]:
+    """The same with what these ways allow."""
     found = []
     for log_prior, allowance in likeliest(block, residuals, form, swing, ways):
         products, log_det = projected(block, columns, form, allowance)
-        found.append((log_prior - 0.5 * log_det, products))
-    return max(found, key=lambda pair: pair[0] - 0.5 * float(pair[1][0, 0]))
+        found.append((log_prior - 0.5 * log_det, products, allowance))
+    return max(found, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
 
 
 def _rained_on(block: Block, residuals: Floats) -> Stirred:

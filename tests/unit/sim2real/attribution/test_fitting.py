@@ -8,7 +8,7 @@ import pytest
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fitter
-from wetwell.sim2real.attribution.promise import Alone, Beside
+from wetwell.sim2real.attribution.promise import MOST_COLUMNS, Alone, Beside
 from wetwell.sim2real.recording.regimes import STEADY, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -59,36 +59,73 @@ def alone(fitter, candidate):
     )
 
 
+class White:
+    """All bins count alike, each by itself."""
+
+    def products(self, columns):
+        return columns.T @ columns
+
+
+def squares(fit):
+    return float(np.sum(residuals_of(fit.residuals) ** 2))
+
+
 def beside(fitter, fit):
-    return Beside(losses=fit.residuals, slopes=fitter.slopes(fit), position=fit.position)
+    return Beside(
+        weights=White(), residuals=residuals_of(fit.residuals), slopes=fitter.slopes(fit), position=fit.position
+    )
+
+
+def best(its):
+    """The best promise of the only candidate."""
+    ((first, *_),) = its
+    return first
 
 
 def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
-    promise = beside(fitter, lag).promise(alone(fitter, candidate(alpha, "water_inertia")))
+    promise = best(beside(fitter, lag).promises([alone(fitter, candidate(alpha, "water_inertia"))]))
     start = fitter.at((*lag.candidates, promise.candidate), (*lag.points, promise.point))
     assert fitter.cost(start) > fitter.cost(lag), "beside the lag as it stands nothing is gained"
-    assert promise.cost < 0.9 * fitter.cost(lag)
+    assert promise.gain > 0.1 * squares(lag)
     both = fitter.refine(start)
-    assert fitter.cost(both) < promise.cost, "the inertia shortens the lag, which a sum does not know"
+    assert squares(lag) - squares(both) > promise.gain, "the inertia shortens the lag, which a sum does not know"
     found = {effect.name: effect.model_dump() for effect in both.effects}
     assert found["flow_meter_lag"]["lag_s"] == pytest.approx(4.0, abs=0.2)
     assert found["water_inertia"]["inertia_s2_m2"] == pytest.approx(400.0, rel=0.2)
 
 
+def test_each_form_of_an_effect_has_a_promise_of_its_own(fitter, lag, alpha):
+    """What a wave does there and back is not linear in its time: each start of it is replayed."""
+    inertia = candidate(alpha, "water_inertia")
+    grids = [grid for wave_s in (0.0, 3.0) for grid in inertia.start_grids({"wave_s": wave_s})]
+    plain = residuals_of(fitter.plain.residuals)
+    fits = fitter.along(inertia, grids)
+    one = Alone(
+        candidate=inertia,
+        points=tuple(fit.points[0] for fit in fits),
+        changes=np.array([residuals_of(fit.residuals) - plain for fit in fits]),
+    )
+    (promises,) = beside(fitter, lag).promises([one])
+    names = [free.name for free in inertia.free]
+    waves = [inertia.free[names.index("wave_s")].value(float(its.point[names.index("wave_s")])) for its in promises]
+    assert sorted(waves) == pytest.approx([0.0, 3.0])
+    assert promises[0].gain >= promises[1].gain
+
+
 def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
-    """Small residuals, a known change and known slopes: strength and the other's move are those of lstsq."""
+    """A known change and known slopes: strength and the other's move are those of lstsq."""
     rng = np.random.default_rng(7)
     slopes, change = rng.normal(size=(500, 1)), rng.normal(size=500)
     change += 0.2 * slopes[:, 0]
-    wanted = 1e-3 * (rng.normal(size=500) - 1.4 * change)
+    wanted = rng.normal(size=500) - 1.4 * change
     wanted -= slopes[:, 0] * (slopes[:, 0] @ wanted) / (slopes[:, 0] @ slopes[:, 0])
     (lift,) = candidates_of(len(alpha.pump), 1, only=["static_head_bias"])
     point = np.array([lift.free[0].normalised(1.0)])
-    one = Alone(candidate=lift, points=(point,), changes=1e-3 * change[None, :])
-    promise = Beside(losses=wanted, slopes=1e-3 * slopes, position=np.array([0.5])).promise(one)
-    (scale, _), left, _, _ = np.linalg.lstsq(1e-3 * np.column_stack([change, slopes]), -wanted, rcond=None)
+    one = Alone(candidate=lift, points=(point,), changes=change[None, :])
+    promise = best(Beside(weights=White(), residuals=wanted, slopes=slopes, position=np.array([0.5])).promises([one]))
+    (scale, _), left, _, _ = np.linalg.lstsq(np.column_stack([change, slopes]), -wanted, rcond=None)
     assert lift.free[0].value(promise.point[0]) == pytest.approx(scale, rel=1e-4)
-    assert promise.cost == pytest.approx(float(left[0]), rel=1e-4)
+    assert promise.gain == pytest.approx(float(wanted @ wanted - left[0]), rel=1e-4)
 
 
 def test_others_that_do_nearly_the_same_stay_within_their_ranges_together(alpha):
@@ -101,8 +138,18 @@ def test_others_that_do_nearly_the_same_stay_within_their_ranges_together(alpha)
     fitter = fitter_of(alpha, truth)
     (grows,) = candidates_of(len(alpha.pump), 1, only=["level_dependent_static_head"])
     growing = fitter.refine(fitter.at([grows], [np.array([0.33, 0.0])]))
-    promise = beside(fitter, growing).promise(alone(fitter, candidate(alpha, "control_delay")))
-    assert promise.cost < fitter.cost(growing)
+    promise = best(beside(fitter, growing).promises([alone(fitter, candidate(alpha, "control_delay"))]))
+    assert promise.gain > 0.0
+
+
+def test_candidates_are_weighed_few_at_a_time_as_they_would_be_alone(fitter, lag, alpha):
+    names = ("water_inertia", "static_head_bias", "flow_meter_gain", "friction_bias", "head_sensor_offset")
+    alones = [alone(fitter, candidate(alpha, name)) for name in names] * 2
+    assert sum(len(one.points) for one in alones) > MOST_COLUMNS
+    its = beside(fitter, lag)
+    for together, one in zip(its.promises(alones), alones, strict=True):
+        assert together[0].gain == pytest.approx(best(its.promises([one])).gain, rel=1e-6)
+    assert its.promises([]) == []
 
 
 def test_slopes_of_residuals_know_nothing_of_the_noise(fitter, alpha):

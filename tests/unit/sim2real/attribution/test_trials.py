@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from wetwell.sim2real.attribution.attribution import halves
+from wetwell.sim2real.attribution.attribution import halves, weighed_cells
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fitter
+from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.trials import Trials
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.sim2real.trial.cases import trial_case
 from wetwell.sim2real.truth import truth_plant
@@ -35,7 +37,9 @@ def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start()
     )
     guesses = {one: initial_guesses(one, replay, residuals, fitter.plain.residuals) for one in (header, cutoff)}
     alone = fitter.refine(fitter.at([header], [np.array([0.8])]))
-    (both,) = Trials(fitter, guesses, lambda _: None, map).with_one_more([alone])
+    cells = weighed_cells(replay, residuals, residuals_of(fitter.plain.residuals))
+    besides = Hypotheses(fitter, cells, map).beside([alone])
+    (both,) = Trials(fitter, cells, guesses, lambda _: None, map).with_one_more([alone], besides)
     assert both.names == ("common_header", "flow_low_cutoff")
     assert fitter.cost(both) < 0.5 * fitter.cost(alone)
     (limit,) = (effect for effect in both.effects if effect.name == "flow_low_cutoff")

@@ -21,7 +21,7 @@ from wetwell.sim2real.likelihood.covariance import (
     no_form,
     projected,
 )
-from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none
+from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none, weights_of
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
@@ -208,6 +208,14 @@ def test_cells_whose_form_may_be_off_by_much_say_little_of_what_all_have_alike(c
     form = replace(no_form(cells), signature=signature)
     found = evidence(cells, residuals, np.zeros((signature.size, 0)), form)
     assert found.log == pytest.approx(log_densities(cells, residuals, form).sum(), abs=1.0)
+
+
+def test_further_effects_are_weighed_as_the_evidence_weighs_its_own(cells):
+    rng = np.random.default_rng(4)
+    residuals, slopes = rng.normal(size=cells.group.size), rng.normal(size=(cells.group.size, 2))
+    form = some_form(cells, rng)
+    found = evidence(cells, residuals, 1e-3 * slopes, form)
+    np.testing.assert_allclose(weights_of(found, form).products(1e-3 * slopes), found.precision)
 
 
 def test_a_parameter_is_integrated_over_its_range(cells):
