@@ -107,16 +107,20 @@ def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], 
 
 
 def _all_samples(database: sqlite3.Connection, stations: Iterable[int]) -> Iterator[Row]:
-    """Rows of each station; then all, where there are others: one whose station was changed ends those of its own."""
-    count = 0
-    for station in stations:
+    """Rows of each station; then all, where there are others: one whose station was changed ends those of its own.
+
+    Of one that is of no station nothing else is read: what cannot be read of it would end all.
+    """
+    count, known = 0, tuple(stations)
+    for station in known:
         for row in _samples(database, station):
             count += 1
             yield row
     if _readable(database, "SELECT count(*) FROM sample") != [(count,)]:
         for order in ("", "DESC"):
-            query = f"SELECT {_SAMPLE} FROM sample ORDER BY station {order}, time_ns {order}, seq {order}"  # noqa: S608
-            yield from _as_far_as_can_be(database, query)
+            of_known = f"WHERE +station IN ({', '.join('?' * len(known))})"  # the sign keeps SQLite from its index
+            query = f"SELECT {_SAMPLE} FROM sample {of_known} ORDER BY station {order}, time_ns {order}, seq {order}"  # noqa: S608
+            yield from _as_far_as_can_be(database, query, known)
 
 
 def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
@@ -189,15 +193,15 @@ def _read(database: sqlite3.Connection, query: str, values: Row) -> tuple[list[R
     return rows, True
 
 
-def _as_far_as_can_be(database: sqlite3.Connection, query: str) -> Iterator[Row]:
+def _as_far_as_can_be(database: sqlite3.Connection, query: str, values: Row) -> Iterator[Row]:
     """Rows until one cannot be read, one after the other: they may be many."""
     count = 0
     try:
-        for row in database.execute(query):
+        for row in database.execute(query, values):
             count += 1
             yield row
     except UNREADABLE:
-        yield from _next_row(database, query, (), count)
+        yield from _next_row(database, query, values, count)
 
 
 def _next_row(database: sqlite3.Connection, query: str, values: Row, count: int) -> list[Row]:

@@ -218,6 +218,25 @@ def test_a_row_whose_station_was_changed_costs_no_row_behind_it(content, tmp_pat
         assert len(store.samples("beta", 0, 2**62)) == TIMES - size
 
 
+def test_rows_of_no_station_of_which_nothing_else_can_be_read_cost_none_between_them(content, tmp_path):
+    """Their data are said to be longer than the row: SQLite ends a scan as soon as it looks at them."""
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        rows = store.file._writer.execute("SELECT station, time_ns, size FROM sample WHERE size > 1").fetchall()
+    changed, lost = bytearray(content), 0
+    for number, time_ns, size in (rows[len(rows) // 3], rows[2 * len(rows) // 3]):
+        place = content.index(number.to_bytes(1, "big") + time_ns.to_bytes(6, "big"))
+        head = next(place - length for length in range(5, 20) if content[place - length] == length)
+        assert content[head + 5] > 0x80, "after those of station, time, number and quality the type of the data"
+        changed[head + 5], changed[place] = 0xFF, 0x70
+        lost += size
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.file.is_damaged = True
+        store.write(batch("alpha", TIMES, TIMES + 1))
+        assert len(store.samples("beta", 0, 2**62)) == TIMES - lost
+
+
 @pytest.mark.parametrize("data", [b"", b"odd"])
 def test_where_a_history_ends_is_told_though_its_last_row_is_damaged(content, tmp_path, data):
     (tmp_path / "live.sqlite").write_bytes(content)
