@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
+from wetwell.protocols.quantities import columns_of, pumps_of
 from wetwell.protocols.recordings.origin import Origin
 from wetwell.services.historian.store.live.connection import UNREADABLE
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
@@ -113,9 +114,12 @@ def _filed(folder: Path) -> set[Row]:
 
 @lru_cache(maxsize=100)
 def _rows_of(content: bytes, station: str, day: str) -> frozenset[Row]:
-    """Samples of a daily file; none if it is not that of a station and a day."""
+    """Samples of a daily file; none if it is not that of a station and a day, or a column has lost its name."""
     with contextlib.suppress(OSError, ValueError, KeyError, pa.ArrowException):
         table = pa.parquet.ParquetFile(pa.BufferReader(content), page_checksum_verification=True).read()
+        names = set(table.column_names)
+        if not names.issuperset({"quality", *columns_of(pumps_of(names))}):
+            return frozenset()
         time_ns = table["time"].cast(pa.int64()).to_numpy()
         days = time_ns.astype("datetime64[ns]").astype("datetime64[D]")
         if Origin.of_metadata(table.schema.metadata or {}).station == station and (days == np.datetime64(day)).all():

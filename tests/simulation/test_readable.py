@@ -63,3 +63,14 @@ def test_a_daily_file_in_the_place_of_that_of_another_station_cannot_be_read(his
     file.replace(other / file.name)
     day = {sample for sample in keys(samples) if sample[1] < DAY_NS}
     assert readable_in(folder) == keys(samples) - day
+
+
+def test_a_daily_file_with_a_column_of_another_name_is_not_what_was_written(history):
+    """No checksum guards its names: a column that has lost its own leaves the others, and rows without a value."""
+    folder, samples = history
+    file = min(folder.glob("samples/*/*.parquet"))
+    content = file.read_bytes()
+    assert b"pump1_head_m" in content
+    file.write_bytes(content.replace(b"pump1_head_m", b"pump1_heaf_m"))
+    day = {sample for sample in keys(samples) if sample[1] < DAY_NS}
+    assert readable_in(folder) == keys(samples) - day
