@@ -27,7 +27,7 @@ HAS_RED = """() => {
 
 def drag(page, first, last):
     over = page.locator(".is-trends .u-over").nth(1)
-    over.scroll_into_view_if_needed()
+    over.hover()  # scrolls, and again where the chart was made anew meanwhile
     box = over.bounding_box()
     page.mouse.move(box["x"] + first * box["width"], box["y"] + 0.5 * box["height"])
     page.mouse.down()
