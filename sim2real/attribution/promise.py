@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cholesky
 from scipy.optimize import lsq_linear
 
 from wetwell.protocols.arrays import Floats
@@ -15,8 +14,6 @@ MOST_SCALED = 2.0
 """Times what an effect did alone that it may do beside others: the starts of a grid are further apart. [1]"""
 MOST_COLUMNS = 24
 """That are weighed together: the products of what candidates do with each other are of no use."""
-ROUNDED = 1e-9
-"""Share of its square by which a column of products is rounded at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,8 +87,8 @@ class Beside:
 
     def _of_few(self, alones: Sequence[Alone]) -> list[list[Promise]]:
         columns = np.column_stack([self.residuals, self.slopes, *(one.changes.T for one in alones)])
-        inner = self.weights.products(columns)
-        root = cholesky(inner + np.diag(ROUNDED * np.diag(inner) + np.finfo(float).tiny))
+        squares, directions = np.linalg.eigh(self.weights.products(columns))
+        root = np.sqrt(np.maximum(squares, 0.0))[:, None] * directions.T
         count = self.slopes.shape[1]
         left, slopes, changed = root[:, 0], root[:, 1 : 1 + count], root[:, 1 + count :].T
         basis, triangle = np.linalg.qr(slopes)
