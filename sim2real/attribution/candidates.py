@@ -93,6 +93,15 @@ class Candidate:
                 values[name] = free.value(float(one))
         return EFFECTS[self.name].model_validate(values)
 
+    def neutral(self, point: Floats) -> Floats:
+        """The point with all strengths neutral."""
+        return np.array(
+            [
+                one if free.neutral is None else free.normalised(free.neutral)
+                for free, one in zip(self.free, point, strict=True)
+            ]
+        )
+
     def start_grids(self, guess: Mapping[str, float], strengths: Sequence[float] = STRENGTHS) -> list[list[Floats]]:
         """Points to begin at: the guess, and grids of rising strength, each strength on both sides of neutral.
 
@@ -105,12 +114,7 @@ class Candidate:
         if not any(free.neutral is not None for free in self.free):
             return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
         grids = [[base]] if any(free.name in guess for free in self.free) else []
-        still = np.array(
-            [
-                one if free.neutral is None else free.normalised(free.neutral)
-                for free, one in zip(self.free, base, strict=True)
-            ]
-        )
+        still = self.neutral(base)
         for k, free in enumerate(self.free):
             if free.neutral is None or guess.get(free.name) == free.neutral:
                 continue

@@ -134,11 +134,5 @@ def _bounded(triangle: Floats, wanted: Floats, low: Floats, high: Floats) -> Flo
 
 def _scaled(candidate: Candidate, point: Floats, scale: float) -> Floats:
     """A point with its strengths so many times as far from neutral, within the range."""
-    neutral = np.array(
-        [
-            one if free.neutral is None else free.normalised(free.neutral)
-            for free, one in zip(candidate.free, point, strict=True)
-        ]
-    )
-    is_strength = np.array([free.neutral is not None for free in candidate.free])
-    return np.where(is_strength, np.clip(neutral + scale * (point - neutral), 0.0, 1.0), point)
+    neutral = candidate.neutral(point)
+    return np.clip(neutral + scale * (point - neutral), 0.0, 1.0)
