@@ -131,8 +131,7 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
     """
     parts = list(zip(fit.candidates, fit.split(ends), strict=False))  # of no candidates it is one empty part
     return all(
-        _may_be_neutral(candidate, its) != [True]
-        and not any(_hold(candidate, its, EFFECTS[candidate.name].another_at))
+        _may_be_neutral(candidate, its) != [True] and not any(_may_be_another(candidate, its))
         for candidate, its in parts
     )
 
@@ -140,6 +139,13 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
 def _may_be_neutral(candidate: Candidate, ends: Floats) -> list[bool]:
     """Of each strength."""
     return _hold(candidate, ends, {free.name: free.neutral for free in candidate.free})
+
+
+def _may_be_another(candidate: Candidate, ends: Floats) -> list[bool]:
+    """Of each parameter with an end of its range at which it is another effect."""
+    of_name = {free.name: {"low": free.low, "high": free.high} for free in candidate.free}
+    another_at = EFFECTS[candidate.name].another_at
+    return _hold(candidate, ends, {name: of_name[name][end] for name, end in another_at.items()})
 
 
 def _hold(candidate: Candidate, ends: Floats, values: Mapping[str, float | None]) -> list[bool]:

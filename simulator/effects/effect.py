@@ -51,7 +51,7 @@ class Effect(Table):
 
     component: ClassVar[Component]
     neutral: ClassVar[dict[str, float]]
-    another_at: ClassVar[dict[str, float]] = {}
+    another_at: ClassVar[dict[str, Literal["low", "high"]]] = {}
     has_one_form: ClassVar[bool] = False
     may_change: ClassVar[bool] = False
     is_learnt: ClassVar[bool] = False

@@ -35,7 +35,7 @@ class Ragging(Effect):
 
     component: ClassVar[Component] = "pump"
     neutral: ClassVar[dict[str, float]] = {"speed_loss": 0.0, "throttle_m": 0.0}
-    another_at: ClassVar[dict[str, float]] = {"growth_s": 30.0}
+    another_at: ClassVar[dict[str, Literal["low", "high"]]] = {"growth_s": "low"}
     may_change: ClassVar[bool] = True
 
     name: Literal["ragging"] = "ragging"

@@ -36,7 +36,7 @@ class AirPocket(Effect):
 
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"head_m": 0.0}
-    another_at: ClassVar[dict[str, float]] = {"purge_s": 1.0e4}
+    another_at: ClassVar[dict[str, Literal["low", "high"]]] = {"purge_s": "high"}
 
     name: Literal["air_pocket"] = "air_pocket"
     head_m: Annotated[float, limits(0.0, 20.0, "m")]
