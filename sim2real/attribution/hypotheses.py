@@ -19,7 +19,7 @@ from wetwell.sim2real.attribution.promise import Beside
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import GOOD, LATE, POOR_FORM, Form, no_form
-from wetwell.sim2real.likelihood.evidence import Evidence, Member, evidence, evidence_of_none, weights_of
+from wetwell.sim2real.likelihood.evidence import Evidence, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
@@ -165,7 +165,7 @@ class Hypotheses:
     def _beside(self, fit: Fit) -> Beside:
         shown = self._shown(fit)
         return Beside(
-            weights=weights_of(evidence(self._cells, shown.residuals, shown.slopes, shown.form), shown.form),
+            weights=cell_weights(evidence(self._cells, shown.residuals, shown.slopes, shown.form), shown.form),
             residuals=shown.residuals,
             slopes=shown.slopes,
             position=fit.position,

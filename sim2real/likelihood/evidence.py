@@ -209,7 +209,7 @@ class Weights:
         return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
 
 
-def weights_of(found: Evidence, form: Form) -> Weights:
+def cell_weights(found: Evidence, form: Form) -> Weights:
     """How cells count beside the effects of an evidence, of which the form is given."""
     blocks = []
     for one in found.stirred:

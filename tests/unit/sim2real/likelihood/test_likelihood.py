@@ -21,7 +21,7 @@ from wetwell.sim2real.likelihood.covariance import (
     no_form,
     projected,
 )
-from wetwell.sim2real.likelihood.evidence import Member, evidence, evidence_of_none, weights_of
+from wetwell.sim2real.likelihood.evidence import Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
@@ -215,7 +215,7 @@ def test_further_effects_are_weighed_as_the_evidence_weighs_its_own(cells):
     residuals, slopes = rng.normal(size=cells.group.size), rng.normal(size=(cells.group.size, 2))
     form = some_form(cells, rng)
     found = evidence(cells, residuals, 1e-3 * slopes, form)
-    np.testing.assert_allclose(weights_of(found, form).products(1e-3 * slopes), found.precision)
+    np.testing.assert_allclose(cell_weights(found, form).products(1e-3 * slopes), found.precision)
 
 
 def test_a_parameter_is_integrated_over_its_range(cells):
