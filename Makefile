@@ -11,12 +11,14 @@ WORKERS := 3
 # A file of daemons and pages stays in one process, which makes its site once; of the others idle processes take over.
 DIST := loadfile
 PYTEST = $(BIN)/pytest -q --numprocesses=$(WORKERS) --dist=$(DIST) --no-loadscope-reorder --durations=10
+# One test after the other: a page that is watched must keep up with its site.
+BROWSE = $(BIN)/pytest -q --durations=10 tests/browser
 # Where every process compiles all modules anew, each start takes three times as long.
 export PYTHONDONTWRITEBYTECODE =
 # Matrices are small: threads of the linear algebra would only wait for each other, and the tests use all cores.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: help up test check browser others long soak lint types imports kernels modules format docs requirements clean sbom audit release sign verify image
+.PHONY: help up test check page browser others long soak lint types imports kernels modules format docs requirements clean sbom audit release sign verify image
 
 help:  ## Show the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -30,18 +32,21 @@ test: $(VENV)/.dev  ## Lint, types, import contract, and the tests that guard ea
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync kernels types modules lint imports
 	$(PYTEST) -m "not check and not long and not soak"
 
-check: sbom  ## The other tests: long simulations, the browser, chaos, the pages of docs walked through; SBOM
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync browser others
+check: sbom  ## The other tests of CI: the browser, chaos, data sets, pages of docs walked through; SBOM
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync page others
 
-browser: $(VENV)/.dev  ## What of `make check` looks at the page, one test after the other: a page that is watched must keep up with its site
-	$(BIN)/pytest -q --durations=10 -m "check and not long and not soak" tests/browser
+page: $(VENV)/.dev  ## What of `make check` looks at the page
+	$(BROWSE) -m "check and not long and not soak"
+
+browser: $(VENV)/.dev  ## All that looks at the page; after a change of it
+	$(BROWSE)
 
 others: $(VENV)/.dev  ## What of `make check` looks at no page; it gives way to the browser
 	nice -n 5 $(PYTEST) -m "check and not long and not soak" \
 	  $$(grep -rlE 'mark\.check' tests --include='test_*.py' --exclude-dir=browser)
 
-long: $(VENV)/.dev  ## What is the same again for longer: hundreds of simulated station-days, the wheel under each Python, the slowest pages of docs
-	$(PYTEST) -m "long and not soak"
+long: $(VENV)/.dev browser  ## What CI has no time for: hundreds of simulated station-days, plants of truth, a fleet, Prometheus, the site of docs
+	$(PYTEST) -m "long and not soak" --ignore=tests/browser
 
 soak: $(VENV)/.dev  ## What needs the machine alone: kills at 600 times life; twenty starts, with a load on purpose
 	$(BIN)/pytest -q -m soak

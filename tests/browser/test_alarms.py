@@ -71,6 +71,7 @@ def test_an_act_of_a_crew_is_entered_and_stands_in_the_log(site, open_page) -> N
     expect(line).to_contain_text("Ada")
 
 
+@pytest.mark.long
 def test_an_episode_is_told_and_leads_to_its_time(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha?pump=1")
     episode = page.locator(".episodes tbody tr").filter(has_text="pump 2")
@@ -80,6 +81,7 @@ def test_an_episode_is_told_and_leads_to_its_time(site, open_page) -> None:
     expect(page.get_by_role("button", name="Pump 2", exact=True)).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.long
 def test_the_overview_tells_cause_and_cost_and_on_a_phone_it_is_a_card(site, open_page) -> None:
     page = open_page(site.url)
     line = page.get_by_role("row").filter(has_text="alpha")
@@ -92,6 +94,7 @@ def test_the_overview_tells_cause_and_cost_and_on_a_phone_it_is_a_card(site, ope
     assert phone.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+@pytest.mark.long
 def test_a_station_under_maintenance_says_so_on_every_page_until_it_is_back(site, open_page, axe) -> None:
     page = open_page(f"{site.url}/station/alpha")
     modes = page.get_by_role("group", name="Mode of the station")
@@ -117,6 +120,7 @@ def test_a_station_under_maintenance_says_so_on_every_page_until_it_is_back(site
     expect(modes.get_by_role("button", name="back in operation")).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.long
 def test_the_dialog_of_an_act_can_be_used_by_everybody(site, open_page, axe) -> None:
     page = open_page(f"{site.url}/alarms")
     page.get_by_role("row").filter(has_text="level high").get_by_role("button", name="shelve").click()
@@ -124,6 +128,7 @@ def test_the_dialog_of_an_act_can_be_used_by_everybody(site, open_page, axe) -> 
     assert axe(page) == []
 
 
+@pytest.mark.long
 def test_alarms_of_the_list_can_be_taken_along(site, open_page, tmp_path) -> None:
     page = open_page(f"{site.url}/alarms")
     expect(page.get_by_role("row").filter(has_text="level high")).to_be_visible()
@@ -131,6 +136,7 @@ def test_alarms_of_the_list_can_be_taken_along(site, open_page, tmp_path) -> Non
     assert (rows["level_high"]["station"], rows["level_high"]["priority"]) == ("alpha", "high")
 
 
+@pytest.mark.long
 def test_what_stands_at_a_station_can_be_taken_along_while_it_is_live(site, open_page, tmp_path) -> None:
     page = open_page(f"{site.url}/station/alpha")
     panel = page.locator(".is-alarms")
@@ -139,6 +145,7 @@ def test_what_stands_at_a_station_can_be_taken_along_while_it_is_live(site, open
     assert rows["level_high"]["state"] in {"unacknowledged", "acknowledged", "returned"}
 
 
+@pytest.mark.long
 def test_episodes_and_energy_of_a_range_can_be_taken_along(site, open_page, tmp_path) -> None:
     page = open_page(f"{site.url}/station/alpha?span=24h")
     expect(page.locator(".episodes tbody tr").filter(has_text="pump 2").first).to_be_visible(timeout=150_000)

@@ -205,6 +205,7 @@ def test_a_thousand_stations_fit_a_phone(fed, open_page) -> None:
     assert lines.count() < 60
 
 
+@pytest.mark.long
 def test_what_a_source_calls_bad_and_what_was_never_seen_is_not_in_ink(fed, open_page) -> None:
     page = open_page(f"{fed.url}/station/s-{BAD:04}")
     expect(page.locator(".well .water")).to_have_attribute("data-quality", "bad")
@@ -217,6 +218,7 @@ def test_what_a_source_calls_bad_and_what_was_never_seen_is_not_in_ink(fed, open
     expect(unheard).not_to_contain_text("normal")
 
 
+@pytest.mark.long
 def test_a_main_that_was_flushed_is_told_by_the_newest_verdict_whatever_pump_ran_before(fed, open_page) -> None:
     page = open_page(f"{fed.url}/station/s-{FLUSHED:04}?pump=1")
     expect(page.locator(".sentence")).to_have_text("Pump 1 and its main are as they were learnt.")
@@ -226,6 +228,7 @@ def test_a_main_that_was_flushed_is_told_by_the_newest_verdict_whatever_pump_ran
     expect(page.locator(".cause")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_of_two_mains_the_one_that_is_at_fault_says_so(fed, open_page) -> None:
     page = open_page(f"{fed.url}/station/s-{TWO_MAINS:04}")
     expect(page.locator(".well .main.fault title")).to_have_text([f"{MAINS[0]}, system fault: act"])
@@ -249,6 +252,7 @@ def test_one_cursor_goes_through_all_trends(fed, open_page) -> None:
     expect(page.locator(".is-trends .readout")).to_contain_text("level 1.00 m")
 
 
+@pytest.mark.long
 def test_the_watched_gap_is_a_sentence_two_pictures_and_names(fed, open_page, axe, screenshots) -> None:
     page = open_page(f"{fed.url}/station/s-{WATCHED:04}")
     panel = page.locator(".is-gap")
@@ -271,7 +275,13 @@ def test_the_watched_gap_is_a_sentence_two_pictures_and_names(fed, open_page, ax
 
 
 @pytest.mark.parametrize(
-    "path", ["/", f"/station/s-{WATCHED:04}", "/station/s-0042", "/alarms", "/health", "/station/nowhere"]
+    "path",
+    [
+        "/",
+        f"/station/s-{WATCHED:04}",
+        *(pytest.param(path, marks=pytest.mark.long) for path in ("/station/s-0042", "/alarms", "/health")),
+        pytest.param("/station/nowhere", marks=pytest.mark.long),
+    ],
 )
 def test_no_english_is_left_on_a_german_page(fed, open_page, path) -> None:
     page = open_page(fed.url + path, locale="de-DE", timezone_id="Europe/Berlin", may_lose_its_server=True)
@@ -297,6 +307,7 @@ def test_an_alarm_is_told_in_the_language_of_the_reader_with_what_is_known_of_it
     assert of_fault == f"Leitungsfehler – Druckleitung: handeln, {size}, die Grenze wird am 2026-04-07 erreicht"
 
 
+@pytest.mark.long
 def test_local_time_goes_on_over_the_change_to_summer_time(fed, open_page) -> None:
     berlin = {"timezone_id": "Europe/Berlin", "locale": "de-DE"}
     page = open_page(f"{fed.url}/station/s-0600", may_lose_its_server=True, **berlin)  # it has no historian
@@ -318,7 +329,7 @@ def test_local_time_goes_on_over_the_change_to_summer_time(fed, open_page) -> No
     )
 
 
-@pytest.mark.parametrize("width", [1280, 1600, 1920])
+@pytest.mark.parametrize("width", [1280, *(pytest.param(width, marks=pytest.mark.long) for width in (1600, 1920))])
 @pytest.mark.parametrize("lang", ["en", "de"])
 def test_nothing_of_a_fault_is_cut_off_in_the_overview(fed, open_page, width, lang) -> None:
     page = open_page(f"{fed.url}/?lang={lang}", viewport={"width": width, "height": 900})

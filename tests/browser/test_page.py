@@ -56,6 +56,7 @@ def stands(page, level):
     return None
 
 
+@pytest.mark.long
 def test_the_plant_is_held_let_go_and_slowed_down(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha")
     clock = page.get_by_role("group", name="Clock of the simulated plant")
@@ -80,6 +81,7 @@ def test_the_plant_is_held_let_go_and_slowed_down(site, open_page) -> None:
         site.plant_clock(speed=before)
 
 
+@pytest.mark.long
 def test_who_wants_no_motion_gets_none(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha", reduced_motion="reduce")
     expect(page.locator(".pump.runs").first).to_be_visible(timeout=SLOW_MS)
@@ -137,6 +139,7 @@ def test_acknowledging_by_name_works_and_survives_a_reload(site, open_page, scre
     expect(page.get_by_role("dialog")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_the_address_holds_the_view(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha")
     page.get_by_role("group", name="Pump").get_by_role("button", name="Pump 3").click()
@@ -171,6 +174,7 @@ def test_the_page_comes_back_when_the_server_does(site, open_page, unused_port) 
         assert page.evaluate(MANY_IN_THE_FIRST_CHART)
 
 
+@pytest.mark.long
 def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_port, tmp_path) -> None:
     file, port = tmp_path / "tokens.toml", unused_port()
     token = new_token(file, "ada", "operator")
@@ -194,15 +198,16 @@ def test_where_tokens_are_asked_for_one_is_given_once(site, open_page, unused_po
     ("path", "scheme"),
     [
         ("/", "light"),
-        ("/", "dark"),
-        ("/station/alpha", "light"),
+        pytest.param("/", "dark", marks=pytest.mark.long),
+        pytest.param("/station/alpha", "light", marks=pytest.mark.long),
         pytest.param("/station/alpha", "dark", marks=pytest.mark.long),
         pytest.param("/station/alpha?span=24h", "light", marks=pytest.mark.long),
         ("/station/alpha?from=2025-01-01T04:00:00Z&to=2025-01-01T08:00:00Z&at=2025-01-01T07:30:00Z", "dark"),
         ("/alarms", "dark"),
-        ("/alarms?show=journal", "light"),
-        ("/reports", "light"),
-        ("/health", "light"),
+        *(
+            pytest.param(path, "light", marks=pytest.mark.long)
+            for path in ("/alarms?show=journal", "/reports", "/health")
+        ),
     ],
 )
 def test_axe_finds_nothing_serious(site, open_page, axe, path, scheme) -> None:
@@ -214,7 +219,10 @@ def test_axe_finds_nothing_serious(site, open_page, axe, path, scheme) -> None:
     assert serious == [], json.dumps(serious, indent=1)
 
 
-@pytest.mark.parametrize(("width", "height"), [(390, 844), (1280, 720), (2560, 1440)])
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [(390, 844), *(pytest.param(*one, marks=pytest.mark.long) for one in [(1280, 720), (2560, 1440)])],
+)
 def test_nothing_sticks_out_from_phone_to_wall(site, open_page, screenshots, width, height) -> None:
     page = open_page(f"{site.url}/station/alpha", viewport={"width": width, "height": height}, color_scheme="dark")
     expect(page.locator(".well .big")).to_contain_text("m", timeout=SLOW_MS)

@@ -63,6 +63,7 @@ def test_a_span_fills_every_panel_and_dragging_zooms_and_back_undoes_it(site, op
     expect(page.get_by_role("button", name="24 h")).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.long
 def test_a_moment_of_the_past_shows_plane_well_and_evidence_of_that_time(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha?pump=2")
     expect(page.locator(".curve.now.fault")).to_have_count(1)
@@ -80,6 +81,7 @@ def test_a_moment_of_the_past_shows_plane_well_and_evidence_of_that_time(site, o
     expect(page.locator(".curve.now.fault")).to_have_count(1)
 
 
+@pytest.mark.long
 def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha?pump=2&from=2025-01-01T04:00:00Z&to=2025-01-01T09:00:00Z")
     expect(page.locator("#trend-note")).to_have_text(POINTS)
@@ -97,6 +99,7 @@ def test_bands_tell_the_fault_and_the_list_of_changes_leads_to_its_moment(site, 
     assert page.locator(".is-alarms table").nth(1).locator("tbody tr").count() == 1
 
 
+@pytest.mark.long
 def test_dates_give_a_range_and_a_wrong_order_is_refused(site, open_page) -> None:
     page = open_page(f"{site.url}/station/alpha", timezone_id="Europe/Berlin")
     expect(page.locator("#station-time")).to_have_text(re.compile(r"(MEZ|CET|GMT\+1)"))

@@ -198,7 +198,8 @@ def answers(store: Store) -> list[History]:
     return [History.decode(historian.answer("alpha", question)) for question in asked]
 
 
-@pytest.mark.parametrize("downsample_after_days", [pytest.param(None, marks=pytest.mark.long), 2])
+@pytest.mark.long
+@pytest.mark.parametrize("downsample_after_days", [None, 2])
 def test_a_crash_before_any_act_of_the_rollover_loses_nothing_and_doubles_nothing(
     tmp_path: Path, die_at: Callable[[int], None], downsample_after_days: int | None
 ) -> None:

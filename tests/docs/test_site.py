@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.check
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[2]
 SAID = {

@@ -75,7 +75,7 @@ WALKS = (
         given="""cp "$ROOT"/simulator/stations/alpha.toml north.toml
 wetwell simulate --station north.toml --days 0.2 --out north.parquet""",
     ),
-    Walk(("docs/add-a-station.md",), services=("wetwell up",), shows_output=True),
+    Walk(("docs/add-a-station.md",), services=("wetwell up",), shows_output=True, is_long=True),
     Walk(
         ("docs/tutorial-connect-a-plc.md",),
         services=(
@@ -85,6 +85,7 @@ wetwell simulate --station north.toml --days 0.2 --out north.parquet""",
         patient=("wetwell gateway read", "wetwell doctor"),
         codes={"wetwell doctor": 1},  # without historian and alarms it warns
         shows_output=True,
+        is_long=True,
     ),
     Walk(
         ("docs/tutorial-first-fault.md", "docs/alarms.md", "docs/grafana.md", "docs/operations.md"),
@@ -170,6 +171,7 @@ wetwell simulate --station north.toml --days 0.2 --seed 3 --out field.csv.gz""",
         given=f"""{STATION}
 sed -n '/^# preparation.toml/,/^```/p' "$ROOT"/docs/field-data.md | sed '$d' > preparation.toml
 {TAKEN_AS_A_FIELD_WOULD}""",
+        is_long=True,
     ),
     Walk(
         ("docs/backtest.md",),

@@ -90,6 +90,7 @@ def told(alarms):
     return [(one.id, one.time, one.state) for one in alarms if one.pump is not None and not one.by]
 
 
+@pytest.mark.long
 def test_of_two_alarm_daemons_one_raises_each_alarm_once_and_carries_out_each_act_once(postgres, tmp_path):
     site = PairSite(postgres.url, tmp_path, ["alarms"])
     sent, heard, acts = [], [], []
@@ -141,6 +142,7 @@ def test_of_two_alarm_daemons_one_raises_each_alarm_once_and_carries_out_each_ac
     assert {name for name, _ in acts} <= set(written)
 
 
+@pytest.mark.long
 def test_of_two_historians_each_sample_is_kept_once(postgres, tmp_path):
     stations = stations_of(tmp_path, 2)
     site = PairSite(postgres.url, tmp_path, ["historian"])

@@ -83,7 +83,7 @@ def iter_until(subscriber: zenoh.Subscriber) -> Iterator[zenoh.Sample]:
     pytest.fail(f"nothing more came within {DEADLINE_S:g} s")
 
 
-@pytest.mark.parametrize("gather_s", [0.0, pytest.param(0.1, marks=pytest.mark.check)])
+@pytest.mark.parametrize("gather_s", [0.0, pytest.param(0.1, marks=pytest.mark.long)])
 def test_blockage_is_seen_on_zenoh_and_every_daemon_stops_with_0(tmp_path: Path, gather_s: float) -> None:
     scenario = tmp_path / "quick.toml"
     scenario.write_text(SCENARIO)
@@ -184,7 +184,9 @@ def test_daemons_go_on_where_they_were_when_the_router_comes_back() -> None:
 
 
 @pytest.mark.check
-@pytest.mark.parametrize("file", ["anomaly-free/anomaly-free.csv.gz", "valve1/1.csv.gz"])
+@pytest.mark.parametrize(
+    "file", ["anomaly-free/anomaly-free.csv.gz", pytest.param("valve1/1.csv.gz", marks=pytest.mark.long)]
+)
 @pytest.mark.real_data
 def test_a_replayed_rig_without_head_and_frequency_gets_no_confident_fault(
     file: str, real_data: Path, tmp_path: Path

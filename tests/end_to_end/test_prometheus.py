@@ -18,7 +18,7 @@ from browser_site import CLOGGING, Site, until
 from ports import free_port
 
 pytestmark = [
-    pytest.mark.check,
+    pytest.mark.long,
     pytest.mark.skipif(
         shutil.which("prometheus") is None, reason="prometheus is not installed (Debian package of that name)"
     ),

@@ -93,7 +93,7 @@ def load(processes: int) -> Iterator[None]:
             process.join()
 
 
-@pytest.mark.check
+@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_a_start_says_nothing_and_loses_nothing_and_a_second_one_goes_on(tmp_path: Path) -> None:
     folder = tmp_path / "data"

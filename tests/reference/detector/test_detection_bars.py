@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.check
+pytestmark = pytest.mark.long
 
 PATH = Path(__file__).parents[3] / "benchmarks" / "detection.py"
 SEEDS = range(4000, 4002)

@@ -11,7 +11,7 @@ from wetwell.detector.evaluation.scores import macro_f1
 from wetwell.services.batch.backtest import SimulatedRecording, judge
 from wetwell.services.stations import find_scenario
 
-pytestmark = pytest.mark.check
+pytestmark = pytest.mark.long
 
 SEED = 20
 BOUNDS = {

@@ -18,7 +18,7 @@ from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.inflow.surges import Surges
 from wetwell.simulator.simulation import Simulation
 
-SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.check) for seed in (1, 2))]
+SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2))]
 
 
 @cache
@@ -72,7 +72,7 @@ def test_two_days_without_fault_bring_no_alarm(seed):
     assert false_alarms(verdicts, recording).station_days > 1.6
 
 
-@pytest.mark.check
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_common_header_with_several_pumps_on_hides_no_fault_and_makes_none(seed):
     recording, verdicts = judged("common", seed)

@@ -181,8 +181,8 @@ def of_station(columns, quantity):
     return np.concatenate([columns[f"pump{i}_{quantity}"] for i in range(1, 5) if f"pump{i}_{quantity}" in columns])
 
 
-@pytest.mark.check
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", ELASTIC_DEVIATIONS)
 def test_a_deviation_shows_where_it_must(name, seed):
     with_it, without = drawn(name, seed)
@@ -209,7 +209,7 @@ ONE_CHANNEL = {
 }
 
 
-@pytest.mark.check
+@pytest.mark.long
 @pytest.mark.parametrize("name", ONE_CHANNEL)
 def test_a_deviation_of_a_channel_leaves_all_others_as_they_were(name):
     with_it, without = drawn(name, 3)
@@ -223,7 +223,7 @@ def test_a_deviation_of_a_channel_leaves_all_others_as_they_were(name):
     assert differing <= allowed
 
 
-@pytest.mark.check
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["pump_wear", "ragging"])
 def test_what_wears_or_clogs_one_pump_leaves_the_other_on_its_curve(name):
     case, _ = drawn(name, 5)

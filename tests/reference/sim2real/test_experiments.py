@@ -14,7 +14,7 @@ from wetwell.sim2real.diagnosis.diagnosis import diagnose
 from wetwell.simulator.scenario import DEFAULT_START_NS
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = pytest.mark.check
+pytestmark = pytest.mark.long
 
 ONLY = ("motor_slip", "friction_bias", "static_head_bias")
 STATION = """name = "north"
@@ -88,7 +88,6 @@ def test_what_a_crew_switches_is_no_shifted_threshold(answers):
     assert report.verdict == "none"
 
 
-@pytest.mark.long
 def test_experiment_prints_what_it_weighs_and_refuses_other_folders(answers, tmp_path):
     code, out, _ = wetwell("gap", "experiment", answers / "first")
     assert code == 0

@@ -19,7 +19,7 @@ from wetwell.simulator.inflow.diurnal import DiurnalInflow
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = pytest.mark.check
+pytestmark = pytest.mark.long
 
 STATION = """
 name = "pair"

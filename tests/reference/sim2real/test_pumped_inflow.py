@@ -44,7 +44,11 @@ def learnt(recording, alpha) -> Jumps | None:
 
 @pytest.mark.parametrize(
     ("seed", "high_m3h", "low_m3h"),
-    [(971_101, 150.0, 5.0), (971_102, 150.0, 5.0), (971_103, 94.0, 4.0), (971_105, 220.0, 30.0)],
+    [
+        *(pytest.param(seed, 150.0, 5.0, marks=pytest.mark.long) for seed in (971_101, 971_102)),
+        (971_103, 94.0, 4.0),
+        pytest.param(971_105, 220.0, 30.0, marks=pytest.mark.long),
+    ],
 )
 def test_a_station_behind_another_one_is_as_its_file_says(alpha, seed, high_m3h, low_m3h):
     recording = recorded(alpha, pulses(np.random.default_rng(seed), high_m3h, low_m3h), seed)

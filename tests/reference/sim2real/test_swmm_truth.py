@@ -16,7 +16,7 @@ from wetwell.sim2real.truth import truth_plant
 from wetwell.sim2real.truth.case import Deviation, TrueInflow, TruthCase
 from wetwell.sim2real.truth.swmm_input import SWMM_LIBRARY
 
-pytestmark = pytest.mark.check
+pytestmark = pytest.mark.long
 
 pytest.importorskip("pyswmm", reason="pyswmm has no build for this platform", exc_type=ImportError)
 

@@ -119,8 +119,8 @@ def of_running(columns, quantity):
     return np.concatenate([columns[f"pump{i}_{quantity}"] for i in range(1, 5) if f"pump{i}_{quantity}" in columns])
 
 
-@pytest.mark.check
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", DEVIATIONS)
 def test_a_deviation_shows_where_it_must(name, seed):
     with_it, without = drawn(name, seed)
@@ -153,7 +153,7 @@ SENSOR_SIDE = {
 }
 
 
-@pytest.mark.check
+@pytest.mark.long
 @pytest.mark.parametrize("name", SENSOR_SIDE)
 def test_a_deviation_of_a_channel_leaves_all_others_as_they_were(name):
     with_it, without = drawn(name, 3)
@@ -167,7 +167,7 @@ def test_a_deviation_of_a_channel_leaves_all_others_as_they_were(name):
     assert differing <= allowed
 
 
-@pytest.mark.check
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["sump_area_profile", "unmetered_inflow", "control_delay", "threshold_shift"])
 def test_what_moves_the_level_leaves_the_curves_alone(name):
     with_it, without = drawn(name, 4)

@@ -186,7 +186,10 @@ def water_column(frequencies_hz, inertia_s2_m2, wave_s, cells=80):
     return np.array(means_m3h)
 
 
-@pytest.mark.parametrize(("wave_s", "rigid_off_m3h"), [(0.8, 0.3), (3.3, 5.0), (9.0, 20.0)])
+@pytest.mark.parametrize(
+    ("wave_s", "rigid_off_m3h"),
+    [*(pytest.param(*one, marks=pytest.mark.long) for one in [(0.8, 0.3), (3.3, 5.0)]), (9.0, 20.0)],
+)
 def test_waves_in_a_long_main(quiet_alpha, wave_s, rigid_off_m3h):
     """Start, run and stop of a pump; a front comes within a third of a second, and over one of 80 cells."""
     small = quiet_alpha.model_copy(update={"sump": quiet_alpha.sump.model_copy(update={"area_m2": 3.0})})

@@ -70,7 +70,9 @@ def test_the_other_pumps_tell_a_fault_of_one_from_one_of_the_main(alpha, fault, 
     assert severity["value"] == pytest.approx(true_percent, abs=1.0)
 
 
-@pytest.mark.parametrize("has_head", [False, True], ids=["without head", "with head"])
+@pytest.mark.parametrize(
+    "has_head", [False, pytest.param(True, marks=pytest.mark.long)], ids=["without head", "with head"]
+)
 @pytest.mark.parametrize(
     ("fault", "expected"),
     [(BLOCKED, ["normal", "pump_fault"]), (CLOGGED, ["system_fault"] * 2)],

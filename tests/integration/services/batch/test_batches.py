@@ -26,7 +26,7 @@ from wetwell.services.trial.run import run_trial
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
-pytestmark = [pytest.mark.check, pytest.mark.filterwarnings("ignore")]  # of Dask's own threads and sockets
+pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore")]  # of Dask's own threads and sockets
 
 KILL = [0, 0, int(signal.SIGKILL), 0]
 """Signals to raise, of which one ends the process."""

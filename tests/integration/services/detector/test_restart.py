@@ -117,8 +117,7 @@ async def verdicts_of_killed(
     ("seed", "away", "gather"),
     [
         (2, 300, 1),
-        *(pytest.param(*one, marks=pytest.mark.long) for one in [(3, 3_000, 1), (4, 300, 10)]),
-        (5, 3_000, 10),
+        *(pytest.param(*one, marks=pytest.mark.long) for one in [(3, 3_000, 1), (4, 300, 10), (5, 3_000, 10)]),
     ],
 )
 def test_verdicts_after_kills_are_those_without(alpha, samples, undisturbed, tmp_path, seed, away, gather):

@@ -31,7 +31,7 @@ from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
 pytestmark = [
-    pytest.mark.check,
+    pytest.mark.long,
     pytest.mark.filterwarnings("ignore"),  # of Dask's own threads and sockets at a kill
 ]
 

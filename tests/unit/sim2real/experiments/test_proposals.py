@@ -34,6 +34,7 @@ def found(alpha):
     return proposals_of(alpha, ALIKE, CONDITIONS)
 
 
+@pytest.mark.long
 def test_wear_is_told_from_slip_where_the_torque_differs_and_not_by_more_of_the_same(found):
     bits = {one.act.name: one.information_bits for one in found.best}
     by_torque = max(bits["pump_1_valve_shut"], bits["pump_1_at_70"])

@@ -39,6 +39,7 @@ def test_without_head_at_one_duty_point_lift_friction_wear_and_slip_are_one(alph
     assert not found["head_sensor_offset"].is_visible
 
 
+@pytest.mark.long
 def test_flow_and_head_tell_the_pump_from_the_main_and_from_both_meters(alpha):
     found = told(alpha, "flow", "head")
     pump, main = {"pump_wear", "motor_slip"}, {"friction_bias", "static_head_bias"}
