@@ -4,7 +4,7 @@ import math
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled, inlined
-from wetwell.protocols.quantities import FLOW, HEAD, LEVEL, POWER
+from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, LEVEL, POWER
 from wetwell.simulator.corrections.parts import FLOW_READING, HEAD_READING, LEVEL_READING
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.kernel import move_plant
@@ -65,21 +65,25 @@ def replay_seconds(
         Out: what the level sensor would read in each second, the rest of its delay included, before it is known what
         it read.
     reading : (3, pumps, n) array
-        Out: flow, head and power as the sensors would read them without noise and delay.
+        Out: flow, head and power as the sensors would read them without noise and delay; to come as zeros.
     """
     now, sensor = state.station[0], plant.sensors[LEVEL]
     extra_m3h = 0.0
     came_m = filtered_m = sensed_m = level_at_volume_m(now.volume_m3, plant.profile)
     share = sensor.delay_s - int(sensor.delay_s)
+    was_moving, is_damped = True, _is_damped(plant)
     for second in range(forcing.inflow_m3h.size):
         for i in range(state.pumps.size):
             state.pumps[i].frequency_hz = frequency_hz[i, second]
-            truth.flow_m3h[i, 0] = truth.head_m[i, 0] = truth.power_kw[i, 0] = 0.0
+        if was_moving:
+            truth.flow_m3h[:] = truth.head_m[:] = truth.power_kw[:] = 0.0
         coming = 0.0 if is_inlet_shut[second] else 1.0
-        move_plant(plant, state, forcing, second, coming * extra_m3h, truth, 0)
+        is_moving = move_plant(plant, state, forcing, second, coming * extra_m3h, truth, 0)
         true_m = truth.level_m[0]
         misread_m = state.correction[LEVEL_READING, 0]
-        _read(plant, state, damped, second, truth, reading)
+        if is_moving or was_moving or is_damped:
+            _read(plant, state, damped, is_damped, second, truth, reading)
+        was_moving = is_moving
 
         last_m, before_m, begun_m = came_m, filtered_m, sensed_m
         came_m = true_m + misread_m
@@ -110,10 +114,29 @@ def replay_seconds(
 
 
 @inlined
-def _read(plant: PlantRecords, state: PlantState, damped: Floats, second: int, truth: Truth, reading: Floats) -> None:
+def _is_damped(plant: PlantRecords) -> bool:
+    """Whether any sensor of a pump tells of its running after that."""
+    for channel in range(FIRST_PUMP, plant.sensors.size):
+        if plant.sensors[channel].followed < 1.0:
+            return True
+    return False
+
+
+@inlined
+def _read(
+    plant: PlantRecords,
+    state: PlantState,
+    damped: Floats,
+    is_damped: bool,
+    second: int,
+    truth: Truth,
+    reading: Floats,
+) -> None:
     """Read flow, head and power of each pump as its sensors do: damping, gain, offset, cutoff."""
     for i in range(state.pumps.size):
         is_active = state.pumps[i].frequency_hz > 0.0 or state.mean_flow_m3h[i] > 0.0
+        if not is_active and not is_damped:
+            continue
         head_m = truth.head_m[i, 0]
         head_m += state.correction[HEAD_READING, i] if head_m > 0.0 else 0.0
         flow_m3h = truth.flow_m3h[i, 0] * (1.0 + state.correction[FLOW_READING, i])
@@ -128,7 +151,6 @@ def _read(plant: PlantRecords, state: PlantState, damped: Floats, second: int, t
                     value = damped[1, k, i] = follow_again(damped[1, k, i], before, last, came, sensor)
                 damped[2, k, i] = came
                 is_seen = is_active or value > RESTING
-            reading[k, i, second] = 0.0
             if is_seen:
                 value = sensor.gain * value + sensor.offset
                 if value >= sensor.cutoff:

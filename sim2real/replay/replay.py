@@ -239,7 +239,7 @@ class Replay:
         first = observer.level_m[known[:FIRST]]  # a single value may be wrong
         first_level_m = float(np.median(first)) if known.size else self.station.middle_level_m
         level_m = np.empty(traces.seconds)
-        reading = np.empty((len(PUMP_METERS), pumps, traces.seconds))
+        reading = np.zeros((len(PUMP_METERS), pumps, traces.seconds))
         replay_seconds(
             records,
             first_state(plant, max(first_level_m, plant.profile["level_m"][0])),
