@@ -6,7 +6,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import Block, Cells
-from wetwell.sim2real.likelihood.marginal import eliminated
+from wetwell.sim2real.likelihood.marginal import alike, eliminated
 
 OFFSET = 0.3
 """Standard deviation of the error of a good model, over what is allowed: in a block, and in a span of time. [1]"""
@@ -165,8 +165,9 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     log_det = float(np.sum(np.log(variance)))
     for i, (_, of_block, of_span, of_group) in enumerate(parts):
         place = slice(i * groups, (i + 1) * groups)
-        joint[place, place], log_volume = _alike(block.span, of_block, of_span, of_group)
-        log_det += log_volume
+        own_of_span, own_of_group = (np.broadcast_to(one, block.span.shape) for one in (of_span, of_group))
+        room = np.zeros((3, groups))
+        log_det += alike(block.span, of_block, own_of_span, own_of_group, room, joint[place, place])
     log_det += eliminated(
         np.ascontiguousarray(columns),
         1.0 / variance,
@@ -179,15 +180,3 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     )
     left = np.triu(joint[unknown:, unknown:])
     return np.asarray(left + np.triu(left, 1).T, dtype=np.float64), log_det
-
-
-def _alike(span: Integers, of_block: float, of_span: float | Floats, own: float | Floats) -> tuple[Floats, float]:
-    """Inverse and log determinant of the covariance of groups: alike in a block, in a span, each by itself."""
-    alone = np.broadcast_to(1.0 / np.square(own), span.shape)
-    shared = alone * of_span
-    excess = 1.0 + np.bincount(span, shared * of_span)
-    inverse = np.diag(alone) - np.outer(shared, shared) * (span[:, None] == span[None, :]) / excess[span]
-    summed = inverse.sum(axis=1)
-    further = 1.0 + of_block**2 * float(summed.sum())
-    inverse -= np.outer(summed, summed) * (of_block**2 / further)
-    return inverse, float(np.sum(np.log(excess)) - np.sum(np.log(alone)) + np.log(further))

@@ -13,7 +13,7 @@ from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Allowance, Form, no_form, projected
 from wetwell.sim2real.likelihood.jumps import jumping
 from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
-from wetwell.sim2real.likelihood.ways import RIGHT, Ways, likeliest
+from wetwell.sim2real.likelihood.ways import RIGHT, Seen, Ways
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -214,7 +214,7 @@ def cell_weights(found: Evidence, form: Form) -> Weights:
     blocks = []
     for one in found.stirred:
         left, its = found.residuals[one.block.rows], form.chosen(one.block.rows)
-        blocks.append((one.block, its, _under(one.block, left[:, None], left, its, one.swing, RIGHT)[2]))
+        blocks.append((one.block, its, _under(Seen(one.block, left, its, one.swing), left[:, None], RIGHT)[2]))
     return Weights(blocks=tuple(blocks))
 
 
@@ -250,7 +250,7 @@ def weighed(
     rained = [_rained_on(replace(block, surge=surge), residuals) for surge in block.surges]
     for still, swing in product(rained, SWINGS if np.any(form.swinging) else SWINGS[:1]):
         one = replace(still, swing=swing)
-        log, products = under(one.block, columns, residuals, form, swing, ways)
+        log, products = under(Seen(one.block, residuals, form, swing), columns, ways)
         tried.append((one.log_rain + log, products, one))
     totals = np.array([log - 0.5 * float(products[0, 0]) for log, products, _ in tried])
     best = int(np.argmax(totals))
@@ -259,29 +259,26 @@ def weighed(
     return log + unsure, products, stirred
 
 
-def under(
-    block: Block, columns: Floats, residuals: Floats, form: Form, swing: float, ways: Ways
-) -> tuple[float, Floats]:
+def under(seen: Seen, columns: Floats, ways: Ways) -> tuple[float, Floats]:
     """Logarithm of volume and of what not knowing the ways adds, and products of columns, under the likeliest ways.
 
     Parameters
     ----------
-    block, columns, residuals, form, ways
-        As of `weighed`; the first column is what is left.
-    swing : float
-        Of `SWINGS`.
+    seen : Seen
+    columns : (k, n) array
+        Of which products are made; the first is what is left.
+    ways : Ways
+        What may be wrong.
     """
-    log, products, _ = _under(block, columns, residuals, form, swing, ways)
+    log, products, _ = _under(seen, columns, ways)
     return log, products
 
 
-def _under(
-    block: Block, columns: Floats, residuals: Floats, form: Form, swing: float, ways: Ways
-) -> tuple[float, Floats, Allowance]:
+def _under(seen: Seen, columns: Floats, ways: Ways) -> tuple[float, Floats, Allowance]:
     """The same with what these ways allow."""
     found = []
-    for log_prior, allowance in likeliest(block, residuals, form, swing, ways):
-        products, log_det = projected(block, columns, form, allowance)
+    for log_prior, allowance in seen.likeliest(ways):
+        products, log_det = projected(seen.block, columns, seen.form, allowance)
         found.append((log_prior - 0.5 * log_det, products, allowance))
     return max(found, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
 

@@ -3,11 +3,10 @@
 import numpy as np
 from scipy.special import logsumexp
 
-from wetwell.protocols.arrays import Floats
-from wetwell.sim2real.likelihood.cells import TIMES, Block
+from wetwell.sim2real.likelihood.cells import TIMES
 from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form
 from wetwell.sim2real.likelihood.evidence import Evidence, Stirred, under
-from wetwell.sim2real.likelihood.ways import RIGHT, Way, Ways
+from wetwell.sim2real.likelihood.ways import RIGHT, Seen, Way, Ways
 
 SCALES = TIMES[1:]
 """Times what is allowed that something unknown may be in a block, each as likely."""
@@ -41,22 +40,20 @@ def flexible_factor(found: Evidence, form: Form) -> float:
     """
     total = 0.0
     for one in found.stirred:
-        rows = one.block.rows
-        known, *unknown = (
-            _log(one, found.residuals[rows], form.chosen(rows), ways) for ways in (RIGHT, *UNKNOWN_WAYS)
-        )
+        left, its = found.residuals[one.block.rows], form.chosen(one.block.rows)
+        wet = Seen(one.block, left, its, one.swing)
+        dry = None if one.dry is None else Seen(one.dry, left, its, one.swing)
+        known, *unknown = (_log(one, wet, dry, ways) for ways in (RIGHT, *UNKNOWN_WAYS))
         total += float(np.logaddexp(0.0, logsumexp(unknown) - np.log(len(unknown)) - known) - np.log(2.0))
     return total
 
 
-def _log(one: Stirred, residuals: Floats, form: Form, ways: Ways) -> float:
+def _log(one: Stirred, wet: Seen, dry: Seen | None, ways: Ways) -> float:
     """Logarithm of the probability of the residuals of a block, its surge and swing as they are, with rain or dry."""
-    wet = one.log_rain + _of_block(one.block, one.swing, residuals, form, ways)
-    if one.dry is None:
-        return wet
-    return float(np.logaddexp(wet, one.log_dry + _of_block(one.dry, one.swing, residuals, form, ways)))
+    log = one.log_rain + _of_block(wet, ways)
+    return log if dry is None else float(np.logaddexp(log, one.log_dry + _of_block(dry, ways)))
 
 
-def _of_block(block: Block, swing: float, residuals: Floats, form: Form, ways: Ways) -> float:
-    log, products = under(block, residuals[:, None], residuals, form, swing, ways)
+def _of_block(seen: Seen, ways: Ways) -> float:
+    log, products = under(seen, seen.residuals[:, None], ways)
     return log - 0.5 * float(products[0, 0])

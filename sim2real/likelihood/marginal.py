@@ -66,6 +66,57 @@ def eliminated(
     return log_det
 
 
+@compiled
+def alike(span: Integers, of_block: float, of_span: Floats, own: Floats, room: Floats, inverse: Floats) -> float:
+    r"""Invert the covariance of groups that are off alike in a block, alike in a span, and each by itself.
+
+    $$C = b^2 1 1^T + \sum_{\text{spans}} s s^T + \operatorname{diag}(g^2)$$
+
+    by Woodbury's identity, once for each span and once for the block.
+
+    Parameters
+    ----------
+    span : (groups,) array
+        Numbers from 0.
+    of_block : float
+        b, standard deviation of what all groups share.
+    of_span, own : (groups,) arrays
+        s and g.
+    room : (3, groups) array
+        To come as zeros.
+    inverse : (groups, groups) array
+        Out.
+
+    Returns
+    -------
+    log_determinant : float
+        Of C.
+    """
+    alone, summed, excess = room[0], room[1], room[2]
+    groups = span.size
+    log_det = 0.0
+    for i in range(groups):
+        alone[i] = 1.0 / own[i] ** 2
+        excess[span[i]] += alone[i] * of_span[i] ** 2
+        log_det -= math.log(alone[i])
+    total = 0.0
+    for i in range(groups):
+        log_det += math.log(1.0 + excess[i])  # of spans that there are not it is 0
+        for j in range(groups):
+            inverse[i, j] = 0.0
+            if span[i] == span[j]:
+                inverse[i, j] = -alone[i] * of_span[i] * alone[j] * of_span[j] / (1.0 + excess[span[i]])
+        inverse[i, i] += alone[i]
+        for j in range(groups):
+            summed[i] += inverse[i, j]
+        total += summed[i]
+    further = 1.0 + of_block**2 * total
+    for i in range(groups):
+        for j in range(groups):
+            inverse[i, j] -= of_block**2 / further * summed[i] * summed[j]
+    return log_det + math.log(further)
+
+
 @inlined
 def _add_cells(
     columns: Floats,

@@ -70,10 +70,8 @@ KNOWN, RIGHT = Ways(), Ways(may_be_prone=True)
 """Of a right model."""
 
 
-def likeliest(block: Block, residuals: Floats, form: Form, swing: float, ways: Ways) -> list[tuple[float, Allowance]]:
-    """What may be wrong, most probably, by the means of groups and their scatter over the cycles.
-
-    A cell counts by its variance in both: what moves much from cycle to cycle says little of what all have alike.
+class Seen:
+    """What the residuals of a block show of what is wrong in it, whatever ways there are.
 
     Parameters
     ----------
@@ -83,68 +81,93 @@ def likeliest(block: Block, residuals: Floats, form: Form, swing: float, ways: W
         Of the block's cells.
     swing : float
         Of `SWINGS`.
-    ways : Ways
-
-    Returns
-    -------
-    found : list of (float, Allowance)
-        What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow; the
-        second, if there is one, where all spans are poor.
     """
-    counts = block.group_sums(np.ones(residuals.size))
-    allowed, signature, late = (
-        block.group_sums(one**2) / counts for one in (block.allowed, form.signature, form.late)
-    )
-    fixed = block.group_means(form.fixed)
-    noise = block.variance + block.surge * block.of_inflow + (swing * form.swinging) ** 2
-    precision, means, logs = np.zeros((3, len(ways.changing), counts.size))
-    scatter_of(
-        residuals,
-        noise,
-        block.allowed,
-        np.array([of_form(one.errors.form, form.fixed) * form.signature for one in ways.changing]),
-        block.group,
-        np.array([one.errors.offset for one in ways.changing]),
-        precision,
-        means,
-        logs,
-    )
-    changing, log_prior = _chosen(logs, ways.changing)
-    mean, of_mean = _picked(means, changing), 1.0 / _picked(precision, changing)
 
-    def variances(of: Sequence[Way]) -> Floats:
+    def __init__(self, block: Block, residuals: Floats, form: Form, swing: float) -> None:
+        self.block, self.residuals, self.form, self.swing = block, residuals, form, swing
+        counts = block.group_sums(np.ones(residuals.size))
+        self._allowed, self._signature, self._late = (
+            block.group_sums(one**2) / counts for one in (block.allowed, form.signature, form.late)
+        )
+        self._fixed = block.group_means(form.fixed)
+        self._spans = np.bincount(block.span)
+        self._scattered: dict[tuple[Way, ...], tuple[Integers, float, Floats, Floats]] = {}
+
+    def likeliest(self, ways: Ways) -> list[tuple[float, Allowance]]:
+        """What may be wrong, most probably, by the means of groups and their scatter over the cycles.
+
+        A cell counts by its variance in both: what moves much from cycle to cycle says little of what all have alike.
+
+        Parameters
+        ----------
+        ways : Ways
+
+        Returns
+        -------
+        found : list of (float, Allowance)
+            What not knowing the ways adds to the logarithm of the probability, and what those that were chosen allow;
+            the second, if there is one, where all spans are poor.
+        """
+        span_of, spans = self.block.span, self._spans
+        changing, log_prior, mean, of_mean = self._changing(tuple(ways.changing))
+        own_variances = self._variances(ways.own)
+        apart = of_mean + (LATE[2] ** 2) * self._late + own_variances
+        weight = 1.0 / (of_mean + own_variances[-1])
+        middle = np.bincount(span_of, weight * mean) / np.bincount(span_of, weight)
+        freedom = (1.0 - 1.0 / spans)[span_of]
+        away = (mean - middle[span_of]) ** 2
+        own, prior = _chosen(-0.5 * (freedom * np.log(apart) + away / apart), ways.own)
+        log_prior += prior
+
+        left = np.bincount(span_of, _picked(apart, own)) / spans**2 + np.bincount(span_of, self._late) / spans
+        alike = left + np.array([np.bincount(span_of, one) / spans for one in self._variances(ways.span)])
+        span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span)
+        chosen = [(log_prior + prior, span)]
+        if ways.may_be_prone and not span.all():
+            prone = np.log(POORLY) + spans.size * np.log1p(-POORLY)
+            chosen.append((log_prior + prone, np.ones_like(span)))
+        return [
+            (
+                log,
+                Allowance(
+                    span=_errors(ways.span, of_span[span_of]),
+                    own=_errors(ways.own, own),
+                    changing=_errors(ways.changing, changing[self.block.group]),
+                    swing=self.swing,
+                ),
+            )
+            for log, of_span in chosen
+        ]
+
+    def _changing(self, ways: tuple[Way, ...]) -> tuple[Integers, float, Floats, Floats]:
+        """What changes between cycles in each group, what not knowing it adds, and means with their variances."""
+        if ways not in self._scattered:
+            block, form = self.block, self.form
+            precision, means, logs = np.zeros((3, len(ways), self._fixed.size))
+            scatter_of(
+                self.residuals,
+                block.variance + block.surge * block.of_inflow + (self.swing * form.swinging) ** 2,
+                block.allowed,
+                np.array([of_form(one.errors.form, form.fixed) * form.signature for one in ways]),
+                block.group,
+                np.array([one.errors.offset for one in ways]),
+                precision,
+                means,
+                logs,
+            )
+            changing, log_prior = _chosen(logs, ways)
+            mean, of_mean = _picked(means, changing), 1.0 / _picked(precision, changing)
+            self._scattered[ways] = changing, log_prior, mean, of_mean
+        return self._scattered[ways]
+
+    def _variances(self, ways: Sequence[Way]) -> Floats:
+        """(ways, groups) variances of what groups may be off."""
         return np.array(
-            [one.errors.offset**2 * allowed + of_form(one.errors.form, fixed) ** 2 * signature for one in of]
+            [
+                one.errors.offset**2 * self._allowed + of_form(one.errors.form, self._fixed) ** 2 * self._signature
+                for one in ways
+            ]
         )
-
-    spans = np.bincount(block.span)
-    apart = of_mean + (LATE[2] ** 2) * late + variances(ways.own)
-    weight = 1.0 / (of_mean + variances(ways.own)[-1])
-    middle = np.bincount(block.span, weight * mean) / np.bincount(block.span, weight)
-    freedom = (1.0 - 1.0 / spans)[block.span]
-    away = (mean - middle[block.span]) ** 2
-    own, prior = _chosen(-0.5 * (freedom * np.log(apart) + away / apart), ways.own)
-    log_prior += prior
-
-    left = np.bincount(block.span, _picked(apart, own)) / spans**2 + np.bincount(block.span, late) / spans
-    alike = left + np.array([np.bincount(block.span, one) / spans for one in variances(ways.span)])
-    span, prior = _chosen(-0.5 * (np.log(alike) + middle**2 / alike), ways.span)
-    chosen = [(log_prior + prior, span)]
-    if ways.may_be_prone and not span.all():
-        prone = np.log(POORLY) + spans.size * np.log1p(-POORLY)
-        chosen.append((log_prior + prone, np.ones_like(span)))
-    return [
-        (
-            log,
-            Allowance(
-                span=_errors(ways.span, of_span[block.span]),
-                own=_errors(ways.own, own),
-                changing=_errors(ways.changing, changing[block.group]),
-                swing=swing,
-            ),
-        )
-        for log, of_span in chosen
-    ]
 
 
 def _chosen(logs: Floats, ways: Sequence[Way]) -> tuple[Integers, float]:
