@@ -134,9 +134,11 @@ def diagnose_rows(
             each=pool.map,
             priors=EVEN if prior is None else prior.priors,
         )
+        closed_loop = pool.submit(_closed_loop, longest, station, diagnosis.station)
+        detector = pool.submit(_detector, longest, station, diagnosis.station)
         report = diagnosis.report(
-            _closed_loop(longest, station, diagnosis.station),
-            _detector(longest, station, diagnosis.station),
+            closed_loop.result(),
+            detector.result(),
             tuple(note for _, preparation in rows for note in _notes(preparation, diagnosis.traces.rate_s)),
             0 if prior is None else prior.stations,
             each=pool.map,
