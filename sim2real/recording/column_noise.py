@@ -1,16 +1,11 @@
 """Errors of a user's column: how large they are, and the column without them."""
 
-from collections.abc import Callable
-
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from wetwell.protocols.arrays import Floats, Integers
+from wetwell.sim2real.recording.random_walk import gain_of_least, likeliest_gain, smoothed, surprise
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.simulator.corrections.parts import Column
-
-SLOWEST_GAIN = 1e-4
-"""Gain of a filter that hardly believes a new value: it looks back for some ten thousand of them. [1]"""
 
 
 def noise_of(traces: Traces, name: str) -> float:
@@ -31,8 +26,8 @@ def noise_of(traces: Traces, name: str) -> float:
     values = _values(course[traces.is_row & np.isfinite(course)])[0]
     if values.size < 3 or np.ptp(values) == 0.0:
         return 0.0
-    gain = _best(lambda gain: float(np.log(_surprise(values, gain))))
-    return float(np.sqrt((1.0 - gain) * _surprise(values, gain)))
+    gain = likeliest_gain(values)
+    return float(np.sqrt((1.0 - gain) * surprise(values, gain)))
 
 
 def course_of(traces: Traces, column: Column) -> Floats:
@@ -55,13 +50,9 @@ def course_of(traces: Traces, column: Column) -> Floats:
         return course
 
     def unlikely(gain: float) -> float:
-        return (1.0 - gain) * _surprise(values, gain) / column.noise**2 - float(np.log(1.0 - gain))
+        return (1.0 - gain) * surprise(values, gain) / column.noise**2 - float(np.log(1.0 - gain))
 
-    from scipy.signal import filtfilt  # noqa: PLC0415 - takes half a second, and most recordings have no column
-
-    gain = _best(unlikely)
-    ends = min(int(np.ceil(5.0 / gain)), values.size - 1)
-    smooth = filtfilt([gain], [1.0, gain - 1.0], values, padtype="even", padlen=ends)[row_of_value]
+    smooth = smoothed(values, gain_of_least(unlikely))[row_of_value]
     place = np.flatnonzero(known)
     found = np.full(traces.seconds, np.nan)
     if traces.span_s > 1:
@@ -76,19 +67,3 @@ def _values(rows: Floats) -> tuple[Floats, Integers]:
     changes = np.flatnonzero(np.diff(rows))
     stands = max(int(np.median(np.diff(changes))), 1) if changes.size > 1 else 1
     return rows[::stands], np.arange(rows.size) // stands
-
-
-def _surprise(values: Floats, gain: float) -> float:
-    """Mean square of what a filter of that gain did not predict."""
-    from scipy.signal import lfilter  # noqa: PLC0415 - as above
-
-    level, _ = lfilter([gain], [1.0, gain - 1.0], values, zi=[(1.0 - gain) * values[0]])
-    return float(np.mean((values[1:] - level[:-1]) ** 2))
-
-
-def _best(cost: Callable[[float], float]) -> float:
-    """Gain of the least cost."""
-    found = minimize_scalar(
-        lambda log: cost(float(np.exp(log))), bounds=(np.log(SLOWEST_GAIN), -1e-9), method="bounded"
-    )
-    return float(np.exp(found.x))

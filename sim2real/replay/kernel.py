@@ -26,6 +26,7 @@ def replay_seconds(
     level_gain: Floats,
     inflow_gain: Floats,
     sensor_gain: Floats,
+    inflow_kept: float,
     is_inlet_shut: Flags,
     span_s: int,
     truth: Truth,
@@ -36,11 +37,13 @@ def replay_seconds(
 
     The true level is followed by an observer; with gains a second,
 
-    $$A \frac{dL}{dt} = Q_{in} + b - \sum_i Q_i + A\,g\,e, \qquad \frac{db}{dt} = A\,g_b\,e, \qquad e = y - \hat y$$
+    $$A \frac{dL}{dt} = Q_{in} + b - \sum_i Q_i + A\,g\,e, \qquad \frac{db}{dt} = A\,g_b\,e - \frac{b}{T}, \qquad
+    e = y - \hat y$$
 
-    with y the recorded level and ŷ what the level sensor would read, lag included, at that second or as the mean of
-    `span_s` seconds. A late level comes here earlier by the whole seconds of its delay; ŷ has the rest of it, by what
-    the plant moves and not by what was corrected: that has the noise of the sensor.
+    with y the recorded level, ŷ what the level sensor would read, lag included, at that second or as the mean of
+    `span_s` seconds, and $e^{-1/T}$ the share of b that is kept for a second. A late level comes here earlier by the
+    whole seconds of its delay; ŷ has the rest of it, by what the plant moves and not by what was corrected: that has
+    the noise of the sensor.
 
     Parameters
     ----------
@@ -55,6 +58,8 @@ def replay_seconds(
         Shares of the error of a value of the level that move the level, and the inflow over the area. [1, 1/s]
     sensor_gain : (2, n) array
         The same of what the filters of the level sensor hold; of the second 1 begins anew. [1]
+    inflow_kept : float
+        Share of what was given to the inflow that is left after a second. [1]
     is_inlet_shut : (n,) array
         Whether nothing comes in that nobody measures.
     span_s : int
@@ -79,6 +84,7 @@ def replay_seconds(
             truth.flow_m3h[:] = truth.head_m[:] = truth.power_kw[:] = 0.0
         coming = 0.0 if is_inlet_shut[second] else 1.0
         is_moving = move_plant(plant, state, forcing, second, coming * extra_m3h, truth, 0)
+        extra_m3h *= inflow_kept
         true_m = truth.level_m[0]
         misread_m = state.correction[LEVEL_READING, 0]
         if is_moving or was_moving or is_damped:
@@ -116,10 +122,10 @@ def replay_seconds(
 @inlined
 def _is_damped(plant: PlantRecords) -> bool:
     """Whether any sensor of a pump tells of its running after that."""
+    is_damped = False
     for channel in range(FIRST_PUMP, plant.sensors.size):
-        if plant.sensors[channel].followed < 1.0:
-            return True
-    return False
+        is_damped = is_damped or plant.sensors[channel].followed < 1.0
+    return is_damped
 
 
 @inlined

@@ -31,15 +31,18 @@ class Uncertain:
     noise_m2 : float
         Variance of the sensor's noise. [m²]
     drift_m2_s3 : float
-        q, by which the variance of an unknown inflow over the area grows. [m²/s³]
+        q, by which the variance of an unknown inflow over the area grows; of the error of a meter, by which it is
+        renewed as it goes over. [m²/s³]
     waves_m2_s : float
         w, by which the variance of the level grows, of what comes in anew in each second. [m²/s]
     first_m2_s2 : float
         Variance of that inflow before anything is known of it; 0 where it is measured. [m²/s²]
     metered_m2_s2 : float
-        Variance of the mean of a measured inflow over the area between two rows. [m²/s²]
+        Variance of the mean of a measured inflow over the area between two rows, each by itself. [m²/s²]
     lost_s : float
         After that long without a value the filter begins anew. [s]
+    inflow_kept : float
+        Share of the inflow that is not known that is left after a second: all of one without a meter. [1]
     least_gain : float
         Share of an error that is taken away in a second at the least. [1/s]
     keeps_inflow : bool
@@ -55,17 +58,19 @@ class Uncertain:
     metered_m2_s2: float
     lost_s: float
     least_gain: float
+    inflow_kept: float = 1.0
     keeps_inflow: bool = False
 
 
 def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats, Floats]:
     r"""Gains of the filter, and the variances of its errors.
 
-    $$x = (L, b, s_1, s_2)^T, \qquad L' = L + b, \qquad s_1' = (f - l) L' + l L + (1 - f)\, s_1, \qquad y = s_2 + v$$
+    $$x = (L, b, s_1, s_2)^T, \qquad L' = L + b, \qquad b' = \kappa b, \qquad s_1' = (f - l) L' + l L + (1 - f)\, s_1,
+    \qquad y = s_2 + v$$
 
-    with L the level, b the inflow that is not known over the area, and $s_1$, $s_2$ what the filters of the sensor
-    hold after a second; $s_2 = s_1$ where it has one, and L where it has none. The inflow wanders with q, and w of it
-    is of a second only:
+    with L the level, b the inflow that is not known over the area, of which κ is left after a second, and $s_1$,
+    $s_2$ what the filters of the sensor hold after a second; $s_2 = s_1$ where it has one, and L where it has none.
+    The inflow wanders with q, and w of it is of a second only:
 
     $$P \leftarrow F P F^T + G \begin{pmatrix} w + q/3 & q/2 \\ q/2 & q \end{pmatrix} G^T, \qquad
     K = \frac{P h}{h^T P h + \sigma^2}, \qquad P \leftarrow (I - K h^T) P (I - K h^T)^T + \sigma^2 K K^T$$
@@ -88,6 +93,7 @@ def level_filter(uncertain: Uncertain, sensor: SensorParameters) -> tuple[Floats
     Kalman, R. E.: A new approach to linear filtering and prediction problems. J. Basic Eng. 82 (1960) 35-45.
     """
     step, of_level, lag_s = step_of(sensor)
+    step[1, 1] = uncertain.inflow_kept
     seconds = uncertain.is_known.size
     gains, variance_m2 = np.zeros((4, seconds)), np.full(seconds, np.nan)
     _filter(

@@ -11,6 +11,7 @@ from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.inflow_process import InflowProcess
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter, step_of
+from wetwell.sim2real.replay.metered_inflow import MeteredInflow
 from wetwell.simulator.parameters import SensorParameters, plant_parameters
 
 LEVEL_TIME_S = 150.0
@@ -42,6 +43,8 @@ class Observer:
         constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
     process : InflowProcess or None
         From which the gains of a lag come; None where they are constant, or those of a lag.
+    inflow_kept : float
+        Share of what was given to the inflow that is left after a second: errors of its readings go over. [1]
     """
 
     level_m: Floats
@@ -50,6 +53,7 @@ class Observer:
     sensor_gain: Floats
     deviation_m: Floats | None
     process: InflowProcess | None = None
+    inflow_kept: float = 1.0
 
     def of_late_level(self, late_s: int) -> "Observer":
         """The same where a level is recorded so much after it was: its values are taken when they were.
@@ -88,7 +92,9 @@ class Observer:
         r"""What an error of the balance, or of the reading, leaves of itself before each value corrects it.
 
         $$e_k = e_{k-1} + b_{k-1} + g_k, \qquad i_k = e_k + m_k, \qquad
-        e_k \leftarrow e_k - K_k i_k, \quad b_k = b_{k-1} - K_{b,k} i_k$$
+        e_k \leftarrow e_k - K_k i_k, \quad b_k = \kappa b_{k-1} - K_{b,k} i_k$$
+
+        with κ the share of what was given to the inflow that is left after a second.
 
         Parameters
         ----------
@@ -103,7 +109,8 @@ class Observer:
             i; 0 where there is no value. [m]
         """
         left = np.zeros(self.level_m.size)
-        _leave(np.isfinite(self.level_m), self.level_gain, self.inflow_gain, gained_m, misread_m, left)
+        is_known = np.isfinite(self.level_m)
+        _leave(is_known, self.level_gain, self.inflow_gain, self.inflow_kept, gained_m, misread_m, left)
         return left
 
 
@@ -153,7 +160,7 @@ def hides_cycles(traces: Traces, station: Station) -> bool:
     return bool(traces.rate_s * carried_m_s > high_m - low_m)
 
 
-def uncertain_of(traces: Traces, station: Station, level_m: Floats) -> Uncertain:
+def uncertain_of(traces: Traces, station: Station, metered: MeteredInflow | None, level_m: Floats) -> Uncertain:
     r"""What is uncertain of a level in rows, or of one whose inflow is not measured; how that moves is still open.
 
     A switch at a moment that the rows do not show may hide a volume, which is taken from the next row and held
@@ -162,12 +169,13 @@ def uncertain_of(traces: Traces, station: Station, level_m: Floats) -> Uncertain
     $$P_{LL} \leftarrow P_{LL} + \sum_i (Q_i \tau_i / A)^2 / 12$$
 
     with τ the time within which the pump was switched. Q is the flow that the recording shows, or the rated one.
-    A measured inflow leaves no b; its error between rows goes to L.
+    Of a measured inflow, b is the error of its course; what the mean between two rows is off besides goes to L.
 
     Parameters
     ----------
     traces : Traces
     station : Station
+    metered : MeteredInflow or None
     level_m : (n,) array
         Level of the recording, or what of it was sent where only changes are: NaN is "no value".
     """
@@ -176,17 +184,28 @@ def uncertain_of(traces: Traces, station: Station, level_m: Floats) -> Uncertain
     speed_m_s = plant.rated_flow_m3h / 3600.0 / area_m2
     carried_m3h = np.array([_carried_m3h(traces, i, rated) for i, rated in enumerate(plant.rated_flow_m3h)])
     open_m2 = np.sum((carried_m3h[:, None] / 3600.0 / area_m2 * traces.drives.open_s) ** 2, axis=0) / 12.0
-    is_free = traces.inflow_m3h is None
-    return Uncertain(
+    per_m3h = 1.0 / 3600.0 / area_m2
+    uncertain = Uncertain(
         is_known=np.isfinite(level_m),
         open_m2=open_m2,
         noise_m2=level_noise_m(traces, station) ** 2,
         drift_m2_s3=0.0,
         waves_m2_s=0.0,
-        first_m2_s2=(FIRST_SHARE * float(speed_m_s.max())) ** 2 if is_free else 0.0,
-        metered_m2_s2=0.0 if is_free else (inflow_error_m3h(traces) / 3600.0 / area_m2) ** 2,
+        first_m2_s2=(FIRST_SHARE * float(speed_m_s.max())) ** 2,
+        metered_m2_s2=0.0,
         lost_s=max(LOST_S, 2.5 * traces.rate_s),
-        least_gain=0.0 if is_free else 1.0 / LEVEL_TIME_S,
+        least_gain=0.0,
+    )
+    if metered is None:
+        return uncertain
+    error_m2_s2 = (metered.error_m3h * per_m3h) ** 2
+    return replace(
+        uncertain,
+        first_m2_s2=error_m2_s2,
+        drift_m2_s3=error_m2_s2 * (1.0 - metered.kept**2),
+        metered_m2_s2=(metered.between_m3h * per_m3h) ** 2,
+        inflow_kept=metered.kept,
+        least_gain=1.0 / LEVEL_TIME_S,
     )
 
 
@@ -201,7 +220,8 @@ def row_observer(level_m: Floats, process: InflowProcess, sensor: SensorParamete
     sensor : SensorParameters
         Of the level.
     """
-    gains, variance_m2 = level_filter(process.at(step_of(sensor)[2]), sensor)
+    uncertain = process.at(step_of(sensor)[2])
+    gains, variance_m2 = level_filter(uncertain, sensor)
     return Observer(
         level_m=level_m,
         level_gain=gains[0],
@@ -209,6 +229,7 @@ def row_observer(level_m: Floats, process: InflowProcess, sensor: SensorParamete
         sensor_gain=gains[2:],
         deviation_m=np.sqrt(variance_m2),
         process=process,
+        inflow_kept=uncertain.inflow_kept,
     )
 
 
@@ -222,24 +243,23 @@ def _carried_m3h(traces: Traces, pump: int, rated_m3h: float) -> float:
 
 @compiled
 def _leave(
-    is_known: Flags, level_gain: Floats, inflow_gain: Floats, gained_m: Floats, misread_m: Floats, left_m: Floats
+    is_known: Flags,
+    level_gain: Floats,
+    inflow_gain: Floats,
+    inflow_kept: float,
+    gained_m: Floats,
+    misread_m: Floats,
+    left_m: Floats,
 ) -> None:
     """Write what an error of the balance or of the reading leaves before each value."""
     level, inflow = 0.0, 0.0
     for k in range(is_known.size):
         level += inflow + gained_m[k]
+        inflow *= inflow_kept
         if is_known[k]:
             left_m[k] = level + misread_m[k]
             level -= level_gain[k] * left_m[k]
             inflow -= inflow_gain[k] * left_m[k]
-
-
-def inflow_error_m3h(traces: Traces) -> float:
-    """Standard deviation of the mean inflow between two rows, as the bends of the measured one show it. [m³/h]."""
-    if traces.inflow_m3h is None:
-        return 0.0
-    bends = np.diff(traces.inflow_m3h[traces.is_row], n=2)
-    return float(np.median(np.abs(bends))) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
 
 
 def level_noise_m(traces: Traces, station: Station) -> float:

@@ -18,6 +18,7 @@ from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.changing import Acting, Changing, in_period
 from wetwell.sim2real.replay.inflow_process import MOST_SQUARE, InflowProcess, learnt_process
 from wetwell.sim2real.replay.kernel import replay_seconds
+from wetwell.sim2real.replay.metered_inflow import metered_inflow
 from wetwell.sim2real.replay.observer import (
     Observer,
     constant_observer,
@@ -101,7 +102,8 @@ class Replay:
         self.station = station
         self.own = tuple(own)
         self.period = traces.period
-        inflow_m3h = np.zeros(traces.seconds) if traces.inflow_m3h is None else traces.inflow_m3h
+        self._metered = metered_inflow(traces)
+        inflow_m3h = np.zeros(traces.seconds) if self._metered is None else self._metered.course_m3h
         self._forcing = self._healthy(inflow_m3h, None)
         self._courses: dict[Column, Floats] = {}
         self._configured = plant_parameters(station)
@@ -250,6 +252,7 @@ class Replay:
             observer.level_gain,
             observer.inflow_gain,
             observer.sensor_gain,
+            observer.inflow_kept,
             traces.by_hand.is_inlet_shut,
             1 if is_held and traces.span_s > 1 else traces.span_s,
             still_truth(pumps, 1),
@@ -281,7 +284,7 @@ class Replay:
         if traces.inflow_m3h is not None and traces.is_each_second:
             return constant_observer(level_m)
         plant = self._plant(self.own)
-        uncertain, sensor = uncertain_of(traces, station, level_m), plant.sensors[LEVEL]
+        uncertain, sensor = uncertain_of(traces, station, self._metered, level_m), plant.sensors[LEVEL]
         if traces.inflow_m3h is not None:
             return row_observer(level_m, InflowProcess(lags_s=(0.0,), under=(uncertain,)), sensor)
         regime = regimes_of(traces, station).of_station

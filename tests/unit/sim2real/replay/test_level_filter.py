@@ -69,6 +69,18 @@ def test_rows_of_a_minute_are_those_of_the_continuous_model():
     assert np.isnan(variance_m2[~rows]).all()
 
 
+def test_an_error_of_a_meter_that_goes_over_is_followed_as_the_riccati_equation_says():
+    """Against scipy, from second to second."""
+    kept, error = 0.99, 1e-8
+    meter = replace(UNCERTAIN, drift_m2_s3=error * (1.0 - kept**2), first_m2_s2=error, inflow_kept=kept)
+    gains, variance_m2 = level_filter(meter, SENSOR)
+    step = np.array([[1.0, 1.0], [0.0, kept]])
+    wandering = error * (1.0 - kept**2) * np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]) + np.diag([1e-7, 0.0])
+    before = linalg.solve_discrete_are(step.T, np.array([[1.0], [0.0]]), wandering, np.array([[4e-6]]))
+    assert variance_m2[-1] == pytest.approx(before[0, 0] + 4e-6, rel=1e-6)
+    assert gains[:2, -1] == pytest.approx(before[:, 0] / (before[0, 0] + 4e-6), rel=1e-5)
+
+
 def test_a_level_behind_a_lag_is_moved_by_more_than_its_reading():
     gains, _ = level_filter(UNCERTAIN, damped_by(SENSOR, 29.0, 0.0))
     assert gains[0, -1] > gains[3, -1] > 0.0

@@ -11,6 +11,7 @@ from wetwell.sim2real.recording.by_hand import left_alone
 from wetwell.sim2real.recording.drives import Drives
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.inflow_process import InflowProcess
+from wetwell.sim2real.replay.metered_inflow import metered_inflow
 from wetwell.sim2real.replay.observer import (
     constant_observer,
     forced_observer,
@@ -24,7 +25,7 @@ SECONDS = 7200
 
 
 def observer_of(traces, station, **process):
-    uncertain = replace(uncertain_of(traces, station, traces.level_m), **process)
+    uncertain = replace(uncertain_of(traces, station, metered_inflow(traces), traces.level_m), **process)
     process = InflowProcess(lags_s=(0.0,), under=(uncertain,))
     return row_observer(traces.level_m, process, plant_parameters(station).sensors[LEVEL])
 
@@ -97,16 +98,20 @@ def test_where_the_well_is_emptied_between_rows_the_level_is_taken_from_them(alp
     assert np.isinf(observer.deviation_m).all()
 
 
-def test_what_an_error_leaves_follows_from_the_gains():
+@pytest.mark.parametrize("kept", [1.0, 0.9])
+def test_what_an_error_leaves_follows_from_the_gains(kept):
     """Against scipy's state space: gains of each second that do not change."""
     rng = np.random.default_rng(3)
     gain, of_inflow = 0.1, 0.004
     observer = replace(
-        constant_observer(np.ones(400)), level_gain=np.full(400, gain), inflow_gain=np.full(400, of_inflow)
+        constant_observer(np.ones(400)),
+        level_gain=np.full(400, gain),
+        inflow_gain=np.full(400, of_inflow),
+        inflow_kept=kept,
     )
     gained_m, misread_m = rng.normal(size=(2, 400))
     matrices = (
-        np.array([[1.0 - gain, 1.0 - gain], [-of_inflow, 1.0 - of_inflow]]),
+        np.array([[1.0 - gain, 1.0 - gain], [-of_inflow, kept - of_inflow]]),
         np.array([[1.0 - gain, -gain], [-of_inflow, -of_inflow]]),
         np.array([[1.0, 1.0]]),
         np.array([[1.0, 1.0]]),
