@@ -168,7 +168,8 @@ def uncertain_of(traces: Traces, station: Station, metered: MeteredInflow | None
 
     $$P_{LL} \leftarrow P_{LL} + \sum_i (Q_i \tau_i / A)^2 / 12$$
 
-    with τ the time within which the pump was switched. Q is the flow that the recording shows, or the rated one.
+    with τ the time within which the pump was switched: it is as likely in each second since the row before, and a
+    sensor that lags has told of most of it by the next row. Q is the flow that the recording shows, or the rated one.
     Of a measured inflow, b is the error of its course; what the mean between two rows is off besides goes to L.
 
     Parameters
@@ -187,7 +188,7 @@ def uncertain_of(traces: Traces, station: Station, metered: MeteredInflow | None
     per_m3h = 1.0 / 3600.0 / area_m2
     uncertain = Uncertain(
         is_known=np.isfinite(level_m),
-        open_m2=open_m2,
+        open_m2=_since_last_row(open_m2, traces.is_row),
         noise_m2=level_noise_m(traces, station) ** 2,
         drift_m2_s3=0.0,
         waves_m2_s=0.0,
@@ -231,6 +232,20 @@ def row_observer(level_m: Floats, process: InflowProcess, sensor: SensorParamete
         process=process,
         inflow_kept=uncertain.inflow_kept,
     )
+
+
+def _since_last_row(variance_m2: Floats, is_row: Flags) -> Floats:
+    """(n,) variances that stand at rows, evenly over the seconds since the row before each.
+
+    Examples
+    --------
+    >>> _since_last_row(np.array([0.0, 0.0, 0.0, 6.0]), np.array([True, False, False, True]))
+    array([0., 2., 2., 2.])
+    """
+    rows = np.flatnonzero(is_row)
+    spread = np.zeros(variance_m2.size)
+    spread[: rows[-1] + 1] = np.repeat(variance_m2[rows] / np.diff(rows, prepend=-1), np.diff(rows, prepend=-1))
+    return spread
 
 
 def _carried_m3h(traces: Traces, pump: int, rated_m3h: float) -> float:

@@ -113,6 +113,14 @@ def test_friction_is_told_at_every_rate(alpha, every, value, without):
         assert any("friction_bias" in effect.equivalent for effect in told.effects)
 
 
+@pytest.mark.parametrize("without", [(), ("inflow",)])
+def test_a_lag_of_the_level_is_told_in_rows_of_a_minute(alpha, without):
+    recording = stored(record(alpha, [{"name": "level_sensor_lag", "lag_s": 20.0}]), 60, "instant", without)
+    (found,) = diagnose(recording, alpha, only=["level_sensor_lag", "sump_area_profile"]).effects
+    assert found.name == "level_sensor_lag"
+    assert found.parameters["lag_s"].value == pytest.approx(20.0, abs=5.0)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("lag_s", [12.0, 29.0])
 def test_a_lag_of_the_level_is_no_other_effect_where_nobody_measures_the_inflow(alpha, lag_s):

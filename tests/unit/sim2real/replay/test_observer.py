@@ -20,6 +20,7 @@ from wetwell.sim2real.replay.observer import (
     uncertain_of,
 )
 from wetwell.simulator.parameters import plant_parameters
+from wetwell.simulator.telemetry.damping import damped_by
 
 SECONDS = 7200
 
@@ -68,6 +69,14 @@ def test_after_a_start_whose_moment_is_open_the_level_is_taken_from_the_row_and_
     carried_m = 50.0 * 3600.0**-1 / alpha.sump.area_m2
     assert observer.deviation_m[3600] > 10.0 * observer.deviation_m[3540] > 0.1 * carried_m
     assert observer.level_gain[3600] > 0.99 > observer.level_gain[3540]
+
+
+def test_by_the_next_row_a_sensor_that_lags_has_told_of_most_that_a_start_may_hide(alpha, traces):
+    """The level would swing from row to row if it had to be behind a sensor that knew of none of it."""
+    observer = observer_of(traces, alpha)
+    lagging = observer.of_lagging_level(damped_by(plant_parameters(alpha).sensors[LEVEL], 3.0, 0.0))
+    assert lagging.level_gain[3600] == pytest.approx(1.0, abs=0.05)
+    assert lagging.deviation_m[3600] == pytest.approx(observer.deviation_m[3600], rel=0.1)
 
 
 def test_what_a_start_may_hide_goes_by_the_flow_that_is_recorded(alpha, traces):
