@@ -32,17 +32,18 @@ def numbers(least, most):
 def run(station, frequency_hz):
     """(3, pumps, n) flow, head and power of a plant whose drives are driven as they are told."""
     plant, (pumps, seconds) = effective_parameters(station), frequency_hz.shape
-    reading = np.empty((3, pumps, seconds))
+    reading = np.zeros((3, pumps, seconds))
     replay_seconds(
         plant.records(),
         first_state(plant, LEVEL_M),
         healthy_forcing(np.zeros(seconds), pumps, len(station.mains)),
-        np.zeros((2, 3, pumps)),
+        np.zeros((3, 3, pumps)),
         np.ascontiguousarray(frequency_hz),
         np.full(seconds, np.nan),
         np.zeros(seconds),
         np.zeros(seconds),
         np.zeros((2, seconds)),
+        1.0,
         np.zeros(seconds, dtype=bool),
         1,
         still_truth(pumps, 1),
