@@ -36,7 +36,7 @@ class Uncertain:
     waves_m2_s : float
         w, by which the variance of the level grows, of what comes in anew in each second. [m²/s]
     first_m2_s2 : float
-        Variance of that inflow before anything is known of it; 0 where it is measured. [m²/s²]
+        Variance of that inflow before anything is known of it. [m²/s²]
     metered_m2_s2 : float
         Variance of the mean of a measured inflow over the area between two rows, each by itself. [m²/s²]
     lost_s : float
