@@ -9,6 +9,18 @@ GAUSSIAN_MAD = 0.6745
 """Median of what is off, without its sign, over the standard deviation of a normal distribution."""
 
 
+def noise_by_bends(bends: Floats) -> float:
+    """Standard deviation of values about their course, from second differences: few may be large; 0 of none.
+
+    Examples
+    --------
+    >>> values = np.arange(9.0) + 0.5 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+    >>> round(noise_by_bends(np.diff(values, n=2)), 2)
+    1.21
+    """
+    return float(np.median(np.abs(bends)) / GAUSSIAN_MAD / np.sqrt(6.0)) if bends.size else 0.0
+
+
 def filled(values: Floats, longest: int, otherwise: float) -> Floats:
     """Values with NaN replaced by the last one before, for at most `longest` places; else by `otherwise`.
 

@@ -6,10 +6,11 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.recording.random_walk import likeliest_gain, smoothed, surprise
-from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD
+from wetwell.sim2real.recording.seconds import noise_by_bends
 from wetwell.sim2real.recording.traces import Traces
 
 LEAST_ROWS = 3
+"""Under so many rows a course cannot bend: nothing is smoothed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +56,14 @@ def metered_inflow(traces: Traces) -> MeteredInflow | None:
     course = traces.inflow_m3h
     if course is None:
         return None
+    if traces.is_each_second:
+        return MeteredInflow(course_m3h=course, error_m3h=0.0, kept=1.0, between_m3h=0.0)
     rows = np.flatnonzero(traces.is_row)
     values = course[rows]
-    if traces.is_each_second or traces.value == "mean" or values.size < LEAST_ROWS or np.ptp(values) == 0.0:
-        return MeteredInflow(course_m3h=course, error_m3h=0.0, kept=1.0, between_m3h=_bends(values))
+    if traces.value == "mean" or values.size < LEAST_ROWS or np.ptp(values) == 0.0:
+        return MeteredInflow(
+            course_m3h=course, error_m3h=0.0, kept=1.0, between_m3h=noise_by_bends(np.diff(values, n=2))
+        )
     gain = likeliest_gain(values)
     unforeseen = surprise(values, gain)
     return MeteredInflow(
@@ -67,9 +72,3 @@ def metered_inflow(traces: Traces) -> MeteredInflow | None:
         kept=float((1.0 - gain) ** (1.0 / traces.rate_s)),
         between_m3h=float(gain * np.sqrt(unforeseen / 12.0)),
     )
-
-
-def _bends(values: Floats) -> float:
-    """Standard deviation of values about their course, by the bends of that; waves count as errors."""
-    bends = np.diff(values, n=2)
-    return float(np.median(np.abs(bends))) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.seconds import GAUSSIAN_MAD
+from wetwell.sim2real.recording.seconds import noise_by_bends
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.inflow_process import InflowProcess
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter, step_of
@@ -287,6 +287,5 @@ def level_noise_m(traces: Traces, station: Station) -> float:
     bends = np.diff(level_m, n=2)
     if not traces.is_each_second:
         bends = bends[moves[2:] == moves[:-2]]
-    bends = np.abs(bends[np.isfinite(bends)])
-    seen_m = float(np.median(bends)) / GAUSSIAN_MAD / np.sqrt(6.0) if bends.size else 0.0
+    seen_m = noise_by_bends(bends[np.isfinite(bends)])
     return max(seen_m, 0.5 * station.sensors.level_noise_m, MIN_NOISE_M)
