@@ -33,8 +33,12 @@ COST_ALIKE = 1.0
 """Twice the logarithm of the likelihood within which the search ends."""
 LEAST_TOLD = 3.84
 """Twice the logarithm of the likelihood by which a lag must be the less likely one: 95 % of chi-squared."""
+FORGOTTEN = 20.0
+"""Times its lag after which a sensor shows all that was. [1]"""
 MOST_S = 100_000
 """Seconds at rest from which an inflow is learnt: those of the first rests, where there are more."""
+MIN_NOISE_M = 1e-4
+"""Standard deviation of a level sensor at the least: a reading without any noise is rounded. [m]"""
 MOST_SQUARE = 9.0
 """Square of a standardised error beyond which it says no more about how an inflow moves."""
 
@@ -58,9 +62,9 @@ class InflowProcess:
         """What is uncertain under a lag; between two of them the logarithms go straight. [s]."""
         if len(self.lags_s) == 1:
             return self.under[0]
-        logs = np.log([[one.drift_m2_s3, one.waves_m2_s] for one in self.under])
-        drift_m2_s3, waves_m2_s = np.exp([np.interp(lag_s, self.lags_s, each) for each in logs.T])
-        return replace(self.under[0], drift_m2_s3=drift_m2_s3, waves_m2_s=waves_m2_s)
+        logs = np.log([[one.drift_m2_s3, one.waves_m2_s, one.noise_m2] for one in self.under])
+        drift_m2_s3, waves_m2_s, noise_m2 = np.exp([np.interp(lag_s, self.lags_s, each) for each in logs.T])
+        return replace(self.under[0], drift_m2_s3=drift_m2_s3, waves_m2_s=waves_m2_s, noise_m2=noise_m2)
 
 
 def learnt_process(
@@ -79,12 +83,13 @@ def learnt_process(
 
     with the errors $e_k$ of Kalman's filter under lag l, $v_k$ their variance, and a prior of width s that few rests
     do not overrule. Behind a lag, an inflow that is anew in each second looks like a smoother one without. Lags that
-    rests make less likely have no process of their own.
+    rests make less likely have no process of their own. The noise of the sensor is what the bends of the level show,
+    without what the inflow makes of them (`inflow_bends`).
 
     Parameters
     ----------
     uncertain : Uncertain
-        Its process does not count.
+        Its process does not count; its noise is by the bends of the rows.
     level_m : (n,) array
         As measured. [m]
     is_idle, is_settled : (n,) arrays
@@ -103,19 +108,55 @@ def learnt_process(
     idle = np.flatnonzero(is_idle)
     if not np.any(is_settled[idle] & uncertain.is_known[idle]):
         return InflowProcess(lags_s=(0.0,), under=(replace(uncertain, drift_m2_s3=DRIFT * carried_m_s**2),))
-    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s)
+    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, round(rate_s))
     logs, found = np.zeros(2), []
     for lag_s in LAGS_S:
         if lag_s == 0.0 or lag_s >= 0.5 * rate_s:
             lagging = damped_by(sensor, lag_s, 0.0)
             logs, cost = at_rest.likeliest(lagging, logs, ROUGHLY if lag_s == 0.0 else CLOSELY)
-            found.append((cost, step_of(lagging)[2], at_rest.moving(logs)))
+            found.append((cost, step_of(lagging)[2], at_rest.moving(logs, inflow_bends(lagging, at_rest.every_s))))
     least, _, _ = min(found, key=lambda one: one[0])
     likely = [(lag_s, process) for cost, lag_s, process in found if cost <= least + LEAST_TOLD]
     return InflowProcess(
         lags_s=tuple(lag_s for lag_s, _ in likely),
-        under=tuple(replace(uncertain, drift_m2_s3=one.drift_m2_s3, waves_m2_s=one.waves_m2_s) for _, one in likely),
+        under=tuple(
+            replace(uncertain, drift_m2_s3=one.drift_m2_s3, waves_m2_s=one.waves_m2_s, noise_m2=one.noise_m2)
+            for _, one in likely
+        ),
     )
+
+
+def inflow_bends(sensor: SensorParameters, every_s: int) -> Floats:
+    r"""What an inflow makes of the variance that bends of the level show as noise.
+
+    $$\tfrac16 \sum_j d_j^T \begin{pmatrix} w + q/3 & q/2 \\ q/2 & q \end{pmatrix} d_j, \qquad
+    d_j = r_{j + n} - 2 r_j + r_{j - n}, \qquad r_j = h^T F^j G$$
+
+    with what the sensor shows j seconds after the inflow moved, $r_j$, and n seconds from row to row; without a lag
+    it is $w n / 3$ and a little of q. White noise has bends of six times its variance.
+
+    Parameters
+    ----------
+    sensor : SensorParameters
+        Of the level.
+    every_s : int
+        n. [s]
+
+    Returns
+    -------
+    (2,) array
+        Shares of q and w: the noise that they look like, over each. [s³, s]
+    """
+    step, of_level, lag_s = step_of(sensor)
+    before = 2 * every_s
+    shown = np.zeros((2, 2 * before + int(np.ceil(FORGOTTEN * lag_s))))
+    moved = np.column_stack([of_level, [0.0, 1.0, 0.0, 0.0]])
+    for j in range(before, shown.shape[1]):
+        shown[:, j] = moved[3]
+        moved = step @ moved
+    bends = shown[:, before:] - 2.0 * shown[:, every_s:-every_s] + shown[:, :-before]
+    (waves, both), (_, drift) = bends @ bends.T / 6.0
+    return np.array([drift + both + waves / 3.0, waves])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,19 +167,27 @@ class _Rest:
     level_m: Floats
     rows: Flags
     carried_m_s: float
+    every_s: int
 
-    def moving(self, logs: Floats) -> Uncertain:
-        """With a process of the inflow: logarithms of drift and waves, over where the search begins."""
+    def moving(self, logs: Floats, bends: Floats) -> Uncertain:
+        """With a process of the inflow: logarithms of drift and waves, over where the search begins.
+
+        What the process makes of the bends of the level (`inflow_bends`) is no noise of the sensor.
+        """
         drift, wave = np.exp(logs)
+        drift_m2_s3 = DRIFT * drift * self.carried_m_s**2
+        waves_m2_s = (WAVE * wave * self.carried_m_s) ** 2
+        noise_m2 = self.uncertain.noise_m2 - float(bends @ (drift_m2_s3, waves_m2_s))
         return replace(
             self.uncertain,
-            drift_m2_s3=DRIFT * drift * self.carried_m_s**2,
-            waves_m2_s=(WAVE * wave * self.carried_m_s) ** 2,
+            drift_m2_s3=drift_m2_s3,
+            waves_m2_s=waves_m2_s,
+            noise_m2=max(noise_m2, MIN_NOISE_M**2),
         )
 
-    def cost(self, logs: Floats, sensor: SensorParameters) -> float:
+    def cost(self, logs: Floats, sensor: SensorParameters, bends: Floats) -> float:
         """Twice what it takes from the logarithm of the posterior; no error counts for much."""
-        gains, variance_m2 = level_filter(self.moving(logs), sensor)
+        gains, variance_m2 = level_filter(self.moving(logs, bends), sensor)
         error_m = np.full(self.level_m.size, np.nan)
         step, _, lag_s = step_of(sensor)
         _follow(step, lag_s, gains, self.uncertain.is_known, self.level_m, np.zeros((2, 4)), error_m)
@@ -154,7 +203,7 @@ class _Rest:
         found = minimize(
             self.cost,
             first,
-            args=(sensor,),
+            args=(sensor, inflow_bends(sensor, self.every_s)),
             method="Nelder-Mead",
             bounds=LOG_SOUGHT.tolist(),
             options={"initial_simplex": simplex, "xatol": CLOSE, "fatol": COST_ALIKE},
@@ -168,6 +217,7 @@ def _at_rest(
     idle: Integers,
     is_settled: Flags,
     carried_m_s: float,
+    every_s: int,
 ) -> _Rest:
     """Level of the idle seconds; before each rest there is a pause, after which all but the inflow begins anew."""
     rests = np.split(idle, np.flatnonzero(np.diff(idle) > 1) + 1)
@@ -181,6 +231,7 @@ def _at_rest(
         level_m=level_m[place],
         rows=is_known & is_settled[place],
         carried_m_s=carried_m_s,
+        every_s=every_s,
     )
 
 

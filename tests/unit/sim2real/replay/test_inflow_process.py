@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from wetwell.sim2real.replay.inflow_process import DRIFT, MOST_S, learnt_process
+from wetwell.sim2real.recording.seconds import noise_by_bends
+from wetwell.sim2real.replay.inflow_process import DRIFT, MOST_S, inflow_bends, learnt_process
 from wetwell.sim2real.replay.level_filter import Uncertain
 from wetwell.simulator.parameters import SensorParameters
+from wetwell.simulator.telemetry.damping import damped_by
 
 SECONDS = 40_000
 CYCLE_S, REST_S = 1000, 700
@@ -27,10 +29,11 @@ def learnt(lag_s, every_s=1, waves_m2_s=WAVES_M2_S, seconds=SECONDS, seed=4):
         left = np.exp(-1.0 / lag_s)
         level_m = lfilter([1.0 - left], [1.0, -left], level_m)
     level_m = level_m + NOISE_M * rng.standard_normal(seconds)
+    bends_m, rests = np.diff(level_m[::every_s], n=2), is_idle[::every_s]
     uncertain = Uncertain(
         is_known=place % every_s == 0,
         open_m2=np.zeros(seconds),
-        noise_m2=NOISE_M**2,
+        noise_m2=noise_by_bends(bends_m[rests[2:] & rests[:-2]]) ** 2,
         drift_m2_s3=0.0,
         waves_m2_s=0.0,
         first_m2_s2=0.003**2,
@@ -49,6 +52,26 @@ def test_it_is_found_under_the_lag_that_the_sensor_has(lag_s, every_s):
     found = process.at(max(lag_s - 0.5, 0.0))
     assert found.waves_m2_s == pytest.approx(WAVES_M2_S, rel=0.4)
     assert found.drift_m2_s3 == pytest.approx(DRIFT_M2_S3, rel=0.4)
+    assert found.noise_m2 == pytest.approx(NOISE_M**2, rel=0.4)
+
+
+@pytest.mark.parametrize("every_s", [1, 10])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_level_that_does_not_lag_is_never_known_to_lag(every_s, seed):
+    """Waves of the inflow bend the level, too: taken for noise, they would look like what a sensor smooths."""
+    _, process = learnt(0.0, every_s, waves_m2_s=4.0 * WAVES_M2_S, seconds=3 * SECONDS, seed=seed)
+    assert process.lags_s[0] == 0.0
+
+
+@pytest.mark.parametrize(("lag_s", "every_s"), [(0.0, 1), (0.0, 10), (7.0, 10)])
+def test_bends_show_as_noise_what_the_inflow_makes_of_them(lag_s, every_s):
+    rng, step_s = np.random.default_rng(8), 0.1
+    moves = np.sqrt(step_s) * rng.normal(size=1_000_000)
+    left = np.exp(-step_s / lag_s) if lag_s else 0.0
+    shares = inflow_bends(damped_by(SENSOR, lag_s, 0.0), every_s)
+    for level_m, expected in zip((np.cumsum(step_s * np.cumsum(moves)), np.cumsum(moves)), shares, strict=True):
+        shown_m = lfilter([1.0 - left], [1.0, -left], level_m)[:: round(every_s / step_s)]
+        assert np.var(np.diff(shown_m, n=2)) / 6.0 == pytest.approx(expected, rel=0.1)
 
 
 def test_a_lag_that_cannot_be_has_no_process_of_its_own():
@@ -72,7 +95,7 @@ def test_nothing_but_the_process_is_another():
     given, process = learnt(0.0)
     found = process.at(0.0)
     assert found.is_known is given.is_known
-    assert (found.noise_m2, found.first_m2_s2) == (given.noise_m2, given.first_m2_s2)
+    assert (found.first_m2_s2, found.lost_s) == (given.first_m2_s2, given.lost_s)
 
 
 def test_where_nothing_rests_it_is_that_of_the_station():
