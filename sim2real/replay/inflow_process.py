@@ -37,8 +37,6 @@ FORGOTTEN = 20.0
 """Times its lag after which a sensor shows all that was. [1]"""
 MOST_S = 100_000
 """Seconds at rest from which an inflow is learnt: those of the first rests, where there are more."""
-MIN_NOISE_M = 1e-4
-"""Standard deviation of a level sensor at the least: a reading without any noise is rounded. [m]"""
 MOST_SQUARE = 9.0
 """Square of a standardised error beyond which it says no more about how an inflow moves."""
 
@@ -75,6 +73,7 @@ def learnt_process(
     sensor: SensorParameters,
     carried_m_s: float,
     rate_s: float,
+    least_noise_m: float,
 ) -> InflowProcess:
     r"""Likeliest process of the inflow under each lag of the sensor, by the level's errors at rest.
 
@@ -100,6 +99,8 @@ def learnt_process(
         What a pump carries, over the area. [m/s]
     rate_s : float
         From row to row: a lag of less than half of that does not show. [s]
+    least_noise_m : float
+        That a sensor has, however little its bends show: values that are held have none. [m]
 
     References
     ----------
@@ -108,7 +109,7 @@ def learnt_process(
     idle = np.flatnonzero(is_idle)
     if not np.any(is_settled[idle] & uncertain.is_known[idle]):
         return InflowProcess(lags_s=(0.0,), under=(replace(uncertain, drift_m2_s3=DRIFT * carried_m_s**2),))
-    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, round(rate_s))
+    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, round(rate_s), least_noise_m)
     logs, found = np.zeros(2), []
     for lag_s in LAGS_S:
         if lag_s == 0.0 or lag_s >= 0.5 * rate_s:
@@ -168,6 +169,7 @@ class _Rest:
     rows: Flags
     carried_m_s: float
     every_s: int
+    least_noise_m: float
 
     def moving(self, logs: Floats, bends: Floats) -> Uncertain:
         """With a process of the inflow: logarithms of drift and waves, over where the search begins.
@@ -182,7 +184,7 @@ class _Rest:
             self.uncertain,
             drift_m2_s3=drift_m2_s3,
             waves_m2_s=waves_m2_s,
-            noise_m2=max(noise_m2, MIN_NOISE_M**2),
+            noise_m2=max(noise_m2, self.least_noise_m**2),
         )
 
     def cost(self, logs: Floats, sensor: SensorParameters, bends: Floats) -> float:
@@ -218,6 +220,7 @@ def _at_rest(
     is_settled: Flags,
     carried_m_s: float,
     every_s: int,
+    least_noise_m: float,
 ) -> _Rest:
     """Level of the idle seconds; before each rest there is a pause, after which all but the inflow begins anew."""
     rests = np.split(idle, np.flatnonzero(np.diff(idle) > 1) + 1)
@@ -232,6 +235,7 @@ def _at_rest(
         rows=is_known & is_settled[place],
         carried_m_s=carried_m_s,
         every_s=every_s,
+        least_noise_m=least_noise_m,
     )
 
 

@@ -9,7 +9,7 @@ from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.seconds import noise_by_bends
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.inflow_process import MIN_NOISE_M, InflowProcess
+from wetwell.sim2real.replay.inflow_process import InflowProcess
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter, step_of
 from wetwell.sim2real.replay.metered_inflow import MeteredInflow
 from wetwell.simulator.parameters import SensorParameters, plant_parameters
@@ -20,6 +20,8 @@ LOST_S = 300
 """After that long without a level, and more than two rows, the observer begins anew."""
 FIRST_SHARE = 0.5
 """Standard deviation of an inflow before anything is known of it, as a share of what a pump carries."""
+MIN_NOISE_M = 1e-4
+"""Standard deviation of a level sensor at the least: a reading without any noise is rounded. [m]"""
 RANGE = (0.05, 0.95)
 """Quantiles of the level between which the wet well is emptied and filled."""
 
@@ -286,4 +288,9 @@ def level_noise_m(traces: Traces, station: Station) -> float:
     if not traces.is_each_second:
         bends = bends[moves[2:] == moves[:-2]]
     seen_m = noise_by_bends(bends[np.isfinite(bends)])
-    return max(seen_m, 0.5 * station.sensors.level_noise_m, MIN_NOISE_M)
+    return max(seen_m, least_noise_m(station))
+
+
+def least_noise_m(station: Station) -> float:
+    """What a level sensor has at the least, whatever its rows show: half of what the station file says. [m]."""
+    return max(0.5 * station.sensors.level_noise_m, MIN_NOISE_M)

@@ -24,6 +24,7 @@ from wetwell.sim2real.replay.observer import (
     constant_observer,
     forced_observer,
     hides_cycles,
+    least_noise_m,
     row_observer,
     uncertain_of,
 )
@@ -290,7 +291,8 @@ class Replay:
         regime = regimes_of(traces, station).of_station
         settled = uncertain.is_known & _settled(regime)
         carried_m_s = float(np.max(plant.rated_flow_m3h)) / 3600.0 / station.sump.mean_area_m2
-        process = learnt_process(uncertain, level_m, regime == IDLE, settled, sensor, carried_m_s, traces.rate_s)
+        idle, least_m = regime == IDLE, least_noise_m(station)
+        process = learnt_process(uncertain, level_m, idle, settled, sensor, carried_m_s, traces.rate_s, least_m)
         observer = row_observer(level_m, process, sensor)
         return self._widened(observer, plant, settled & np.isin(regime, (IDLE, STEADY, MULTI_PUMP)))
 

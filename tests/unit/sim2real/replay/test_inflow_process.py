@@ -43,7 +43,8 @@ def learnt(lag_s, every_s=1, waves_m2_s=WAVES_M2_S, seconds=SECONDS, seed=4):
     )
     level_m = np.where(uncertain.is_known, level_m, np.nan)
     is_settled = is_idle & (place % CYCLE_S > 0.5 * REST_S)
-    return uncertain, learnt_process(uncertain, level_m, is_idle, is_settled, SENSOR, CARRIED_M_S, float(every_s))
+    process = learnt_process(uncertain, level_m, is_idle, is_settled, SENSOR, CARRIED_M_S, float(every_s), 1e-4)
+    return uncertain, process
 
 
 @pytest.mark.parametrize(("lag_s", "every_s"), [(0.0, 1), (12.0, 1), (30.0, 1), (0.0, 10)])
@@ -101,5 +102,5 @@ def test_nothing_but_the_process_is_another():
 def test_where_nothing_rests_it_is_that_of_the_station():
     given, _ = learnt(0.0, seconds=2000)
     never = np.zeros(2000, dtype=bool)
-    found = learnt_process(given, np.ones(2000), never, never, SENSOR, CARRIED_M_S, 1.0).at(0.0)
+    found = learnt_process(given, np.ones(2000), never, never, SENSOR, CARRIED_M_S, 1.0, 1e-4).at(0.0)
     assert (found.drift_m2_s3, found.waves_m2_s) == (DRIFT * CARRIED_M_S**2, 0.0)
