@@ -162,7 +162,8 @@ def _step(precision: Floats, slope: Floats) -> Floats:
     """To the most probable parameters, within `TRUSTED` of the fit."""
     if slope.size == 0:
         return np.zeros(0)
-    return np.asarray(-solve(precision + np.eye(slope.size) * TRUSTED**-2, slope, assume_a="pos"), dtype=np.float64)
+    step = -solve(precision + np.eye(slope.size) * TRUSTED**-2, slope, assume_a="pos")
+    return np.asarray(step * min(1.0, TRUSTED / max(float(np.abs(step).max()), TRUSTED)), dtype=np.float64)
 
 
 def _partly(neutral: Mapping[int, float]) -> list[dict[int, float]]:

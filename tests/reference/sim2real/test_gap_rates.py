@@ -92,9 +92,16 @@ def test_without_a_gap_nobody_is_blamed(alpha, plain, every, value, without):
     assert (report.rate_s, report.value) == (float(every), value)
 
 
+def test_an_inflow_that_is_another_in_each_second_is_no_lag_of_the_level(alpha):
+    """Slopes at a lag of .3 s promise much at 5 s, which is not there."""
+    report = diagnose(stored(record(alpha, seed=24), 1, without=("inflow",)), alpha).report()
+    assert (report.verdict, report.effects) == ("none", ())
+
+
 @pytest.mark.parametrize(
     ("every", "value", "without"),
     [
+        pytest.param(1, "instant", ("inflow",), marks=pytest.mark.long),
         pytest.param(10, "instant", ("inflow",), marks=pytest.mark.long),
         pytest.param(60, "instant", (), marks=pytest.mark.long),
         pytest.param(60, "mean", ("inflow",), marks=pytest.mark.long),

@@ -21,7 +21,7 @@ from wetwell.sim2real.likelihood.covariance import (
     no_form,
     projected,
 )
-from wetwell.sim2real.likelihood.evidence import Member, cell_weights, evidence, evidence_of_none
+from wetwell.sim2real.likelihood.evidence import TRUSTED, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
@@ -232,6 +232,17 @@ def test_a_parameter_is_integrated_over_its_range(cells):
     inner = np.exp(logs - logs[best])
     variance = float(np.sum(inner * (grid - grid[best]) ** 2) / inner.sum())
     assert 1.0 / found.precision[0, 0] == pytest.approx(variance, rel=0.2)
+
+
+@pytest.mark.parametrize("away", [0.3, 0.02, 0.004])
+def test_no_fit_is_weighed_further_away_than_its_slopes_hold(cells, away):
+    """However steep they are: a lag of .3 s was once weighed where slopes put it at 5 s."""
+    rng = np.random.default_rng(21)
+    slopes = 1e4 * rng.normal(size=(cells.group.size, 2)) * cells.allowed[:, None]
+    residuals = np.sqrt(cells.variance) * rng.normal(size=cells.group.size) - slopes @ (away, 0.1 * away)
+    found = evidence(cells, residuals, slopes, no_form(cells))
+    assert np.abs(found.step).max() == pytest.approx(min(away, TRUSTED), rel=0.05)
+    np.testing.assert_allclose(found.residuals, residuals + slopes @ found.step)
 
 
 def test_what_needs_an_effect_that_goes_straight_is_its_distance_from_neutral(cells):
