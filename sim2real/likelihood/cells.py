@@ -1,6 +1,6 @@
 """What the likelihood is of: the mean of the residuals of a group in a cycle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,6 +83,23 @@ class Block:
     span: Integers
     surge: float | Floats = 0.0
     jumps: Jumps | None = None
+
+    def only(self, kept: Flags) -> "Block":
+        """Some of its (k,) cells."""
+        groups, group = np.unique(self.group[kept], return_inverse=True)
+        cycles, cycle = np.unique(self.cycle[kept], return_inverse=True)
+        return replace(
+            self,
+            rows=self.rows[kept],
+            group=group,
+            cycle=cycle,
+            variance=self.variance[kept],
+            allowed=self.allowed[kept],
+            of_inflow=self.of_inflow[kept],
+            in_storm=self.in_storm[cycles],
+            span=np.unique(self.span[groups], return_inverse=True)[1],
+            surge=np.broadcast_to(self.surge, self.rows.shape)[kept],
+        )
 
     def group_sums(self, values: Floats) -> Floats:
         """(groups, ...) sums of (k, ...) values."""

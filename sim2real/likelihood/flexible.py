@@ -10,7 +10,11 @@ from wetwell.sim2real.likelihood.ways import RIGHT, Seen, Way, Ways
 
 SCALES = TIMES[1:]
 """Times what is allowed that something unknown may be in a block, each as likely."""
-
+SILENT = 1e-3
+"""Share of what is allowed under which noise and error of a reading are nothing: a pump stands. [1]"""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+ACTING, LOG_WEIGHTS = 0.5 * (1.0 + _NODES), np.log(0.5 * _WEIGHTS)
+"""Shares of the blocks in which something unknown acts, and how they sum up to an integral over all. [1]"""
 
 _LARGE = [(Way(errors=Errors(offset=scale, form=POOR.form), is_poor=True),) for scale in SCALES]
 _SMALLER = [(Way(errors=one.errors.times(DIFFERING), is_poor=True),) for (one,) in _LARGE]
@@ -27,10 +31,12 @@ UNKNOWN_WAYS = (
 def flexible_factor(found: Evidence, form: Form) -> float:
     r"""Logarithm of how much more probable the residuals are if something unknown may be in them.
 
-    $$F = \prod_b \frac{\tfrac12\,p(r_b) + \tfrac12 \sum_k p_k\, p(r_b \mid \lambda_k, \mu_k)}{p(r_b)}$$
+    $$F = \int_0^1 \prod_b \frac{(1 - s)\,p(r_b) + s \sum_k p_k\, p(r_b \mid \lambda_k, \mu_k)}{p(r_b)}\,
+    \mathrm{d}s$$
 
-    over blocks b, with λ times what is allowed of offsets that all cycles share, and μ of what changes between them:
-    one of them, or both alike.
+    over blocks b and the share s of them in which it acts, of which nobody knows anything, with λ times what is
+    allowed of offsets that all cycles share, and μ of what changes between them: one of them, or both alike. Readings
+    without noise that are what was expected, as those of a pump that stands, say nothing of what else there is.
 
     Parameters
     ----------
@@ -38,14 +44,19 @@ def flexible_factor(found: Evidence, form: Form) -> float:
     form : Form
         Of the effects beside which it acts.
     """
-    total = 0.0
+    total = np.zeros(ACTING.size)
     for one in found.stirred:
-        left, its = found.residuals[one.block.rows], form.chosen(one.block.rows)
-        wet = Seen(one.block, left, its, one.swing)
-        dry = None if one.dry is None else Seen(one.dry, left, its, one.swing)
+        nothing = (SILENT * one.block.allowed) ** 2
+        says = np.maximum(found.residuals[one.block.rows] ** 2, one.block.variance) > nothing
+        if not says.any():
+            continue
+        block = one.block.only(says)
+        left, its = found.residuals[block.rows], form.chosen(block.rows)
+        wet = Seen(block, left, its, one.swing)
+        dry = None if one.dry is None else Seen(one.dry.only(says), left, its, one.swing)
         known, *unknown = (_log(one, wet, dry, ways) for ways in (RIGHT, *UNKNOWN_WAYS))
-        total += float(np.logaddexp(0.0, logsumexp(unknown) - np.log(len(unknown)) - known) - np.log(2.0))
-    return total
+        total += np.logaddexp(np.log1p(-ACTING), np.log(ACTING) + logsumexp(unknown) - np.log(len(unknown)) - known)
+    return float(logsumexp(LOG_WEIGHTS + total))
 
 
 def _log(one: Stirred, wet: Seen, dry: Seen | None, ways: Ways) -> float:
