@@ -18,6 +18,7 @@ Row = tuple[Any, ...]
 
 _SAMPLE = "station, time_ns, seq, quality, data, size, last_ns, crc"
 _COLUMNS = {
+    "station": "id, name, first_ns, last_ns",
     "sample": _SAMPLE,
     "event": "id, kind, station, time_ns, digest, payload, crc",
     "hour": "station, hour_ns, data, crc",

@@ -16,13 +16,19 @@ def station_rows(database: sqlite3.Connection) -> list[StationRow]:
 
     SQLite keeps each name twice, in the table and in its index. Where they differ, messages of the station say which
     one it is.
+
+    Parameters
+    ----------
+    database : sqlite3.Connection
+        Its `station` may be a view that knows the columns by places; then `main.station` is the table.
     """
     names: dict[object, set[object]] = {}
     rows: list[StationRow] = []
     with contextlib.suppress(*UNREADABLE):
-        rows.extend(database.execute("SELECT id, name, first_ns, last_ns FROM station NOT INDEXED"))
+        rows.extend(database.execute("SELECT id, name, first_ns, last_ns FROM station"))
     with contextlib.suppress(*UNREADABLE):
-        for number, name in database.execute("SELECT id, name FROM station INDEXED BY sqlite_autoindex_station_1"):
+        of_index = "SELECT id, name FROM main.station INDEXED BY sqlite_autoindex_station_1"
+        for number, name in database.execute(of_index):
             names.setdefault(number, set()).add(name)
     certain = []
     for number, name, first_ns, last_ns in rows:

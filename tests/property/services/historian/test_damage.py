@@ -298,6 +298,8 @@ def test_a_word_of_the_schema_that_names_another_thing_is_damage(content, tmp_pa
     ("word", "broken"),
     [
         (b"last_ns INTEGER, crc", b"mast_ns INTEGER, crc"),
+        (b"first_ns INTEGER, last_ns INTEGER)", b"firsv_ns INTEGER, last_ns INTEGER)"),
+        (b"name TEXT NOT NULL UNIQUE", b"nam\xe5 TEXT NOT NULL UNIQUE"),
         (b"data BLOB NOT NULL, size", b"data BLOB NOT NULL, si\xf3e"),
         (b"AFTER DELETE", b"AFTER DEL\xc5TE"),
         (b"INSERT INTO tally", b"INSERT IN\x11O tally"),
