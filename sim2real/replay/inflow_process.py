@@ -109,13 +109,14 @@ def learnt_process(
     idle = np.flatnonzero(is_idle)
     if not np.any(is_settled[idle] & uncertain.is_known[idle]):
         return InflowProcess(lags_s=(0.0,), under=(replace(uncertain, drift_m2_s3=DRIFT * carried_m_s**2),))
-    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, round(rate_s), least_noise_m)
+    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, least_noise_m)
     logs, found = np.zeros(2), []
     for lag_s in LAGS_S:
         if lag_s == 0.0 or lag_s >= 0.5 * rate_s:
             lagging = damped_by(sensor, lag_s, 0.0)
-            logs, cost = at_rest.likeliest(lagging, logs, ROUGHLY if lag_s == 0.0 else CLOSELY)
-            found.append((cost, step_of(lagging)[2], at_rest.moving(logs, inflow_bends(lagging, at_rest.every_s))))
+            bends = inflow_bends(lagging, round(rate_s))
+            logs, cost = at_rest.likeliest(lagging, bends, logs, ROUGHLY if lag_s == 0.0 else CLOSELY)
+            found.append((cost, step_of(lagging)[2], at_rest.moving(logs, bends)))
     least, _, _ = min(found, key=lambda one: one[0])
     likely = [(lag_s, process) for cost, lag_s, process in found if cost <= least + LEAST_TOLD]
     return InflowProcess(
@@ -168,7 +169,6 @@ class _Rest:
     level_m: Floats
     rows: Flags
     carried_m_s: float
-    every_s: int
     least_noise_m: float
 
     def moving(self, logs: Floats, bends: Floats) -> Uncertain:
@@ -197,7 +197,7 @@ class _Rest:
         squares = np.minimum(error_m[rows] ** 2 / variance_m2[rows], MOST_SQUARE)
         return float(np.sum(squares + np.log(variance_m2[rows])) + np.sum((logs / PRIOR_WIDTH) ** 2))
 
-    def likeliest(self, sensor: SensorParameters, first: Floats, step: float) -> tuple[Floats, float]:
+    def likeliest(self, sensor: SensorParameters, bends: Floats, first: Floats, step: float) -> tuple[Floats, float]:
         """Logarithms that cost least, reached from the first ones, and that cost."""
         steps = step * np.diff(LOG_SOUGHT)[:, 0]
         inwards = np.where(first > LOG_SOUGHT.mean(axis=1), -steps, steps)
@@ -205,7 +205,7 @@ class _Rest:
         found = minimize(
             self.cost,
             first,
-            args=(sensor, inflow_bends(sensor, self.every_s)),
+            args=(sensor, bends),
             method="Nelder-Mead",
             bounds=LOG_SOUGHT.tolist(),
             options={"initial_simplex": simplex, "xatol": CLOSE, "fatol": COST_ALIKE},
@@ -219,7 +219,6 @@ def _at_rest(
     idle: Integers,
     is_settled: Flags,
     carried_m_s: float,
-    every_s: int,
     least_noise_m: float,
 ) -> _Rest:
     """Level of the idle seconds; before each rest there is a pause, after which all but the inflow begins anew."""
@@ -234,7 +233,6 @@ def _at_rest(
         level_m=level_m[place],
         rows=is_known & is_settled[place],
         carried_m_s=carried_m_s,
-        every_s=every_s,
         least_noise_m=least_noise_m,
     )
 
