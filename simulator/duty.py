@@ -86,6 +86,7 @@ def duty_flows_m3h(parameters: PlantParameters, speed_ratio: Floats, level_m: fl
             main.friction_h2_m5 - main.own_h2_m5,
             main.linear_flow_m3h,
             main.is_common_header,
+            np.array([pump.valve_leak_m3h for pump in parameters.pumps]),
             flows,
         )
         flow_m3h[np.ix_(known, pumps)] = flows[:, pumps]

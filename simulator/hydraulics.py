@@ -153,19 +153,22 @@ def common_flows(
     shared_h2_m5: float,
     linear_flow_m3h: float,
     inertia_m_m3h: float,
+    leak_m3h: float,
+    back_before_m3h: float,
     flow_m3h: Floats,
-) -> None:
+) -> float:
     r"""Duty flows of pumps on one header, at any speeds.
 
-    The total flow Q solves
+    The flow Q of the main solves
 
-    $$\sum_i Q_i(H) = Q, \qquad H = H_s + k Q (Q + s) + j\,(Q - Q_\text{before})$$
+    $$\sum_i Q_i(H) - K \sqrt{H / 1\,\text{m}} = Q, \qquad H = H_s + k Q (|Q| + s) + j\,(Q - Q_\text{before})$$
 
-    and each pump loses $k_\text{own} Q_i (Q_i + s)$ on its own way to the header.
+    and each pump loses $k_\text{own} Q_i (Q_i + s)$ on its own way to the header. K is of the check valves through
+    which water runs back: what they let through is missing in the main.
 
     The left side falls and the right side rises with Q, so that there is one root; Newton's method finds it, kept
-    inside a bracket by bisection. One running pump is solved in closed form. A pump whose shut-off head lies under
-    the header's head gives no flow: its check valve is closed.
+    inside a bracket by bisection. One running pump without a leak is solved in closed form. A pump whose shut-off
+    head lies under the header's head gives no flow: its check valve is closed.
 
     Parameters
     ----------
@@ -179,10 +182,19 @@ def common_flows(
         As in `individual_flow_m3h`; inertia acts on the total flow.
     own_h2_m5, shared_h2_m5 : float
         Friction of each pump's own pipe, and of the one that all share. [h²/m⁵]
+    leak_m3h : float
+        K, flow back through the check valves of all standing pumps at a head of 1 m. [m³/h]
+    back_before_m3h : float
+        What ran back before the step. [m³/h]
     flow_m3h : (pumps,) array
         Flows before the step, replaced by those after it. [m³/h]
+
+    Returns
+    -------
+    back_m3h : float
+        What runs back after the step. [m³/h]
     """
-    before_m3h = 0.0
+    before_m3h = -back_before_m3h
     running = 0
     alone = 0
     for i in pumps:
@@ -193,8 +205,8 @@ def common_flows(
         else:
             flow_m3h[i] = 0.0
     if running == 0:
-        return
-    if running == 1:
+        return back_before_m3h
+    if running == 1 and (leak_m3h <= 0.0 or speed_ratio[alone] <= 0.0):
         flow_m3h[alone] = flow_at_head_m3h(
             curves[alone, 0],
             curves[alone, 1],
@@ -204,30 +216,75 @@ def common_flows(
             inertia_m_m3h,
             (own_h2_m5 + shared_h2_m5) * linear_flow_m3h,
         )
-        return
+        return 0.0
     own_loss_m_m3h = own_h2_m5 * linear_flow_m3h
     rise_m_m3h = inertia_m_m3h + shared_h2_m5 * linear_flow_m3h
     lowest_head_m = static_head_m - inertia_m_m3h * before_m3h
-    low_m3h = 0.0
+    low_m3h = -_back_at_head(leak_m3h, lowest_head_m)[0]
     high_m3h = _flows_at_head(pumps, curves, speed_ratio, lowest_head_m, own_h2_m5, own_loss_m_m3h, flow_m3h)[0]
     total_m3h = high_m3h / (1.0 + running)
     if inertia_m_m3h > 0.0 and before_m3h < high_m3h:
         total_m3h = before_m3h  # it can hardly have moved
+    back_m3h = 0.0
     for _ in range(MAX_ITERATIONS):
-        head_m = lowest_head_m + (rise_m_m3h + shared_h2_m5 * total_m3h) * total_m3h
+        head_m = lowest_head_m + (rise_m_m3h + shared_h2_m5 * abs(total_m3h)) * total_m3h
         pumped_m3h, steepness = _flows_at_head(
             pumps, curves, speed_ratio, head_m, own_h2_m5, own_loss_m_m3h, flow_m3h
         )
-        excess_m3h = pumped_m3h - total_m3h
+        back_m3h, slope = _back_at_head(leak_m3h, head_m)
+        excess_m3h = pumped_m3h - back_m3h - total_m3h
         if excess_m3h > 0.0:
             low_m3h = total_m3h
         else:
             high_m3h = total_m3h
         if abs(excess_m3h) <= FLOW_TOLERANCE_M3H or high_m3h - low_m3h <= FLOW_TOLERANCE_M3H:
-            return
-        total_m3h -= excess_m3h / (steepness * (rise_m_m3h + 2.0 * shared_h2_m5 * total_m3h) - 1.0)
+            break
+        total_m3h -= excess_m3h / ((steepness - slope) * (rise_m_m3h + 2.0 * shared_h2_m5 * abs(total_m3h)) - 1.0)
         if not low_m3h < total_m3h < high_m3h:
             total_m3h = 0.5 * (low_m3h + high_m3h)
+    return back_m3h
+
+
+@compiled
+def header_back_flow_m3h(
+    leak_m3h: float, static_head_m: float, shared_h2_m5: float, linear_flow_m3h: float, pumped_m3h: float
+) -> float:
+    r"""Flow back through check valves of standing pumps on a header.
+
+    $$Q_\text{back} = K \sqrt{H / 1\,\text{m}}, \qquad H = H_s + k Q (|Q| + s), \qquad
+    Q = Q_\text{pumped} - Q_\text{back}$$
+
+    Parameters
+    ----------
+    leak_m3h, static_head_m, shared_h2_m5, linear_flow_m3h : float
+        K, H_s, k and s, as in `common_flows`.
+    pumped_m3h : float
+        Flow of the running pumps together. [m³/h]
+
+    Examples
+    --------
+    >>> header_back_flow_m3h(10.0, 4.0, 0.0, 0.0, 100.0)
+    20.0
+    """
+    low_m3h = 0.0
+    high_m3h = leak_m3h * math.sqrt(static_head_m + shared_h2_m5 * pumped_m3h * (pumped_m3h + linear_flow_m3h))
+    back_m3h = high_m3h
+    for _ in range(MAX_ITERATIONS):
+        main_m3h = pumped_m3h - back_m3h
+        head_m = static_head_m + shared_h2_m5 * main_m3h * (abs(main_m3h) + linear_flow_m3h)
+        through_m3h, slope = _back_at_head(leak_m3h, head_m)
+        excess_m3h = back_m3h - through_m3h
+        if excess_m3h > 0.0:
+            high_m3h = back_m3h
+        else:
+            low_m3h = back_m3h
+        if abs(excess_m3h) <= FLOW_TOLERANCE_M3H or high_m3h - low_m3h <= FLOW_TOLERANCE_M3H:
+            break
+        fall_m_m3h = shared_h2_m5 * (2.0 * abs(main_m3h) + linear_flow_m3h)
+        back_m3h -= excess_m3h / (1.0 + slope * fall_m_m3h)
+        if not low_m3h < back_m3h < high_m3h:
+            back_m3h = 0.5 * (low_m3h + high_m3h)
+    return back_m3h
 
 
 @compiled
@@ -240,6 +297,7 @@ def main_flows(
     shared_h2_m5: float,
     linear_flow_m3h: float,
     is_common: bool,
+    leak_m3h: Floats,
     flow_m3h: Floats,
 ) -> None:
     """Set the (n, pumps) duty flows of pumps of a main at n points, without inertia.
@@ -256,17 +314,34 @@ def main_flows(
         As in `common_flows`. [h²/m⁵, m³/h]
     is_common : bool
         Whether pumps share the main, or have a pipe each that loses as much as both parts together.
+    leak_m3h : (pumps,) array
+        Flow back through the check valve of each while it stands, at a head of 1 m. [m³/h]
     flow_m3h : (n, pumps) array
         Out. [m³/h]
     """
     for point in range(static_head_m.size):
         speed, lift_m, flow = speed_ratio[point], static_head_m[point], flow_m3h[point]
         if is_common:
-            common_flows(pumps, curves, speed, lift_m, own_h2_m5, shared_h2_m5, linear_flow_m3h, 0.0, flow)
+            back_m3h = 0.0
+            for i in pumps:
+                if speed[i] <= 0.0:
+                    back_m3h += leak_m3h[i]
+            common_flows(
+                pumps, curves, speed, lift_m, own_h2_m5, shared_h2_m5, linear_flow_m3h, 0.0, back_m3h, 0.0, flow
+            )
             continue
         for i in pumps:
             friction_h2_m5 = own_h2_m5 + shared_h2_m5
             flow[i] = individual_flow_m3h(curves[i], speed[i], lift_m, friction_h2_m5, linear_flow_m3h, 0.0, 0.0)
+
+
+@compiled
+def _back_at_head(leak_m3h: float, head_m: float) -> tuple[float, float]:
+    """Flow back through check valves under a head, and its slope over the head."""
+    if leak_m3h <= 0.0 or head_m <= 0.0:
+        return 0.0, 0.0
+    back_m3h = leak_m3h * math.sqrt(head_m)
+    return back_m3h, 0.5 * back_m3h / head_m
 
 
 @compiled

@@ -77,7 +77,8 @@ class PlantState(NamedTuple):
     """State of a plant; of the station there is one record.
 
     The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
-    now and before a step, and their means over the second. `water` (pumps, 2, nodes + 1) is that in the main of each,
+    now and before a step, and their means over the second. `back_m3h` (mains,) runs back at the inlet of each main
+    whose water is accelerated as a whole. `water` (pumps, 2, nodes + 1) is that in the main of each,
     where waves run; that of a header is its first pump's. `correction` (terms, pumps) is what learnt corrections add
     to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past` (channels, m) and
     `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the order of their
@@ -93,6 +94,7 @@ class PlantState(NamedTuple):
     flow_m3h: Floats
     flow_before_m3h: Floats
     mean_flow_m3h: Floats
+    back_m3h: Floats
     water: Floats
     correction: Floats
     past: Floats
@@ -128,6 +130,7 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         flow_m3h=np.zeros(pumps),
         flow_before_m3h=np.zeros(pumps),
         mean_flow_m3h=np.zeros(pumps),
+        back_m3h=np.zeros(len(parameters.mains)),
         water=np.zeros((pumps, 2, NODES + 1)),
         correction=np.zeros((len(TERMS), pumps)),
         past=np.full((channels(pumps), PAST_S), np.nan),

@@ -161,7 +161,10 @@ def _drive(
         inflow = 0.5 * inlet * (around.inflow[second] + around.inflow[second + 1]) + spec.hidden_inflow
         standing = sum(flow <= 0.0 and speed <= 0.0 for flow, speed in zip(flows, command, strict=True))
         behind_m = nodes["HEADER"].head - level_m if spec.shared_loss > 0 else lift_m
-        well.generated_inflow(inflow + standing * spec.flap_leak * math.sqrt(max(behind_m, 0.0)))
+        back = standing * spec.flap_leak * math.sqrt(max(behind_m, 0.0))
+        well.generated_inflow(inflow + back)
+        if spec.shared_loss > 0 and spec.flap_leak > 0.0:
+            nodes["HEADER"].generated_inflow(-back)
         for _ in range(_STEPS):
             for i, machine in enumerate(machines):
                 aim, reach = wanted[i] if i in plc.running else 0.0, ROUTING_STEP_S / spec.ramp_s

@@ -28,7 +28,7 @@ LEVEL, LEVEL_READING = range(2)
 COMMAND, FLOW, HEAD, POWER, DAMPED_FLOW = range(5)
 _TORQUE, _PUMPED, _SPEED, _PUSH, _STIFFNESS, _OPEN, _ON, _SET = range(5, 13)
 _PUMP_ROWS = 13
-_LEVEL, _SEEN, _AIR, _PRIMED = range(4)
+_LEVEL, _SEEN, _AIR, _PRIMED, _BACK = range(5)
 _READING, _RUNNING, _TURN, _OVER, _UNDER = range(5)
 _PLC_ROWS = 5
 _STOPPED = 1e-9
@@ -67,9 +67,9 @@ def torque_ratio(speed: float, flow: float, rated_flow: float) -> float:
 @allocating
 def pipe_loss(flow: float, spec: Spec) -> tuple[float, float]:
     """Loss of a pipe of coefficient 1 and its derivative: between rough (q²) and Blasius (q^1.75)."""
-    rough = flow * flow
+    rough = flow * abs(flow)
     if spec.smoothness <= 0.0 or flow <= 0.0:
-        return rough, 2.0 * flow
+        return rough, 2.0 * abs(flow)
     smooth = spec.rated_flow**0.25 * flow**1.75
     share = spec.smoothness
     return (1.0 - share) * rough + share * smooth, 2.0 * (1.0 - share) * flow + 1.75 * share * smooth / flow
@@ -112,7 +112,7 @@ def integrate(
     """
     pumps = spec.shutoff_m.size
     pump = np.zeros((_PUMP_ROWS, pumps))
-    well = np.array([level_m, level_m, spec.air_seed_m, 0.0])
+    well = np.array([level_m, level_m, spec.air_seed_m, 0.0, 0.0])
     plc = np.zeros(_PLC_ROWS)
     order = np.zeros(pumps, dtype=np.int64)
     for second in range(loss_factor.size):
@@ -204,7 +204,7 @@ def _move(spec: Spec, pump: Floats, well: Floats, loss_factor: float, extra_lift
     if well[_PRIMED] >= spec.siphon_prime_s:
         lift_m -= spec.siphon_m
     lift_m = max(lift_m, 0.0)
-    shared_m, shared_slope = pipe_loss(pump[FLOW].sum(), spec)
+    shared_m, shared_slope = pipe_loss(pump[FLOW].sum() - well[_BACK], spec)  # of the step before
     shared_m *= spec.shared_loss * loss_factor
     coupling = spec.shared_inertance / STEP_S + spec.shared_loss * loss_factor * shared_slope
     weighted, compliance = 0.0, 0.0
@@ -230,11 +230,12 @@ def _move(spec: Spec, pump: Floats, well: Floats, loss_factor: float, extra_lift
             change = (pump[_PUSH, i] - coupling * total_change) / pump[_STIFFNESS, i]
             pump[FLOW, i] = max(before + change, 0.0)
         elif pump[COMMAND, i] <= 0.0:
-            back += spec.flap_leak * math.sqrt(lift_m + shared_m)
+            back += spec.flap_leak * math.sqrt(max(lift_m + shared_m, 0.0))
         out += 0.5 * (before + pump[FLOW, i])
         pump[_PUMPED, i] += pump[FLOW, i] * STEP_S
         pump[DAMPED_FLOW, i] += (pump[FLOW, i] - pump[DAMPED_FLOW, i]) * followed
         pump[_TORQUE, i] = torque_ratio(pump[_SPEED, i], pump[FLOW, i], spec.rated_flow)
+    well[_BACK] = back if spec.shared_loss > 0.0 else 0.0
     return out, back
 
 

@@ -6,9 +6,9 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import inlined
 from wetwell.simulator.corrections.parts import HEAD_LOSS, STATIC_HEAD
 from wetwell.simulator.forcing import Forcing
-from wetwell.simulator.hydraulics import common_flows, individual_flow_m3h
+from wetwell.simulator.hydraulics import common_flows, header_back_flow_m3h, individual_flow_m3h
 from wetwell.simulator.parameters import MainParameters, PlantRecords
-from wetwell.simulator.rising_main.waves import STEPS, coming, pass_on, still_water
+from wetwell.simulator.rising_main.waves import STEPS, coming, let_back_m3h, pass_on, still_water
 from wetwell.simulator.state import PlantState
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
@@ -29,10 +29,10 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
     static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
     friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
-    inertia_s2_m2 = plant.mains[m].inertia_s2_m2
-    flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
-    if inertia_s2_m2 <= 0.0:
-        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, 0.0)
+    leak_m3h = _standing_leak_m3h(plant, state, forcing, second, pumps) if plant.mains[m].is_common_header else 0.0
+    flow_m3h, mean_m3h = state.flow_m3h, state.mean_flow_m3h
+    if plant.mains[m].inertia_s2_m2 <= 0.0:
+        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, 0.0, leak_m3h, 0.0)
         for i in pumps:
             mean_m3h[i] = flow_m3h[i]
         return
@@ -44,24 +44,46 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
     if not is_moving:
         return
     if plant.mains[m].wave_s * STEPS >= 2.0:
-        _move_waves(plant, state, m, static_head_m, friction_h2_m5, was_moving)
+        _move_waves(plant, state, m, static_head_m, friction_h2_m5, was_moving, leak_m3h)
         return
-    inertia_m_m3h = inertia_s2_m2 / SECONDS_PER_HOUR * STEPS / STAGE
+    _move_column(plant, state, m, static_head_m, friction_h2_m5, leak_m3h)
+
+
+@inlined
+def _move_column(
+    plant: PlantRecords, state: PlantState, m: int, static_head_m: float, friction_h2_m5: float, leak_m3h: float
+) -> None:
+    """Set the flows of main m, whose water is accelerated as a whole, after the second, and their means over it."""
+    flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    inertia_m_m3h = plant.mains[m].inertia_s2_m2 / SECONDS_PER_HOUR * STEPS / STAGE
     for _ in range(STEPS):
         for i in pumps:
             before_m3h[i] = flow_m3h[i]
-        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
+        back_before_m3h = state.back_m3h[m]
+        back_m3h = _solve_flows(
+            plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h, leak_m3h, back_before_m3h
+        )
+        back_m3h = back_before_m3h + (back_m3h - back_before_m3h) * (1.0 - STAGE) / STAGE
         for i in pumps:
             mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / STEPS
             flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
-        _solve_flows(plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h)
+        state.back_m3h[m] = _solve_flows(
+            plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h, leak_m3h, back_m3h
+        )
         for i in pumps:
             mean_m3h[i] += STAGE * flow_m3h[i] / STEPS
 
 
 @inlined
 def _move_waves(
-    plant: PlantRecords, state: PlantState, m: int, static_head_m: float, friction_h2_m5: float, was_moving: bool
+    plant: PlantRecords,
+    state: PlantState,
+    m: int,
+    static_head_m: float,
+    friction_h2_m5: float,
+    was_moving: bool,
+    leak_m3h: float,
 ) -> None:
     """Set the flows of main m, in which waves run, in the middles of steps; water at rest has forgotten its waves."""
     main, flow_m3h = plant.mains[m], state.flow_m3h
@@ -88,9 +110,13 @@ def _move_waves(
                     0.0,
                     s_m3h,
                     steepness,
+                    leak_m3h,
+                    0.0,
                     flow_m3h,
                 )
                 total_m3h = sum_of(flow_m3h, pumps)
+                if leak_m3h > 0.0:
+                    total_m3h -= let_back_m3h(leak_m3h, came_m, steepness, total_m3h)
             else:
                 total_m3h = flow_m3h[at] = individual_flow_m3h(
                     state.curves[at], state.speed_ratio[at], came_m, 0.0, 0.0, steepness, 0.0
@@ -116,15 +142,17 @@ def _solve_flows(
     static_head_m: float,
     friction_h2_m5: float,
     inertia_m_m3h: float,
-) -> None:
-    """Set the flows of main m by its layout; pipes of their own have air of their own."""
+    leak_m3h: float,
+    back_before_m3h: float,
+) -> float:
+    """Set the flows of main m by its layout, and return what runs back; pipes of their own have air of their own."""
     main, curves, flow_m3h = plant.mains[m], state.curves, state.flow_m3h
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     if main.is_common_header:
         at = pumps[0]
         lift_m = lift_at_m(state, at, static_head_m)
         friction_h2_m5 *= 1.0 + state.correction[HEAD_LOSS, at]
-        common_flows(
+        back_m3h: float = common_flows(
             pumps,
             curves,
             state.speed_ratio,
@@ -133,15 +161,18 @@ def _solve_flows(
             friction_h2_m5 * main.shared_friction,
             main.linear_flow_m3h,
             inertia_m_m3h,
+            leak_m3h,
+            back_before_m3h,
             flow_m3h,
         )
-        return
+        return back_m3h
     for i in pumps:
         lift_m = lift_at_m(state, i, static_head_m)
         own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
         flow_m3h[i] = individual_flow_m3h(
             curves[i], state.speed_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
         )
+    return 0.0
 
 
 @inlined
@@ -162,27 +193,70 @@ def gather_air(plant: PlantRecords, state: PlantState, m: int) -> None:
 
 @inlined
 def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, level_m: float) -> float:
-    """Flow back into the wet well through the check valves of standing pumps: K sqrt(H), H the head behind."""
-    back_m3h = 0.0
-    for i in range(state.pumps.size):
-        leak_m3h = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
-        if leak_m3h > 0.0 and state.speed_ratio[i] <= 0.0 and state.flow_m3h[i] <= 0.0:
-            m = plant.pumps[i].main
+    """Flow back into the wet well through the check valves of standing pumps: K sqrt(H), H the head behind.
+
+    Where all pumps of a main stand, its water runs back as fast.
+    """
+    total_m3h = 0.0
+    for m in range(plant.mains.size):
+        pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+        leak_m3h, back_m3h = _standing_leak_m3h(plant, state, forcing, second, pumps), 0.0
+        if leak_m3h > 0.0:
             static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
-            head_m = lift_at_m(state, i, static_head_m)
             if plant.mains[m].is_common_header:
-                pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
                 friction_h2_m5 = plant.mains[m].friction_h2_m5 * forcing.friction_factor[m, second]
-                total_m3h = sum_of(state.mean_flow_m3h, pumps)
-                head_m += friction_h2_m5 * total_m3h * (total_m3h + plant.mains[m].linear_flow_m3h)
-            back_m3h += leak_m3h * math.sqrt(head_m)
+                back_m3h = _header_back_m3h(plant, state, m, static_head_m, friction_h2_m5, leak_m3h)
+            else:
+                for i in pumps:
+                    its_m3h = _valve_leak_m3h(plant, state, forcing, second, i)
+                    back_m3h += its_m3h * math.sqrt(lift_at_m(state, i, static_head_m))
+        if sum_of(state.speed_ratio, pumps) <= 0.0 and sum_of(state.mean_flow_m3h, pumps) <= 0.0:
+            state.back_m3h[m] = back_m3h
+        total_m3h += back_m3h
+    return total_m3h
+
+
+@inlined
+def _header_back_m3h(
+    plant: PlantRecords, state: PlantState, m: int, static_head_m: float, friction_h2_m5: float, leak_m3h: float
+) -> float:
+    """Flow back at the header of main m, beside the mean flows of the second. [m³/h]."""
+    main = plant.mains[m]
+    pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
+    back_m3h: float = header_back_flow_m3h(
+        leak_m3h,
+        lift_at_m(state, pumps[0], static_head_m),
+        friction_h2_m5 * main.shared_friction,
+        main.linear_flow_m3h,
+        sum_of(state.mean_flow_m3h, pumps),
+    )
     return back_m3h
 
 
 @inlined
-def sum_of(flow_m3h: Floats, pumps: Integers) -> float:
-    """Sum of the flows of some pumps, in their order. [m³/h]."""
-    total_m3h = 0.0
+def _valve_leak_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, i: int) -> float:
+    """Flow back through the check valve of a pump at 1 m, if it stands. [m³/h]."""
+    if state.speed_ratio[i] > 0.0 or state.flow_m3h[i] > 0.0:
+        return 0.0
+    leak_m3h: float = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
+    return leak_m3h
+
+
+@inlined
+def _standing_leak_m3h(
+    plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, pumps: Integers
+) -> float:
+    """Flow back through the check valves of those of some pumps that stand, at 1 m. [m³/h]."""
+    leak_m3h = 0.0
     for i in pumps:
-        total_m3h += flow_m3h[i]
-    return total_m3h
+        leak_m3h += _valve_leak_m3h(plant, state, forcing, second, i)
+    return leak_m3h
+
+
+@inlined
+def sum_of(values: Floats, pumps: Integers) -> float:
+    """Sum of what some pumps have, in their order."""
+    total = 0.0
+    for i in pumps:
+        total += values[i]
+    return total

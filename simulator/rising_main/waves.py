@@ -45,6 +45,31 @@ def coming(water: Floats, way: float, b: float, loss_h2_m5: float, linear_flow_m
 
 
 @compiled
+def let_back_m3h(leak_m3h: float, came_m: float, steepness: float, pumped_m3h: float) -> float:
+    r"""Flow back through check valves at the inlet of a main in which waves run.
+
+    $$Q_\text{back} = K \sqrt{H / 1\,\text{m}}, \qquad H = c + b_m (Q_\text{pumped} - Q_\text{back}) \ge 0$$
+
+    Parameters
+    ----------
+    leak_m3h : float
+        K. [m³/h]
+    came_m, steepness : float
+        c and $b_m$, as `coming` has them. [m, m/(m³/h)]
+    pumped_m3h : float
+        Flow of the running pumps together. [m³/h]
+
+    Examples
+    --------
+    >>> let_back_m3h(10.0, 2.0, 0.02, 120.0)
+    20.0
+    """
+    slows_m3h = 0.5 * leak_m3h**2 * steepness
+    head_m = max(came_m + steepness * pumped_m3h, 0.0)
+    return math.sqrt(slows_m3h**2 + leak_m3h**2 * head_m) - slows_m3h
+
+
+@compiled
 def pass_on(
     water: Floats,
     way: float,

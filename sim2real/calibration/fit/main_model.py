@@ -54,7 +54,8 @@ class MainModel:
         lift_m = self.lift_m + parameters[SHIFT]
         friction_h2_m5 = float(parameters[FRICTION])
         pumps = np.arange(self.pumps)
-        main_flows(pumps, curves, self.speed_ratio, lift_m, 0.0, friction_h2_m5, 0.0, self.is_common, flow_m3h)
+        sound = np.zeros(self.pumps)
+        main_flows(pumps, curves, self.speed_ratio, lift_m, 0.0, friction_h2_m5, 0.0, self.is_common, sound, flow_m3h)
         speed = self.speed_ratio
         head_m = curves[:, 0] * speed**2 + curves[:, 1] * speed * flow_m3h + curves[:, 2] * flow_m3h**2
         return flow_m3h, np.where(flow_m3h > 0.0, head_m, 0.0)

@@ -10,10 +10,12 @@ from wetwell.simulator.parameters import PlantParameters
 class CheckValveLeak(Effect):
     r"""Water flows from the main back into the wet well through each standing pump.
 
-    $$Q_\text{back} = K \sqrt{H / 1\,\text{m}}, \qquad H = H_s \text{, on a common header } H_s + k Q^2$$
+    $$Q_\text{back} = K \sqrt{H / 1\,\text{m}}, \qquad H = H_s \text{, on a common header } H_s + k Q |Q|, \quad
+    Q = \sum_i Q_i - \sum Q_\text{back}$$
 
-    No meter shows it: the pump's own reads 0 while it stands, and the back flow is no part of the inflow. Flow and
-    head of the running pumps are as without it. The main is taken to stay full.
+    No meter shows it: the pump's own reads 0 while it stands, and the back flow is no part of the inflow. On a common
+    header the running pumps deliver it, too: they carry more, at a lower head, than the main takes. On mains of their
+    own they are as without it. The main is taken to stay full.
 
     Parameters
     ----------

@@ -13,10 +13,10 @@ class CheckValveLeak(PumpFault):
     r"""Water flows from the main back into the wet well while the pump stands.
 
     $$Q_\text{back} = K\, r(t) \sqrt{H / 1\,\text{m}}, \qquad
-    H = H_s \text{, on a common header } H_s + k Q^2$$
+    H = H_s \text{, on a common header } H_s + k Q |Q|, \quad Q = \sum_i Q_i - \sum Q_\text{back}$$
 
-    No meter shows it: the pump's own reads 0 while it stands. The level rises faster and pumps start more often. The
-    main is taken to stay full.
+    No meter shows it: the pump's own reads 0 while it stands. The level rises faster and pumps start more often. On a
+    common header the running pumps deliver it, too: they carry more, at a lower head. The main is taken to stay full.
 
     Parameters
     ----------

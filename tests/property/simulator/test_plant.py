@@ -230,7 +230,9 @@ def test_header_balances_and_shares_one_head(pumps, static_head_m, friction_h2_m
     flow_m3h = np.zeros(len(pumps))
     speed_ratio = np.array([ratio for _, ratio in pumps])
     curves = np.array([curve for curve, _ in pumps])
-    common_flows(np.arange(len(pumps)), curves, speed_ratio, static_head_m, 0.0, friction_h2_m5, 0.0, 0.0, flow_m3h)
+    common_flows(
+        np.arange(len(pumps)), curves, speed_ratio, static_head_m, 0.0, friction_h2_m5, 0.0, 0.0, 0.0, 0.0, flow_m3h
+    )
     assert (flow_m3h >= 0).all()
     header_m = static_head_m + friction_h2_m5 * flow_m3h.sum() ** 2
     for (curve, ratio), flow in zip(pumps, flow_m3h, strict=True):

@@ -10,8 +10,16 @@ import pytest
 from scipy.optimize import brentq
 
 from wetwell.protocols.station.rising_main import RisingMain
-from wetwell.simulator.duty import duty_table
-from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, individual_flow_m3h, pump_head_m
+from wetwell.protocols.station.station_file import EffectTable
+from wetwell.simulator.duty import duty_flows_m3h, duty_table
+from wetwell.simulator.effects import effective_parameters
+from wetwell.simulator.hydraulics import (
+    common_flows,
+    flow_at_head_m3h,
+    header_back_flow_m3h,
+    individual_flow_m3h,
+    pump_head_m,
+)
 from wetwell.simulator.power import electrical_power_kw, hydraulic_power_kw
 
 PAPER_CURVE = (36.0, -0.02333, -1.3333e-4)
@@ -32,7 +40,17 @@ def header_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
     flow_m3h = np.zeros(len(curves))
     pumps = np.arange(len(curves))
     common_flows(
-        pumps, np.array(curves), np.array(speed_ratio), static_head_m, 0.0, friction_h2_m5, 0.0, 0.0, flow_m3h
+        pumps,
+        np.array(curves),
+        np.array(speed_ratio),
+        static_head_m,
+        0.0,
+        friction_h2_m5,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        flow_m3h,
     )
     return flow_m3h
 
@@ -135,7 +153,17 @@ def test_a_loss_that_is_in_part_linear_against_brentq(linear_flow_m3h):
     expected = flows(brentq(surplus_m, 2.0, 36.0, xtol=1e-13, rtol=1e-14))
     flow_m3h = np.zeros(3)
     common_flows(
-        np.arange(3), np.array(curves), np.array(speed_ratio), 2.0, own, shared, linear_flow_m3h, 0.0, flow_m3h
+        np.arange(3),
+        np.array(curves),
+        np.array(speed_ratio),
+        2.0,
+        own,
+        shared,
+        linear_flow_m3h,
+        0.0,
+        0.0,
+        0.0,
+        flow_m3h,
     )
     assert flow_m3h == pytest.approx(expected, abs=TOLERANCE_M3H)
     (expected_m3h,) = (
@@ -145,9 +173,57 @@ def test_a_loss_that_is_in_part_linear_against_brentq(linear_flow_m3h):
     assert alone == pytest.approx(expected_m3h, abs=TOLERANCE_M3H)
     one = np.zeros(3)
     common_flows(
-        np.arange(3), np.array(curves), np.array([1.0, 0.0, 0.0]), 2.0, own, shared, linear_flow_m3h, 0.0, one
+        np.arange(3),
+        np.array(curves),
+        np.array([1.0, 0.0, 0.0]),
+        2.0,
+        own,
+        shared,
+        linear_flow_m3h,
+        0.0,
+        0.0,
+        0.0,
+        one,
     )
     assert one.tolist() == [pytest.approx(expected_m3h, abs=TOLERANCE_M3H), 0.0, 0.0]
+
+
+@pytest.mark.parametrize("leak_m3h", [0.5, 8.0, 60.0])
+@pytest.mark.parametrize("static_head_m", [0.0, 2.0, 12.0])
+@pytest.mark.parametrize("speed_ratio", [(1.0, 0.0, 0.0), (1.0, 0.8, 0.0), (0.62, 0.0, 0.0)])
+def test_what_runs_back_through_standing_pumps_is_missing_in_the_main(leak_m3h, static_head_m, speed_ratio):
+    """With the header's head as the unknown; behind a weak pump the main itself may run back."""
+    curves, shared, linear_flow_m3h = [PAPER_CURVE, SMALL_CURVE, FLAT_CURVE], 5e-4, 4.0
+    pairs = list(zip(curves, speed_ratio, strict=True))
+
+    def flows(head_m):
+        return [brentq_flow_m3h(curve, ratio, lambda _: head_m) if ratio else 0.0 for curve, ratio in pairs]
+
+    def surplus_m(head_m):
+        main = sum(flows(head_m)) - leak_m3h * math.sqrt(head_m)
+        return head_m - static_head_m - shared * main * (abs(main) + linear_flow_m3h)
+
+    header_m = brentq(surplus_m, 0.0, 80.0, xtol=1e-13, rtol=1e-14)
+    flow_m3h = np.zeros(3)
+    common_flows(
+        *(np.arange(3), np.array(curves), np.array(speed_ratio), static_head_m, 0.0, shared, linear_flow_m3h),
+        *(0.0, leak_m3h, 0.0, flow_m3h),
+    )
+    assert flow_m3h == pytest.approx(flows(header_m), abs=1e-6)
+    back_m3h = header_back_flow_m3h(leak_m3h, static_head_m, shared, linear_flow_m3h, flow_m3h.sum())
+    assert back_m3h == pytest.approx(leak_m3h * math.sqrt(header_m), abs=1e-6)
+
+
+def test_duty_points_of_a_station_file_know_its_leaks(quiet_alpha):
+    leak, header = EffectTable(name="check_valve_leak", leak_m3h=8.0), EffectTable(name="common_header")
+    plain, leaking = (
+        duty_flows_m3h(
+            effective_parameters(quiet_alpha.model_copy(update={"effect": effects})), np.array([1.0, 0.0, 0.0]), 1.0
+        )
+        for effects in ((header,), (header, leak))
+    )
+    assert leaking[0] > plain[0] + 10.0
+    assert leaking[1:].tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("layout", [individual_flows, header_flows])
