@@ -18,6 +18,9 @@ WIDE = 50.0
 STRENGTHS = (0.002, 0.01, 0.04, 0.12, 0.3)
 """Strengths that are tried first, as shares of the way from neutral to either end of the range."""
 
+OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
+"""Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeParameter:
@@ -66,6 +69,11 @@ class Candidate:
         """Component that the effect belongs to."""
         return EFFECTS[self.name].component
 
+    @property
+    def is_pattern(self) -> bool:
+        """Whether the values themselves show how strong it is, whatever else there is: so it is tried."""
+        return self.name in OF_TELEMETRY
+
     def effect(self, point: Floats) -> Effect:
         """Effect with its free parameters at a point, each normalised to its range; as it is in the last period."""
         return self._in_period(point, self.periods)
@@ -106,7 +114,7 @@ class Candidate:
         """Points to begin at: the guess, and grids of rising strength, each strength on both sides of neutral.
 
         The other strengths are neutral in a grid, as its scale is that of one. One that is neutral by the guess has
-        no grid.
+        no grid, nor has a pattern that the guess tells.
         """
         base = np.array(
             [free.normalised(min(max(guess.get(free.name, free.start), free.low), free.high)) for free in self.free]
@@ -114,6 +122,8 @@ class Candidate:
         if not any(free.neutral is not None for free in self.free):
             return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
         grids = [[base]] if any(free.name in guess for free in self.free) else []
+        if grids and self.is_pattern:
+            return grids
         still = self.neutral(base)
         for k, free in enumerate(self.free):
             if free.neutral is None or guess.get(free.name) == free.neutral:

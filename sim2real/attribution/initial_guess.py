@@ -6,7 +6,6 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
-from wetwell.sim2real.attribution.testable import OF_TELEMETRY
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, STEADY
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import POWER, Bins
@@ -45,7 +44,7 @@ def initial_guesses(
     """
     names = {free.name for free in candidate.free}
     guess = _seen(names, dict(candidate.fixed).get("channel"), residuals.telemetry.patterns)
-    if candidate.name in OF_TELEMETRY and not guess:
+    if candidate.is_pattern and not guess:
         return []
     control, middle_m = replay.station.control, replay.station.middle_level_m
     guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}

@@ -75,6 +75,7 @@ class Beside:
         with r the residuals, d what the candidate changes alone, S the slopes of the others, and the covariance C of
         the cells by what the others leave: what is explained by an error of their form promises little. The others
         stay within their ranges. Of points that differ in strength alone there is the best one, the best form first.
+        What the values themselves show of a pattern is as strong as they show it: α is 1.
         """
         found: list[list[Promise]] = []
         few: list[Alone] = []
@@ -104,7 +105,8 @@ class Beside:
         apart = changed - along_others @ basis.T
         along, squares = apart @ left, np.maximum(np.sum(apart**2, axis=1), np.finfo(float).tiny)
         is_strength = np.array([free.neutral is not None for free in alone.candidate.free], dtype=bool)
-        scale = np.clip(-along / squares, 0.0, MOST_SCALED) if is_strength.any() else np.ones(along.size)
+        is_scaled = is_strength.any() and not alone.candidate.is_pattern
+        scale = np.clip(-along / squares, 0.0, MOST_SCALED) if is_scaled else np.ones(along.size)
         best: dict[bytes, int] = {}
         for place in np.argsort(scale * (2.0 * along + scale * squares)).tolist():
             best.setdefault(alone.points[place][~is_strength].tobytes(), place)

@@ -24,8 +24,6 @@ CHANGED = 0.01
 """Share of a reading by which an effect changes it."""
 CALLED: dict[AnalogueQuantity, str] = {"flow_m3h": "flow", "head_m": "head", "power_kw": "power"}
 """Words for the readings in a reason."""
-OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
-"""Effects that are seen by the pattern of the values: where there is none, there is no such effect."""
 BESIDE_A_METER = {"unmetered_inflow"}
 """Effects that are what a meter of the inflow does not see: without one there is nothing that they are beside."""
 
@@ -73,7 +71,7 @@ def _least_gain(bins: Bins, rows: Flags) -> float:
 
 
 def _moves(candidate: Candidate, fitter: Fitter, least: float, replay: Replay) -> bool:
-    if candidate.name in OF_TELEMETRY:
+    if candidate.is_pattern:
         is_level = candidate.name == "level_quantisation" and np.isfinite(replay.traces.level_m).any()
         return replay.traces.is_each_second or (bool(is_level) and replay.traces.span_s == 1)
     if candidate.name in BESIDE_A_METER and replay.traces.inflow_m3h is None:
@@ -101,7 +99,7 @@ def _reason(candidate: Candidate, replay: Replay, regimes: Regimes) -> str:
         if replay.station.control.is_external:
             return "the control is external: nobody knows why pumps start and stop"
         return f"{rows} do not show the level at which a pump was switched"
-    if candidate.name in OF_TELEMETRY:
+    if candidate.is_pattern:
         return f"{rows} do not show how single values came"
     if candidate.component in {"sump", "level_sensor"} and not np.isfinite(traces.level_m).any():
         return "the level is not measured"

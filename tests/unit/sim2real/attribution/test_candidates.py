@@ -1,5 +1,7 @@
 """Where the search for an effect begins."""
 
+import pytest
+
 from wetwell.sim2real.attribution.candidates import candidates_of
 
 
@@ -28,3 +30,14 @@ def test_in_the_grid_of_a_strength_the_others_are_neutral():
     assert guess[fast] > 0.0
     assert all(point[fast] == 0.0 for grid in grids for point in grid if point[daily] > 0.0)
     assert any(point[daily] > 0.0 for grid in grids for point in grid)
+
+
+def test_a_pattern_is_tried_as_strong_as_the_values_show_it():
+    """Beside a range of a thousand metres the deadband of a level is nothing: a grid of strengths never meets it."""
+    (rounded,) = candidates_of(1, 1, only=["level_quantisation"])
+    held = candidates_of(1, 1, only=["report_by_exception"])[0]
+    for one, name, value in ((rounded, "quantum_m", 0.02), (held, "deadband", 0.042)):
+        assert one.is_pattern
+        ((start,),) = one.start_grids({name: value})
+        assert one.free[0].value(float(start[0])) == pytest.approx(value, rel=1e-9)
+        assert len(one.start_grids({}, strengths=(0.3, 1.0))) == 1, "without a guess it is probed"

@@ -128,6 +128,21 @@ def test_a_promise_of_what_is_linear_is_what_least_squares_find(alpha):
     assert promise.gain == pytest.approx(float(wanted @ wanted - left[0]), rel=1e-4)
 
 
+def test_a_pattern_promises_what_it_does_as_strong_as_the_values_show_it():
+    """However much more of it would explain."""
+    wanted, change = np.full(9, -3.0), np.ones(9)
+    gains = {}
+    for name in ("level_quantisation", "static_head_bias"):
+        (one,) = candidates_of(1, 1, only=[name])
+        point = np.array([one.free[0].normalised(0.02)])
+        its = Alone(candidate=one, points=(point,), changes=change[None, :])
+        beside = Beside(weights=White(), residuals=wanted, slopes=np.zeros((9, 0)), position=np.zeros(0))
+        promise = best(beside.promises([its]))
+        gains[name] = one.free[0].value(float(promise.point[0])), promise.gain
+    assert gains["level_quantisation"] == pytest.approx((0.02, 9.0 * (9.0 - 4.0)))
+    assert gains["static_head_bias"] == pytest.approx((0.04, 9.0 * (9.0 - 1.0)))
+
+
 def test_others_that_do_nearly_the_same_stay_within_their_ranges_together(alpha):
     """A slope and its reference go far against each other: each cut by itself, they would do anything."""
     truth = (
