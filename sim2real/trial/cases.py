@@ -48,6 +48,7 @@ class StoragePlan:
         What no case has.
     metered_share : float
         Share of the cases that have an inflow meter. [1]
+        Of what lies behind that meter all cases have one, if any has.
     """
 
     rates_s: tuple[int, ...] = (1,)
@@ -59,6 +60,11 @@ class StoragePlan:
     def ways(self) -> tuple[tuple[int, StoredValue], ...]:
         """Each rate with each kind of value. [s, -]."""
         return tuple((rate_s, value) for rate_s in self.rates_s for value in self.values)
+
+    @property
+    def may_meter(self) -> bool:
+        """Whether any case has an inflow meter."""
+        return self.metered_share > 0.0 and "inflow_m3h" not in self.absent
 
 
 DEFAULT_STORAGE = StoragePlan()
@@ -184,14 +190,18 @@ def trial_case(
     plant = plants[place]
     turn, place = divmod(turn, len(storage.ways))
     every_s, value = storage.ways[place]
-    has_meter = _stream(seed, number, *_METERS).random() < storage.metered_share
+    names = _names(seed, number, kind, plant, turn, effects, may_meter=storage.may_meter)
+    is_behind_meter = any(FAMILIES[plant].kinds[name].is_behind_meter for name in names)
+    has_meter = storage.may_meter and (
+        is_behind_meter or _stream(seed, number, *_METERS).random() < storage.metered_share
+    )
     unmetered: tuple[AnalogueQuantity, ...] = () if has_meter or "inflow_m3h" in storage.absent else ("inflow_m3h",)
     return TrialCase(
         seed=seed,
         number=number,
         kind=kind,
         plant=plant,
-        names=_names(seed, number, kind, plant, turn, effects),
+        names=names,
         seconds=seconds,
         every_s=every_s,
         value=value,
@@ -200,12 +210,21 @@ def trial_case(
 
 
 def _names(
-    seed: int, number: int, kind: CaseKind, plant: PlantName, turn: int, effects: tuple[str, ...]
+    seed: int,
+    number: int,
+    kind: CaseKind,
+    plant: PlantName,
+    turn: int,
+    effects: tuple[str, ...],
+    *,
+    may_meter: bool,
 ) -> tuple[str, ...]:
     if kind == "none":
         return ()
     family = FAMILIES[plant]
     held = family.open if kind == "open" else family.held_of(effects)
+    if not may_meter:
+        held = tuple(name for name in held if not family.kinds[name].is_behind_meter) or held
     order = _stream(seed, KINDS.index(kind), len(held), 0)
     first = held[int(order.permutation(len(held))[turn % len(held)])]
     return _others((first,), _BESIDE.get(kind, 0), family, _stream(seed, number))

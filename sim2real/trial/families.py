@@ -40,6 +40,10 @@ class Deviates(Protocol):
     def component(self) -> str:
         """Where it lies."""
 
+    @property
+    def is_behind_meter(self) -> bool:
+        """Whether it lies between the meter of the inflow and the wet well: without that meter it is nothing."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:

@@ -265,7 +265,11 @@ LIBRARY_KINDS: dict[str, Kind] = {
     ),
     "sump_area_profile": Kind("sump", ("level_m",), _area, _sump_area_profile),
     "unmetered_inflow": Kind(
-        "sump", ("level_m",), lambda d: {"flow_m3h": rounded(d.flow_m3h * d.over(0.03, 0.2))}, _unmetered_inflow
+        "sump",
+        ("level_m",),
+        lambda d: {"flow_m3h": rounded(d.flow_m3h * d.over(0.03, 0.2))},
+        _unmetered_inflow,
+        is_behind_meter=True,
     ),
     "pump_wear": Kind("pump", ("flow_m3h", "head_m", "level_m"), _wear, _pump_wear),
     "ragging": Kind(

@@ -137,6 +137,7 @@ OPEN_KINDS: dict[str, Kind] = {
         ("level_m",),
         lambda d: {"share": d.between(0.5, 0.9), "tank_s": d.over(900.0, 3600.0)},
         _second_sump,
+        is_behind_meter=True,
     ),
     "clock_drift": Kind(
         "telemetry",

@@ -104,6 +104,8 @@ class Kind:
     draw, act : callable
     needs_two_pumps : bool
         Whether it shows only when two pumps run.
+    is_behind_meter : bool
+        Whether it lies between the meter of the inflow and the wet well: without that meter it is nothing.
     """
 
     component: str
@@ -111,6 +113,7 @@ class Kind:
     draw: Callable[[Draw], Parameters]
     act: Callable[[Truth, Mapping[str, Any]], None]
     needs_two_pumps: bool = False
+    is_behind_meter: bool = False
 
 
 def rounded(value: float) -> float:

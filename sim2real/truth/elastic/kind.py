@@ -97,13 +97,17 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class ElasticKind:
-    """A way to deviate: where it lies, where it must show itself, how it is drawn and what it does."""
+    """A way to deviate: where it lies, where it must show itself, how it is drawn and what it does.
+
+    What lies between the meter of the inflow and the wet well is nothing without that meter.
+    """
 
     component: str
     signals: tuple[AnalogueQuantity, ...]
     draw: Callable[[Sizes], Parameters]
     act: Callable[[ElasticTruth, Mapping[str, Any]], None]
     needs_two_pumps: bool = False
+    is_behind_meter: bool = False
 
 
 def digits(value: float) -> float:

@@ -264,6 +264,7 @@ LIBRARY_FORMS: dict[str, ElasticKind] = {
         ("level_m",),
         lambda d: {"flow_m3h": digits(d.flow_m3h * d.size(0.03, 0.2)), "breath": d.even(0.0, 0.15)},
         _unmetered_inflow,
+        is_behind_meter=True,
     ),
     "pump_wear": ElasticKind("pump", ("flow_m3h", "head_m", "level_m"), _worn, _pump_wear),
     "ragging": ElasticKind(

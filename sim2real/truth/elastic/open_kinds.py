@@ -169,6 +169,7 @@ OPEN_FORMS: dict[str, ElasticKind] = {
         ("level_m",),
         lambda d: {"weir_share": d.even(0.7, 1.0), "pump_share": d.even(0.15, 0.4)},
         _storm_tank,
+        is_behind_meter=True,
     ),
     "skipping_clock": ElasticKind(
         "telemetry",

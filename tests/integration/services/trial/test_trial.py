@@ -55,8 +55,10 @@ def folder(cases, tmp_path):
 
 def test_a_perfect_diagnosis_scores_one(folder, monkeypatch):
     _, result = run_fake("perfect", folder, monkeypatch)
-    for name in ("verdict_right", "exact_set", "top_1", "top_2", "component_right", "interval_coverage"):
+    names = ("verdict_right", "exact_set", "exact_by_name", "top_1", "top_2", "component_right", "interval_coverage")
+    for name in names:
         assert result["all"][name]["value"] == 1.0, name
+    assert result["all"]["equivalents"]["mean"] == 0.0
     assert result["reliability"]["all"] == {
         "cases": COUNT,
         "calibration_error": 0.0,
@@ -211,6 +213,27 @@ def test_rates_and_values_take_turns_with_the_same_effects_at_each():
     none_metered = replace(plan, storage=StoragePlan(absent=("inflow_m3h",), metered_share=1.0))
     assert {all_metered.case(number).absent for number in range(20)} == {()}
     assert {none_metered.case(number).absent for number in range(20)} == {("inflow_m3h",)}
+
+
+BEHIND_THE_METER = {"unmetered_inflow", "second_sump", "storm_tank"}
+
+
+@pytest.mark.parametrize("plants", [("fine", "swmm"), ("elastic",)])
+def test_what_lies_behind_the_meter_of_the_inflow_is_asked_with_that_meter_alone(plants):
+    some, none = (
+        [
+            trial_case(5, k, kinds=KINDS, plants=plants, seconds=600, storage=StoragePlan(metered_share=share))
+            for k in range(300)
+        ]
+        for share in (0.5, 0.0)
+    )
+    behind = [case for case in some if BEHIND_THE_METER & {*case.names}]
+    assert {"open", "leave_one_out", "single"} <= {case.kind for case in behind}
+    assert not any(case.absent for case in behind)
+    assert 0.3 < np.mean([bool(case.absent) for case in some]) < 0.7
+    assert all(case.absent for case in none)
+    assert not any(BEHIND_THE_METER & {*case.names[:1]} for case in none)
+    assert {case.names[0] for case in none if case.names} < {case.names[0] for case in some if case.names}
 
 
 def test_how_a_case_is_stored_is_its_own_and_the_same_in_all_attempts():
