@@ -8,6 +8,7 @@ from wetwell.services.reports.charts import Section, Series, bar_chart, heat_map
 SHARES = (
     "verdict_right",
     "exact_set",
+    "exact_by_name",
     "top_1",
     "top_2",
     "component_right",
@@ -91,10 +92,12 @@ def _share_table(title: str, groups: Mapping[str, Mapping[str, Any]]) -> str:
             *(_share(scores[key]) for key in SHARES),
             (scores["shrinkage"] or {}).get("median"),
             (scores["parameter_error"] or {}).get("median"),
+            (scores["equivalents"] or {}).get("mean"),
         ]
         for name, scores in groups.items()
     ]
-    columns = [title, "cases", "failed", "not tested", *SHARES, "median shrinkage", "median parameter error"]
+    medians = ("median shrinkage", "median parameter error", "equivalents of an effect")
+    columns = [title, "cases", "failed", "not tested", *SHARES, *medians]
     return table([column.replace("_", " ") for column in columns], rows)
 
 

@@ -75,7 +75,7 @@ def score_trial(plan: TrialPlan, folder: Path, failed: Mapping[str, Failure]) ->
 
 def brief(result: dict[str, Any], folder: Path) -> dict[str, object]:
     """What is printed for people: right answers of how many, by kind, rate, metering and noise."""
-    names = ("verdict_right", "exact_set", "top_1", "top_2", "component_right", "false_attribution")
+    names = ("verdict_right", "exact_set", "exact_by_name", "top_1", "top_2", "component_right", "false_attribution")
     split = {group: parts["scores"] for groups in result["splits"].values() for group, parts in groups.items()}
     rows = [
         {"kind": kind, "cases": scores["cases"], "not_tested": scores["not_tested"]}

@@ -19,7 +19,14 @@ from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.jumps import with_jumps
-from wetwell.sim2real.likelihood.posterior import SetProbability, best_set, equivalents, posterior_of, verdict_of
+from wetwell.sim2real.likelihood.posterior import (
+    SetProbability,
+    best_set,
+    blurred,
+    equivalents,
+    posterior_of,
+    verdict_of,
+)
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
@@ -116,7 +123,11 @@ def attribute(
     tested_names = [fit.names[0] for fit in singles]
     log_share = partial(priors.log_share, tested=tested_names)
     equal: dict[str, tuple[str, ...]] = {}
-    while verdict_of(posterior := posterior_of(hypotheses.weights(), len(singles), log_share)) == "effect":
+
+    def weighed() -> tuple[SetProbability, ...]:
+        return blurred(posterior_of(hypotheses.weights(), len(singles), log_share), hypotheses.alike)
+
+    while verdict_of(posterior := weighed()) == "effect":
         names = best_set(posterior)
         likely = hypotheses.of(names)
         its_ends = sharpened(likely.fit, intervals_of(fitter, likely.fit, residuals.bins), likely.evidence)

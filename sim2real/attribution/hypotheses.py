@@ -137,6 +137,11 @@ class Hypotheses:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
 
+    def alike(self, effects: Sequence[str], answers: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+        """Those of some answers whose readings differ from those of a set in no group by more than is allowed."""
+        own = self.of(effects).evidence.residuals
+        return tuple(answer for answer in answers if self._differ_little(self.of(answer).evidence.residuals - own))
+
     def rule_out(self, effects: Sequence[str]) -> None:
         """Take a set for none that may be the answer."""
         key = tuple(sorted(effects))
@@ -240,15 +245,18 @@ class Hypotheses:
         time_s = np.hypot(self._fitter.station.materiality.time_s, POOR_FORM * time_constant_s(fit, member))
         return np.asarray(time_s * self._cells.means(rate_of(self._fitter.bins, explained)), dtype=np.float64)
 
+    def _differ_little(self, change: Floats) -> bool:
+        """Whether (cells,) changes are within what is allowed in each group."""
+        return bool(np.all(self._cells.group_squares(change) <= self._cells.group_squares(self._cells.allowed)))
+
     def _are_apart(
         self, position: Floats, of_member: Integers, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats
     ) -> bool:
         """Whether each effect that is told does more than is allowed that the others that are told cannot do."""
-        least = self._cells.group_squares(self._cells.allowed)
         for member in told:
             is_other = np.isin(of_member, told) & (of_member != member)
             own = own_signature(signatures[member], slopes[:, is_other], self._cells.allowed, position[is_other])
-            if not np.any(self._cells.group_squares(own) > least):
+            if self._differ_little(own):
                 return False
         return True
 

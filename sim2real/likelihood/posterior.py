@@ -1,7 +1,7 @@
 """Probabilities of none, unknown and of sets of effects, given a recording."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,8 @@ FURTHER_PRIOR = 0.02
 MISJUDGED = 0.2
 """Probability that the likelihood takes unknown for known, or the other way round: what acts is too small to be seen
 beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
+MISTAKEN = 0.2
+"""Probability that of two sets that differ by no more than is allowed the less likely one is the truth. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""
 
@@ -101,6 +103,44 @@ def posterior_of(
     return tuple(sorted(found, key=lambda one: -one.probability))
 
 
+def blurred(
+    posterior: Sequence[SetProbability],
+    alike: Callable[[tuple[str, ...], Sequence[tuple[str, ...]]], Sequence[tuple[str, ...]]],
+) -> tuple[SetProbability, ...]:
+    r"""Probabilities once sets whose difference does not matter may be taken for one another, best first.
+
+    $$P'(S) = \frac{P(S)}{1 + \rho\, |A(S)|} + \sum_{S' \in A(S)} \frac{\rho\, P(S')}{1 + \rho\, |A(S')|},
+    \qquad \rho = \frac{\kappa}{1 - \kappa}$$
+
+    with the sets A(S) that are alike S, and κ `MISTAKEN`. Sets beyond `CREDIBLE` of the probability of all keep what
+    they have: it is next to nothing.
+
+    Parameters
+    ----------
+    posterior : sequence of SetProbability
+        Best first.
+    alike : callable
+        Those of some sets that are alike one of them.
+    """
+    odds = MISTAKEN / (1.0 - MISTAKEN)
+    found = {one.effects: one.probability for one in posterior if one.verdict == "effect"}
+    for one in _credible(posterior):
+        others = alike(one.effects, [effects for effects in found if effects != one.effects])
+        share = one.probability * odds / (1.0 + odds * len(others))
+        for effects in others:
+            found[effects] += share
+            found[one.effects] -= share
+    changed = [replace(one, probability=found[one.effects]) if one.verdict == "effect" else one for one in posterior]
+    return tuple(sorted(changed, key=lambda one: -one.probability))
+
+
+def _credible(posterior: Sequence[SetProbability]) -> list[SetProbability]:
+    """Sets of effects, best first, until they have `CREDIBLE` of the probability of all of them."""
+    sets = [one for one in posterior if one.verdict == "effect"]
+    before = np.cumsum([0.0, *(one.probability for one in sets)])
+    return [one for one, told in zip(sets, before, strict=False) if told < CREDIBLE * before[-1]]
+
+
 def _log_prior(effects: tuple[str, ...], library: int, log_share: Callable[[tuple[str, ...]], float] | None) -> float:
     if not effects:
         return float(np.log(NONE_PRIOR))
@@ -134,13 +174,8 @@ def equivalents(posterior: Sequence[SetProbability], effects: Sequence[str]) -> 
         Best first.
     effects : sequence of str
     """
-    sets = [one for one in posterior if one.verdict == "effect"]
-    total, told = sum(one.probability for one in sets), 0.0
     found: dict[str, list[str]] = {name: [] for name in effects}
-    for one in sets:
-        if told >= CREDIBLE * total:
-            break
-        told += one.probability
+    for one in _credible(posterior):
         gone, come = set(effects) - set(one.effects), set(one.effects) - set(effects)
         if len(gone) == len(come) == 1:
             found[gone.pop()].append(come.pop())

@@ -99,8 +99,9 @@ class CaseScore:
     told first is one of them, and `top_2` whether both are told or declared equivalent. Where the truth is not in
     the library, `top_1` and `top_2` do not arise, and "unknown" or a declared equivalent is right.
 
-    `exact_set` asks whether nothing is missing and nothing false beside it. `said` is the probability of the answer
-    that the posterior gives most, and whether that very set is the truth.
+    `exact_set` asks whether nothing is missing and nothing false beside it, `exact_by_name` the same without what is
+    declared equivalent, and `equivalents` has of each told effect how many are. `said` is the probability of the
+    answer that the posterior gives most, and whether that very set is the truth.
 
     A true effect that the answer lists as not tested is neither right nor wrong: of a pair the other is asked for.
     Where none is left, "none" is right, "unknown" neither, and the rest does not arise.
@@ -115,8 +116,10 @@ class CaseScore:
     component_right: bool | None
     false_attribution: bool | None
     exact_set: bool | None
+    exact_by_name: bool | None
     shrinkage: float | None
     parameters: tuple[dict[str, Any], ...]
+    equivalents: tuple[int, ...] = ()
     said: tuple[float, bool] | None = None
     not_tested: tuple[str, ...] = ()
 
@@ -152,6 +155,7 @@ def score_case(label: Label, answer: Answer | None, whole: Answer | None = None)
             component_right=None,
             false_attribution=None,
             exact_set=None,
+            exact_by_name=None,
             shrinkage=None,
             parameters=(),
             not_tested=not_tested,
@@ -174,10 +178,19 @@ def score_case(label: Label, answer: Answer | None, whole: Answer | None = None)
         false_attribution=told == "effect" if label.kind == "none" else None,
         exact_set=bool(answer and names and is_exact_set(answer.sets, asked.names)) if is_known else verdict_right,
         said=_said(label, asked, answer) if answer else None,
+        exact_by_name=_is_named(asked, answer, told, is_known=is_known),
+        equivalents=tuple(len(effect.equivalent) for effect in answer.effects) if answer and names else (),
         shrinkage=answer.gap.shrinkage if answer and is_known and told == "effect" else 0.0 if is_known else None,
         parameters=tuple(_parameter_rows(asked, answer)) if answer and is_known else (),
         not_tested=not_tested,
     )
+
+
+def _is_named(asked: Label, answer: Answer | None, told: str, *, is_known: bool) -> bool:
+    """Whether the answer is the truth without anything that it declares equivalent."""
+    if not is_known or answer is None or told != "effect":
+        return told == VERDICT_OF[asked.kind] and not is_known
+    return sorted(answer.names) == sorted(asked.names)
 
 
 def _is_equivalent(told: str, true: Sequence[str], answer: Answer) -> bool:
@@ -261,8 +274,17 @@ def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
         "not_tested": sum(bool(score.not_tested) for score in scores),
         **{
             name: share([getattr(score, name) for score in scores])
-            for name in ("verdict_right", "top_1", "top_2", "component_right", "exact_set", "false_attribution")
+            for name in (
+                "verdict_right",
+                "top_1",
+                "top_2",
+                "component_right",
+                "exact_set",
+                "exact_by_name",
+                "false_attribution",
+            )
         },
+        "equivalents": _mean([count for score in scores for count in score.equivalents]),
         "shrinkage": {"median": float(np.median(shrinkages)), "mean": float(np.mean(shrinkages))}
         if shrinkages
         else None,
@@ -274,6 +296,11 @@ def summary(scores: Sequence[CaseScore]) -> dict[str, Any]:
         else None,
         "interval_coverage": share(covered),
     }
+
+
+def _mean(counts: Sequence[int]) -> dict[str, float] | None:
+    """Mean number of what is declared equivalent of a told effect, and how many effects are told."""
+    return {"mean": float(np.mean(counts)), "effects": len(counts)} if counts else None
 
 
 def named_shrinkage(scores: Sequence[CaseScore]) -> dict[str, float] | None:

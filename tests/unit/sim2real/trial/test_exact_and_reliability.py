@@ -55,6 +55,25 @@ def test_an_exact_set_has_nothing_missing_and_nothing_beside_it(truth, given, ex
 
 
 @pytest.mark.parametrize(
+    ("truth", "given", "exact", "equivalents"),
+    [
+        (label("single", "a"), answer("effect", ["a"]), True, (0,)),
+        (label("single", "a"), answer("effect", ["b", "a", "c"]), False, (2,)),
+        (label("pair", "a", "b"), answer("effect", ["b", "c"], ["a"]), True, (1, 0)),
+        (label("single", "a"), answer("none"), False, ()),
+        (label("none"), answer("none"), True, ()),
+        (label("none"), answer("effect", ["a"]), False, (0,)),
+        (label("open", "z"), answer("unknown"), True, ()),
+        (label("leave_one_out", "a"), answer("effect", ["b", "a"]), False, (1,)),
+        (label("single", "a"), None, False, ()),
+    ],
+)
+def test_what_is_exact_by_name_has_no_need_of_equivalents(truth, given, exact, equivalents):
+    scored = score_case(truth, given)
+    assert (scored.exact_by_name, scored.equivalents) == (exact, equivalents)
+
+
+@pytest.mark.parametrize(
     ("truth", "posterior", "said"),
     [
         (label("single", "a"), [("effect", ["a"], 0.7), ("none", [], 0.3)], (0.7, True)),
