@@ -1,4 +1,7 @@
-"""A case whose deviations all matter: drawn anew where one of them moves nothing by more than is material."""
+"""A case whose deviations all matter: drawn anew where one of them moves nothing by more than is material.
+
+So is one whose pumps run the wet well dry: what they take then no two models say alike.
+"""
 
 from dataclasses import replace
 
@@ -12,12 +15,14 @@ from wetwell.sim2real.trial.readings import Readings, readings_of
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.storage import EVERY_SECOND, stored
 
+DRY_M = 0.01
+"""Level of a wet well that is dry. [m]"""
 ATTEMPTS = 8
 """Draws after which a case is given up: a short recording may have no room for its effect."""
 
 
 def material_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
-    """The case in its first attempt in which every deviation matters, with truth and recording.
+    """The case in its first attempt in which every deviation matters and there is water, with truth and recording.
 
     A twin without the deviation tells that, second by second and without the noise of the sensors; what the historian
     keeps of the seconds does not count, but for signals that it does not keep at all.
@@ -27,18 +32,22 @@ def material_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
     WetwellError
         If there is none among `ATTEMPTS`, or its plant is not installed.
     """
-    small = ""
+    why = ""
     for attempt in range(ATTEMPTS):
         case = replace(case, attempt=attempt)
         truth = case.truth()
         passage = _passage_of(truth, case.plant)
+        if passage.lowest_level_m < DRY_M:
+            why = f"the pumps of plant '{case.plant}' run the wet well dry in the last of {ATTEMPTS} draws"
+            continue
         small = immaterial_name(truth, case.plant, passage)
         if not small:
             return case, truth, stored(passage.recording(truth=False), truth.storage)
-    raise WetwellError(
-        f"{case.name}: '{small}' moves nothing that plant '{case.plant}' records by more than is material in any of "
-        f"{ATTEMPTS} draws: a longer recording may show it"
-    )
+        why = (
+            f"'{small}' moves nothing that plant '{case.plant}' records by more than is material in any of "
+            f"{ATTEMPTS} draws: a longer recording may show it"
+        )
+    raise WetwellError(f"{case.name}: {why}")
 
 
 def immaterial_name(truth: TruthCase, plant: PlantName, passage: Passes | None = None) -> str:

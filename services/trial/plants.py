@@ -13,6 +13,10 @@ from wetwell.sim2real.truth.elastic import plant as elastic_plant
 class Passes(Protocol):
     """What a plant has noted of a case."""
 
+    @property
+    def lowest_level_m(self) -> float:
+        """Lowest true level of the wet well. [m]."""
+
     def recording(self, *, truth: bool) -> Recording:
         """What is recorded; a blind recording has no truth columns."""
 

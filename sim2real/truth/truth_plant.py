@@ -58,6 +58,11 @@ class Passage:
         return stored(recording, self.case.storage)
 
     @property
+    def lowest_level_m(self) -> float:
+        """Lowest true level of the wet well. [m]."""
+        return float(self.station_record[kernel.LEVEL].min())
+
+    @property
     def _stamps_ns(self) -> Integers:
         return self.case.start_ns + NS_PER_S * np.arange(self.case.seconds)
 

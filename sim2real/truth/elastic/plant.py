@@ -49,6 +49,11 @@ class ElasticPassage:
         """What sensors without noise would have recorded."""
         return self._stored(self._columns(_QUIET, self.station_record[kernel.READING] - self.level_noise_m), {})
 
+    @property
+    def lowest_level_m(self) -> float:
+        """Lowest true level of the wet well. [m]."""
+        return float(self.station_record[kernel.LEVEL].min())
+
     def _stored(self, columns: dict[str, Floats], truth: dict[str, Floats]) -> Recording:
         case = self.case
         time_ns = case.start_ns + NS_PER_S * np.arange(case.seconds)

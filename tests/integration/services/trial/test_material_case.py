@@ -133,6 +133,16 @@ def test_a_case_whose_deviation_does_not_matter_is_drawn_anew(tmp_path):
     assert immaterial_name(truth, "fine") == ""
 
 
+def test_a_case_whose_pumps_run_the_wet_well_dry_is_drawn_anew():
+    """The true plant goes on, a simulator does not: no two models say what pumps take of an empty wet well."""
+    first = TrialCase(seed=6, number=0, kind="single", plant="elastic", names=("control_delay",), seconds=3600)
+    assert passage_of(first.truth(), "elastic").lowest_level_m == 0.0
+    assert immaterial_name(first.truth(), "elastic") == ""
+    case, truth, _ = material_case(first)
+    assert case.attempt > 0
+    assert passage_of(truth, "elastic").lowest_level_m > 0.05
+
+
 def test_a_case_whose_deviation_matters_stays_in_its_first_attempt():
     first = PLAN.case(0)
     case, truth, recording = material_case(first)
