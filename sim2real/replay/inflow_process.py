@@ -42,6 +42,30 @@ MOST_SQUARE = 9.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Bends:
+    """How the level of rows bends at rest: what of it the inflow does not make is noise of the sensor.
+
+    Attributes
+    ----------
+    noise_m2 : float
+        Variance of the noise that they show if the inflow makes nothing of them. [m²]
+    every_s : int
+        From row to row. [s]
+    least_noise_m : float
+        Standard deviation of the noise at the least. [m]
+    """
+
+    noise_m2: float
+    every_s: int
+    least_noise_m: float
+
+    def under(self, moving: Uncertain, made: Floats) -> Uncertain:
+        """A process of the inflow with the noise that it leaves of the bends; `made` as of `inflow_bends`."""
+        noise_m2 = self.noise_m2 - float(made @ (moving.drift_m2_s3, moving.waves_m2_s))
+        return replace(moving, noise_m2=max(noise_m2, self.least_noise_m**2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InflowProcess:
     """How an inflow moves if the sensor of the level lags by so much.
 
@@ -51,18 +75,23 @@ class InflowProcess:
         Of the sensor, rising. [s]
     under : tuple of Uncertain
         One for each lag; they differ in the process.
+    bends : Bends, optional
+        From which the noise under a lag comes; none where it is known otherwise.
     """
 
     lags_s: tuple[float, ...]
     under: tuple[Uncertain, ...]
+    bends: Bends | None = None
 
-    def at(self, lag_s: float) -> Uncertain:
-        """What is uncertain under a lag; between two of them the logarithms go straight. [s]."""
-        if len(self.lags_s) == 1:
+    def at(self, sensor: SensorParameters) -> Uncertain:
+        """What is uncertain under a sensor; between two lags the logarithms of the process go straight."""
+        if self.bends is None:
             return self.under[0]
-        logs = np.log([[one.drift_m2_s3, one.waves_m2_s, one.noise_m2] for one in self.under])
-        drift_m2_s3, waves_m2_s, noise_m2 = np.exp([np.interp(lag_s, self.lags_s, each) for each in logs.T])
-        return replace(self.under[0], drift_m2_s3=drift_m2_s3, waves_m2_s=waves_m2_s, noise_m2=noise_m2)
+        lag_s = step_of(sensor)[2]
+        logs = np.log([[one.drift_m2_s3, one.waves_m2_s] for one in self.under])
+        drift_m2_s3, waves_m2_s = np.exp([np.interp(lag_s, self.lags_s, each) for each in logs.T])
+        moving = replace(self.under[0], drift_m2_s3=drift_m2_s3, waves_m2_s=waves_m2_s)
+        return self.bends.under(moving, inflow_bends(sensor, self.bends.every_s))
 
 
 def learnt_process(
@@ -83,7 +112,7 @@ def learnt_process(
     with the errors $e_k$ of Kalman's filter under lag l, $v_k$ their variance, and a prior of width s that few rests
     do not overrule. Behind a lag, an inflow that is anew in each second looks like a smoother one without. Lags that
     rests make less likely have no process of their own. The noise of the sensor is what the bends of the level show,
-    without what the inflow makes of them (`inflow_bends`).
+    without what the inflow makes of them under that lag (`inflow_bends`).
 
     Parameters
     ----------
@@ -109,22 +138,21 @@ def learnt_process(
     idle = np.flatnonzero(is_idle)
     if not np.any(is_settled[idle] & uncertain.is_known[idle]):
         return InflowProcess(lags_s=(0.0,), under=(replace(uncertain, drift_m2_s3=DRIFT * carried_m_s**2),))
-    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, least_noise_m)
+    bends = Bends(noise_m2=uncertain.noise_m2, every_s=round(rate_s), least_noise_m=least_noise_m)
+    at_rest = _at_rest(uncertain, level_m, idle, is_settled, carried_m_s, bends)
     logs, found = np.zeros(2), []
     for lag_s in LAGS_S:
         if lag_s == 0.0 or lag_s >= 0.5 * rate_s:
             lagging = damped_by(sensor, lag_s, 0.0)
-            bends = inflow_bends(lagging, round(rate_s))
-            logs, cost = at_rest.likeliest(lagging, bends, logs, ROUGHLY if lag_s == 0.0 else CLOSELY)
-            found.append((cost, step_of(lagging)[2], at_rest.moving(logs, bends)))
+            made = inflow_bends(lagging, bends.every_s)
+            logs, cost = at_rest.likeliest(lagging, made, logs, ROUGHLY if lag_s == 0.0 else CLOSELY)
+            found.append((cost, step_of(lagging)[2], at_rest.moving(logs, made)))
     least, _, _ = min(found, key=lambda one: one[0])
     likely = [(lag_s, process) for cost, lag_s, process in found if cost <= least + LEAST_TOLD]
     return InflowProcess(
         lags_s=tuple(lag_s for lag_s, _ in likely),
-        under=tuple(
-            replace(uncertain, drift_m2_s3=one.drift_m2_s3, waves_m2_s=one.waves_m2_s, noise_m2=one.noise_m2)
-            for _, one in likely
-        ),
+        under=tuple(replace(uncertain, drift_m2_s3=one.drift_m2_s3, waves_m2_s=one.waves_m2_s) for _, one in likely),
+        bends=bends,
     )
 
 
@@ -169,27 +197,24 @@ class _Rest:
     level_m: Floats
     rows: Flags
     carried_m_s: float
-    least_noise_m: float
+    bends: Bends
 
-    def moving(self, logs: Floats, bends: Floats) -> Uncertain:
+    def moving(self, logs: Floats, made: Floats) -> Uncertain:
         """With a process of the inflow: logarithms of drift and waves, over where the search begins.
 
-        What the process makes of the bends of the level (`inflow_bends`) is no noise of the sensor.
+        What the process has `made` of the bends of the level (`inflow_bends`) is no noise of the sensor.
         """
         drift, wave = np.exp(logs)
-        drift_m2_s3 = DRIFT * drift * self.carried_m_s**2
-        waves_m2_s = (WAVE * wave * self.carried_m_s) ** 2
-        noise_m2 = self.uncertain.noise_m2 - float(bends @ (drift_m2_s3, waves_m2_s))
-        return replace(
+        moving = replace(
             self.uncertain,
-            drift_m2_s3=drift_m2_s3,
-            waves_m2_s=waves_m2_s,
-            noise_m2=max(noise_m2, self.least_noise_m**2),
+            drift_m2_s3=DRIFT * drift * self.carried_m_s**2,
+            waves_m2_s=(WAVE * wave * self.carried_m_s) ** 2,
         )
+        return self.bends.under(moving, made)
 
-    def cost(self, logs: Floats, sensor: SensorParameters, bends: Floats) -> float:
+    def cost(self, logs: Floats, sensor: SensorParameters, made: Floats) -> float:
         """Twice what it takes from the logarithm of the posterior; no error counts for much."""
-        gains, variance_m2 = level_filter(self.moving(logs, bends), sensor)
+        gains, variance_m2 = level_filter(self.moving(logs, made), sensor)
         error_m = np.full(self.level_m.size, np.nan)
         step, _, lag_s = step_of(sensor)
         _follow(step, lag_s, gains, self.uncertain.is_known, self.level_m, np.zeros((2, 4)), error_m)
@@ -197,7 +222,7 @@ class _Rest:
         squares = np.minimum(error_m[rows] ** 2 / variance_m2[rows], MOST_SQUARE)
         return float(np.sum(squares + np.log(variance_m2[rows])) + np.sum((logs / PRIOR_WIDTH) ** 2))
 
-    def likeliest(self, sensor: SensorParameters, bends: Floats, first: Floats, step: float) -> tuple[Floats, float]:
+    def likeliest(self, sensor: SensorParameters, made: Floats, first: Floats, step: float) -> tuple[Floats, float]:
         """Logarithms that cost least, reached from the first ones, and that cost."""
         steps = step * np.diff(LOG_SOUGHT)[:, 0]
         inwards = np.where(first > LOG_SOUGHT.mean(axis=1), -steps, steps)
@@ -205,7 +230,7 @@ class _Rest:
         found = minimize(
             self.cost,
             first,
-            args=(sensor, bends),
+            args=(sensor, made),
             method="Nelder-Mead",
             bounds=LOG_SOUGHT.tolist(),
             options={"initial_simplex": simplex, "xatol": CLOSE, "fatol": COST_ALIKE},
@@ -219,7 +244,7 @@ def _at_rest(
     idle: Integers,
     is_settled: Flags,
     carried_m_s: float,
-    least_noise_m: float,
+    bends: Bends,
 ) -> _Rest:
     """Level of the idle seconds; before each rest there is a pause, after which all but the inflow begins anew."""
     rests = np.split(idle, np.flatnonzero(np.diff(idle) > 1) + 1)
@@ -233,7 +258,7 @@ def _at_rest(
         level_m=level_m[place],
         rows=is_known & is_settled[place],
         carried_m_s=carried_m_s,
-        least_noise_m=least_noise_m,
+        bends=bends,
     )
 
 

@@ -10,7 +10,7 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.seconds import noise_by_bends
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.inflow_process import InflowProcess
-from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter, step_of
+from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter
 from wetwell.sim2real.replay.metered_inflow import MeteredInflow
 from wetwell.simulator.parameters import SensorParameters, plant_parameters
 
@@ -78,7 +78,7 @@ class Observer:
         """
         if self.process is None or sensor.followed >= 1.0:
             return self
-        gains, variance_m2 = level_filter(self.process.at(step_of(sensor)[2]), sensor)
+        gains, variance_m2 = level_filter(self.process.at(sensor), sensor)
         return replace(
             self,
             level_gain=gains[0],
@@ -221,7 +221,7 @@ def row_observer(level_m: Floats, process: InflowProcess, sensor: SensorParamete
     sensor : SensorParameters
         Of the level.
     """
-    uncertain = process.at(step_of(sensor)[2])
+    uncertain = process.at(sensor)
     gains, variance_m2 = level_filter(uncertain, sensor)
     return Observer(
         level_m=level_m,

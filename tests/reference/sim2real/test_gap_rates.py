@@ -19,10 +19,10 @@ LENGTH_S = 43_200
 RATES = [(1, "instant"), (5, "instant"), (10, "instant"), (60, "instant"), (10, "mean"), (60, "mean"), (900, "mean")]
 
 
-def record(station, effects=(), seed=23):
+def record(station, effects=(), seed=23, length_s=LENGTH_S):
     tables = tuple(EffectTable.model_validate(effect) for effect in effects)
     true = station.model_copy(update={"effect": tables})
-    return Simulation(true, find_scenario("nominal"), seed).advance(LENGTH_S, truth=False)
+    return Simulation(true, find_scenario("nominal"), seed).advance(length_s, truth=False)
 
 
 def stored(recording, every, value="instant", without=()):
@@ -95,6 +95,13 @@ def test_without_a_gap_nobody_is_blamed(alpha, plain, every, value, without):
 def test_an_inflow_that_is_another_in_each_second_is_no_lag_of_the_level(alpha):
     """Slopes at a lag of .3 s promise much at 5 s, which is not there."""
     report = diagnose(stored(record(alpha, seed=24), 1, without=("inflow",)), alpha).report()
+    assert (report.verdict, report.effects) == ("none", ())
+
+
+@pytest.mark.long
+def test_a_lag_that_is_not_there_gains_nothing_by_a_filter_that_corrects_too_much(alpha):
+    """In rows of 5 s: behind a lag of two the inflow makes less of the bends of a level, and the sensor more."""
+    report = diagnose(stored(record(alpha, seed=31, length_s=86_400), 5, without=("inflow",)), alpha).report()
     assert (report.verdict, report.effects) == ("none", ())
 
 

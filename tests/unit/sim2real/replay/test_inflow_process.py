@@ -17,6 +17,10 @@ CARRIED_M_S = 0.007
 DRIFT_M2_S3, WAVES_M2_S, NOISE_M = 1e-9, 1.5e-6, 0.002
 
 
+def lagging(lag_s):
+    return damped_by(SENSOR, lag_s, 0.0)
+
+
 def learnt(lag_s, every_s=1, waves_m2_s=WAVES_M2_S, seconds=SECONDS, seed=4):
     """What is learnt of a level that rises and is pumped down in turns."""
     rng = np.random.default_rng(seed)
@@ -50,7 +54,7 @@ def learnt(lag_s, every_s=1, waves_m2_s=WAVES_M2_S, seconds=SECONDS, seed=4):
 @pytest.mark.parametrize(("lag_s", "every_s"), [(0.0, 1), (12.0, 1), (30.0, 1), (0.0, 10)])
 def test_it_is_found_under_the_lag_that_the_sensor_has(lag_s, every_s):
     _, process = learnt(lag_s, every_s)
-    found = process.at(max(lag_s - 0.5, 0.0))
+    found = process.at(lagging(lag_s))
     assert found.waves_m2_s == pytest.approx(WAVES_M2_S, rel=0.4)
     assert found.drift_m2_s3 == pytest.approx(DRIFT_M2_S3, rel=0.4)
     assert found.noise_m2 == pytest.approx(NOISE_M**2, rel=0.4)
@@ -81,20 +85,35 @@ def test_a_lag_that_cannot_be_has_no_process_of_its_own():
     assert process.lags_s == (0.0,)
 
 
+@pytest.mark.parametrize("lag_s", [0.5, 2.0, 4.0])
+def test_under_a_lag_the_inflow_makes_less_of_the_bends_and_the_sensor_more(lag_s):
+    """Else the filter corrects too much, its errors cancel over half a minute, and a lag that is not there gains."""
+    given, process = learnt(0.0, every_s=5)
+    found, still = process.at(lagging(lag_s)), process.at(SENSOR)
+    assert still.noise_m2 < found.noise_m2 < given.noise_m2
+    shares = inflow_bends(lagging(lag_s), 5)
+    made_m2 = float(shares @ (found.drift_m2_s3, found.waves_m2_s))
+    assert found.noise_m2 + made_m2 == pytest.approx(given.noise_m2, rel=1e-9)
+
+
 def test_an_inflow_without_waves_may_have_some_that_a_lag_hides():
     _, process = learnt(0.0, waves_m2_s=0.0)
-    assert process.at(0.0).waves_m2_s < 0.02 * WAVES_M2_S < process.at(39.5).waves_m2_s
-    assert process.at(39.5).waves_m2_s > process.at(30.0).waves_m2_s > process.at(10.0).waves_m2_s
+    assert process.at(lagging(0.0)).waves_m2_s < 0.02 * WAVES_M2_S < process.at(lagging(40.0)).waves_m2_s
+    assert (
+        process.at(lagging(40.0)).waves_m2_s
+        > process.at(lagging(30.0)).waves_m2_s
+        > process.at(lagging(10.0)).waves_m2_s
+    )
 
 
 def test_of_many_rests_some_are_enough():
     _, process = learnt(0.0, seconds=3 * MOST_S)
-    assert process.at(0.0).waves_m2_s == pytest.approx(WAVES_M2_S, rel=0.3)
+    assert process.at(lagging(0.0)).waves_m2_s == pytest.approx(WAVES_M2_S, rel=0.3)
 
 
 def test_nothing_but_the_process_is_another():
     given, process = learnt(0.0)
-    found = process.at(0.0)
+    found = process.at(lagging(0.0))
     assert found.is_known is given.is_known
     assert (found.first_m2_s2, found.lost_s) == (given.first_m2_s2, given.lost_s)
 
@@ -102,5 +121,5 @@ def test_nothing_but_the_process_is_another():
 def test_where_nothing_rests_it_is_that_of_the_station():
     given, _ = learnt(0.0, seconds=2000)
     never = np.zeros(2000, dtype=bool)
-    found = learnt_process(given, np.ones(2000), never, never, SENSOR, CARRIED_M_S, 1.0, 1e-4).at(0.0)
+    found = learnt_process(given, np.ones(2000), never, never, SENSOR, CARRIED_M_S, 1.0, 1e-4).at(lagging(0.0))
     assert (found.drift_m2_s3, found.waves_m2_s) == (DRIFT * CARRIED_M_S**2, 0.0)
