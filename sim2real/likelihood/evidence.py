@@ -13,7 +13,7 @@ from wetwell.sim2real.likelihood.cells import Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Allowance, Form, no_form, projected
 from wetwell.sim2real.likelihood.jumps import jumping
 from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
-from wetwell.sim2real.likelihood.ways import RIGHT, Seen, Ways
+from wetwell.sim2real.likelihood.ways import Seen, Ways, right_ways
 
 TRUSTED = 0.01
 """Share of the range of a parameter for which its slopes are taken to hold: the fit minimised another loss. [1]"""
@@ -215,7 +215,8 @@ def cell_weights(found: Evidence, form: Form) -> Weights:
     blocks = []
     for one in found.stirred:
         left, its = found.residuals[one.block.rows], form.chosen(one.block.rows)
-        blocks.append((one.block, its, _under(Seen(one.block, left, its, one.swing), left[:, None], RIGHT)[2]))
+        seen = Seen(one.block, left, its, one.swing)
+        blocks.append((one.block, its, _under(seen, left[:, None], right_ways(one.block))[2]))
     return Weights(blocks=tuple(blocks))
 
 
@@ -225,7 +226,7 @@ def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
 
 
 def weighed(
-    block: Block, columns: Floats, residuals: Floats, form: Form, ways: Ways = RIGHT
+    block: Block, columns: Floats, residuals: Floats, form: Form, ways: Ways | None = None
 ) -> tuple[float, Floats, Stirred]:
     """A block under what is likeliest to be wrong in it.
 
@@ -238,8 +239,8 @@ def weighed(
         By which it is seen what is wrong.
     form : Form
         Of the block's cells.
-    ways : Ways
-        What may be wrong.
+    ways : Ways, optional
+        What may be wrong; by default as in a right model.
 
     Returns
     -------
@@ -247,7 +248,7 @@ def weighed(
         Logarithm of volume and of what not knowing the ways adds, the products of the columns, and the likeliest
         surge and swing.
     """
-    tried = []
+    tried, ways = [], ways or right_ways(block)
     rained = [_rained_on(replace(block, surge=surge), residuals) for surge in block.surges]
     for still, swing in product(rained, SWINGS if np.any(form.swinging) else SWINGS[:1]):
         one = replace(still, swing=swing)

@@ -6,7 +6,7 @@ from scipy.special import logsumexp
 from wetwell.sim2real.likelihood.cells import TIMES
 from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form
 from wetwell.sim2real.likelihood.evidence import Evidence, Stirred, under
-from wetwell.sim2real.likelihood.ways import RIGHT, Seen, Way, Ways
+from wetwell.sim2real.likelihood.ways import Seen, Way, Ways, right_ways
 
 SCALES = TIMES[1:]
 """Times what is allowed that something unknown may be in a block, each as likely."""
@@ -54,7 +54,7 @@ def flexible_factor(found: Evidence, form: Form) -> float:
         left, its = found.residuals[block.rows], form.chosen(block.rows)
         wet = Seen(block, left, its, one.swing)
         dry = None if one.dry is None else Seen(one.dry.only(says), left, its, one.swing)
-        known, *unknown = (_log(one, wet, dry, ways) for ways in (RIGHT, *UNKNOWN_WAYS))
+        known, *unknown = (_log(one, wet, dry, ways) for ways in (right_ways(block), *UNKNOWN_WAYS))
         total += np.logaddexp(np.log1p(-ACTING), np.log(ACTING) + logsumexp(unknown) - np.log(len(unknown)) - known)
     return float(logsumexp(LOG_WEIGHTS + total))
 

@@ -18,7 +18,7 @@ FURTHER_PRIOR = 0.02
 MISJUDGED = 0.2
 """Probability that the likelihood takes unknown for known, or the other way round: what acts is too small to be seen
 beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
-MISTAKEN = 0.2
+MISTAKEN = 0.4
 """Probability that of two sets that differ by no more than is allowed the less likely one is the truth. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""

@@ -1,7 +1,7 @@
 """Where a model is good and where it is poor: the likeliest way, by what a fit leaves."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -20,6 +20,7 @@ from wetwell.sim2real.likelihood.covariance import (
     of_form,
 )
 from wetwell.sim2real.likelihood.scatter import scatter_of
+from wetwell.sim2real.residuals.bins import START_LEVEL, STOP_LEVEL
 
 POORLY = 0.1
 """Probability that a right model is poor in a span or group; and that a block is one where it mostly is. [1]"""
@@ -66,8 +67,21 @@ class Ways:
     may_be_prone: bool = False
 
 
+def _no_larger(ways: Sequence[Way]) -> tuple[Way, ...]:
+    """The same with poor models no further off than good ones, but for what effects do there."""
+    good = min(way.errors.offset for way in ways)
+    return tuple(replace(way, errors=replace(way.errors, offset=good)) for way in ways)
+
+
 KNOWN, RIGHT = Ways(), Ways(may_be_prone=True)
 """Of a right model."""
+RIGHT_AT_EVENTS = Ways(span=_no_larger(SPAN_WAYS), own=_no_larger(OWN_WAYS), may_be_prone=True)
+"""Of the level at which a pump is started or stopped: a controller compares, and no water moves in between."""
+
+
+def right_ways(block: Block) -> Ways:
+    """What a right model may have wrong in a block."""
+    return RIGHT_AT_EVENTS if block.signal in {START_LEVEL, STOP_LEVEL} else RIGHT
 
 
 class Seen:

@@ -26,7 +26,7 @@ from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
-from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, Bins
+from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, STOP_LEVEL, Bins
 
 CYCLES, EACH = 12, 3
 
@@ -285,9 +285,9 @@ def test_only_what_is_far_over_the_allowed_size_asks_for_something_unknown(cells
     assert unknown_in(cells, noise + 12.0 * rng.normal(size=cells.group.size) * cells.allowed) > 0.0
 
 
-def of_many_blocks():
+def of_many_blocks(signals=(FLOW, HEAD, POWER)):
     """Flow, head and power in five regimes: a bin in each of twelve cycles."""
-    signal, regime, cycle = (one.ravel() for one in np.meshgrid([FLOW, HEAD, POWER], range(5), range(CYCLES)))
+    signal, regime, cycle = (one.ravel() for one in np.meshgrid(signals, range(5), range(CYCLES)))
     ones = np.ones(signal.size)
     bins = Bins(
         signal=signal,
@@ -312,6 +312,16 @@ def test_something_unknown_may_act_in_one_block_of_many():
     assert -np.log(blocks + 1.0) < unknown_in(cells, residuals) < -1.5
     residuals[cells.blocks[4].rows] += 10.0 * cells.allowed[cells.blocks[4].rows]
     assert unknown_in(cells, residuals) > 0.0
+
+
+@pytest.mark.parametrize(("signal", "least", "most"), [(FLOW, -10.0, 0.0), (STOP_LEVEL, 2.0, 40.0)])
+def test_a_threshold_that_is_off_by_three_times_what_matters_is_no_error_of_a_right_model(signal, least, most):
+    """A flow of a start may be poor; a level at which a pump is stopped is compared with a number."""
+    cells = of_many_blocks((FLOW, HEAD, STOP_LEVEL))
+    residuals = 0.5 * np.sqrt(cells.variance) * np.random.default_rng(24).normal(size=cells.group.size)
+    (off,) = (block for block in cells.blocks if (block.signal, block.regime) == (signal, 3))
+    residuals[off.rows] += 3.0 * off.allowed
+    assert least < unknown_in(cells, residuals) < most
 
 
 def test_readings_of_nothing_say_nothing_of_what_else_there_is():

@@ -82,7 +82,7 @@ def test_what_differs_by_nothing_that_matters_is_equivalent_however_clear_the_li
     posterior = posterior_of([NONE, *sets], 25)
     assert equivalents(blurred(posterior, only()), lift) == {"static_head_bias": ("pump_wear",)}
     after = blurred(posterior, only((lift, friction)))
-    assert equivalents(after, lift) == {"static_head_bias": ("pump_wear", "friction_bias")}
+    assert {*equivalents(after, lift)["static_head_bias"]} == {"pump_wear", "friction_bias"}
     assert sum(one.probability for one in after) == pytest.approx(1.0)
     assert [one.probability for one in after] == sorted((one.probability for one in after), reverse=True)
     assert verdict_of(after) == verdict_of(posterior)
