@@ -22,9 +22,9 @@ from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import (
     SetProbability,
     best_set,
-    blurred,
     equivalents,
     posterior_of,
+    shared,
     verdict_of,
 )
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
@@ -122,23 +122,19 @@ def attribute(
     hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     tested_names = [fit.names[0] for fit in singles]
     log_share = partial(priors.log_share, tested=tested_names)
-    equal: dict[str, tuple[str, ...]] = {}
-
-    def weighed() -> tuple[SetProbability, ...]:
-        return blurred(posterior_of(hypotheses.weights(), len(singles), log_share), hypotheses.alike)
-
-    while verdict_of(posterior := weighed()) == "effect":
+    while verdict_of(posterior := posterior_of(hypotheses.weights(), len(singles), log_share)) == "effect":
         names = best_set(posterior)
         likely = hypotheses.of(names)
         its_ends = sharpened(likely.fit, intervals_of(fitter, likely.fit, residuals.bins), likely.evidence)
         if are_sized(likely.fit, its_ends):
             own, own_ends = in_order(fitter, likely.fit, its_ends)
             ends, accepted = own_ends, informed(fitter, own, priors)
-            equal = equivalents(posterior, accepted.names)
             break
         hypotheses.rule_out(names)
     else:
         accepted, own, own_ends, ends = None, None, np.zeros((0, 2)), np.zeros((0, 2))
+    posterior = shared(posterior, hypotheses.alike)
+    equal = {} if accepted is None else equivalents(posterior, accepted.names)
     progress(1.0)
     if accepted is not None and accepted is not own:
         ends = intervals_of(fitter, accepted, residuals.bins, priors)

@@ -18,7 +18,7 @@ from wetwell.sim2real.attribution.presence import (
 from wetwell.sim2real.attribution.promise import Beside
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
-from wetwell.sim2real.likelihood.covariance import GOOD, LATE, POOR_FORM, Form, no_form
+from wetwell.sim2real.likelihood.covariance import GOOD, LATE, OFFSET, POOR_FORM, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import Weight
@@ -138,9 +138,11 @@ class Hypotheses:
         return self._best[tuple(sorted(effects))]
 
     def alike(self, effects: Sequence[str], answers: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
-        """Those of some answers whose readings differ from those of a set in no group by more than is allowed."""
+        """Those of some answers whose readings differ from those of a set by no more than a good model is off."""
         own = self.of(effects).evidence.residuals
-        return tuple(answer for answer in answers if self._differ_little(self.of(answer).evidence.residuals - own))
+        return tuple(
+            answer for answer in answers if self._is_within(self.of(answer).evidence.residuals - own, OFFSET)
+        )
 
     def rule_out(self, effects: Sequence[str]) -> None:
         """Take a set for none that may be the answer."""
@@ -245,9 +247,10 @@ class Hypotheses:
         time_s = np.hypot(self._fitter.station.materiality.time_s, POOR_FORM * time_constant_s(fit, member))
         return np.asarray(time_s * self._cells.means(rate_of(self._fitter.bins, explained)), dtype=np.float64)
 
-    def _differ_little(self, change: Floats) -> bool:
-        """Whether (cells,) changes are within what is allowed in each group."""
-        return bool(np.all(self._cells.group_squares(change) <= self._cells.group_squares(self._cells.allowed)))
+    def _is_within(self, change: Floats, share: float) -> bool:
+        """Whether (cells,) changes are within a share of what is allowed in each group."""
+        most = self._cells.group_squares(share * self._cells.allowed)
+        return bool(np.all(self._cells.group_squares(change) <= most))
 
     def _are_apart(
         self, position: Floats, of_member: Integers, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats
@@ -256,7 +259,7 @@ class Hypotheses:
         for member in told:
             is_other = np.isin(of_member, told) & (of_member != member)
             own = own_signature(signatures[member], slopes[:, is_other], self._cells.allowed, position[is_other])
-            if self._differ_little(own):
+            if self._is_within(own, 1.0):
                 return False
         return True
 

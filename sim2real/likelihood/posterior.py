@@ -18,10 +18,10 @@ FURTHER_PRIOR = 0.02
 MISJUDGED = 0.2
 """Probability that the likelihood takes unknown for known, or the other way round: what acts is too small to be seen
 beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
-MISTAKEN = 0.4
-"""Probability that of two sets that differ by no more than is allowed the less likely one is the truth. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""
+PLACES = 6
+"""Decimal places in which probabilities are equal. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,17 +103,16 @@ def posterior_of(
     return tuple(sorted(found, key=lambda one: -one.probability))
 
 
-def blurred(
+def shared(
     posterior: Sequence[SetProbability],
     alike: Callable[[tuple[str, ...], Sequence[tuple[str, ...]]], Sequence[tuple[str, ...]]],
 ) -> tuple[SetProbability, ...]:
-    r"""Probabilities once sets whose difference does not matter may be taken for one another, best first.
+    r"""Probabilities once sets that nothing parts share theirs evenly, best first.
 
-    $$P'(S) = \frac{P(S)}{1 + \rho\, |A(S)|} + \sum_{S' \in A(S)} \frac{\rho\, P(S')}{1 + \rho\, |A(S')|},
-    \qquad \rho = \frac{\kappa}{1 - \kappa}$$
+    $$P'(S) = \frac{P(S)}{1 + |A(S)|} + \sum_{S' \in A(S)} \frac{P(S')}{1 + |A(S')|}$$
 
-    with the sets A(S) that are alike S, and κ `MISTAKEN`. Sets beyond `CREDIBLE` of the probability of all keep what
-    they have: it is next to nothing.
+    with the sets A(S) that are alike S. Sets beyond `CREDIBLE` of the probability of all keep what they have: it is
+    next to nothing. Of equal ones the likelier comes first.
 
     Parameters
     ----------
@@ -122,16 +121,15 @@ def blurred(
     alike : callable
         Those of some sets that are alike one of them.
     """
-    odds = MISTAKEN / (1.0 - MISTAKEN)
     found = {one.effects: one.probability for one in posterior if one.verdict == "effect"}
     for one in _credible(posterior):
         others = alike(one.effects, [effects for effects in found if effects != one.effects])
-        share = one.probability * odds / (1.0 + odds * len(others))
+        share = one.probability / (1.0 + len(others))
         for effects in others:
             found[effects] += share
             found[one.effects] -= share
     changed = [replace(one, probability=found[one.effects]) if one.verdict == "effect" else one for one in posterior]
-    return tuple(sorted(changed, key=lambda one: -one.probability))
+    return tuple(sorted(changed, key=lambda one: -round(one.probability, PLACES)))
 
 
 def _credible(posterior: Sequence[SetProbability]) -> list[SetProbability]:

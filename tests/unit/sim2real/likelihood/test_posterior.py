@@ -5,12 +5,11 @@ import pytest
 
 from wetwell.sim2real.likelihood.posterior import (
     CREDIBLE,
-    MISTAKEN,
     Weight,
     best_set,
-    blurred,
     equivalents,
     posterior_of,
+    shared,
     verdict_of,
 )
 
@@ -80,25 +79,27 @@ def test_what_differs_by_nothing_that_matters_is_equivalent_however_clear_the_li
     lift, friction, wear = (("static_head_bias",), ("friction_bias",), ("pump_wear",))
     sets = [weight(*lift, log=900.0), weight(*friction, log=870.0), weight(*wear, log=899.0)]
     posterior = posterior_of([NONE, *sets], 25)
-    assert equivalents(blurred(posterior, only()), lift) == {"static_head_bias": ("pump_wear",)}
-    after = blurred(posterior, only((lift, friction)))
+    assert equivalents(shared(posterior, only()), lift) == {"static_head_bias": ("pump_wear",)}
+    after = shared(posterior, only((lift, friction)))
     assert {*equivalents(after, lift)["static_head_bias"]} == {"pump_wear", "friction_bias"}
     assert sum(one.probability for one in after) == pytest.approx(1.0)
-    assert [one.probability for one in after] == sorted((one.probability for one in after), reverse=True)
+    probabilities = [one.probability for one in after]
+    assert probabilities == pytest.approx(sorted(probabilities, reverse=True), abs=1e-6)
     assert verdict_of(after) == verdict_of(posterior)
     before, told = ({one.effects: one.probability for one in each} for each in (posterior, after))
-    assert told[friction] == pytest.approx(MISTAKEN * (before[lift] + before[friction]), rel=1e-6)
+    assert [told[lift], told[friction]] == pytest.approx([0.5 * before[lift]] * 2, rel=1e-6)
+    assert best_set(after) == lift, "which is the likelier of two that share"
     assert told[wear] == before[wear]
 
 
 def test_all_of_many_that_are_alike_are_equivalent():
     names = [f"effect {k}" for k in range(9)]
     posterior = posterior_of([NONE, *(weight(name, log=900.0 - 20.0 * k) for k, name in enumerate(names))], 25)
-    after = blurred(posterior, lambda _, others: others)
+    after = shared(posterior, lambda _, others: others)
     assert best_set(after) == ("effect 0",)
     assert equivalents(after, ("effect 0",)) == {"effect 0": tuple(names[1:])}
 
 
 def test_no_equivalents_without_effects():
-    assert blurred(posterior_of([NONE], 25), only()) == posterior_of([NONE], 25)
+    assert shared(posterior_of([NONE], 25), only()) == posterior_of([NONE], 25)
     assert equivalents(posterior_of([NONE], 25), ()) == {}
