@@ -20,7 +20,7 @@ MISJUDGED = 0.2
 beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
 CREDIBLE = 0.95
 """Probability within which sets are not told apart. [1]"""
-PLACES = 6
+DECIMALS = 6
 """Decimal places in which probabilities are equal. [1]"""
 
 
@@ -129,7 +129,7 @@ def shared(
             found[effects] += share
             found[one.effects] -= share
     changed = [replace(one, probability=found[one.effects]) if one.verdict == "effect" else one for one in posterior]
-    return tuple(sorted(changed, key=lambda one: -round(one.probability, PLACES)))
+    return tuple(sorted(changed, key=lambda one: -round(one.probability, DECIMALS)))
 
 
 def _credible(posterior: Sequence[SetProbability]) -> list[SetProbability]:

@@ -10,7 +10,9 @@ from wetwell.simulator.parameters import PlantParameters
 class PumpWear(Effect):
     r"""The curve of a worn pump is lower: its impeller gives less head, and water runs back through its wear rings.
 
-    $$H(Q, N) = (1 - w) \left(c_0 N^2 + c_1 N (Q + q N) + c_2 (Q + q N)^2\right)$$
+    $$H(Q, N) = (1 - w) \left(c_0 N^2 + c_1 N (Q + q N) + c_2 (Q + q N)^2\right) - v \frac{Q^2}{Q_r^2}$$
+
+    Rough or blunt vanes lose head with the square of the flow.
 
     Parameters
     ----------
@@ -18,6 +20,8 @@ class PumpWear(Effect):
         w, share of the head that the impeller has lost; 0 is none. [1]
     leak_m3h : float
         q, leakage at nominal speed; 0 is none. [m³/h]
+    vane_loss_m : float
+        v, head that the vanes lose at the rated flow; 0 is none. [m]
     pump : int
         0 for all.
 
@@ -27,12 +31,13 @@ class PumpWear(Effect):
     """
 
     component: ClassVar[Component] = "pump"
-    neutral: ClassVar[dict[str, float]] = {"head_loss": 0.0, "leak_m3h": 0.0}
+    neutral: ClassVar[dict[str, float]] = {"head_loss": 0.0, "leak_m3h": 0.0, "vane_loss_m": 0.0}
     may_change: ClassVar[bool] = True
 
     name: Literal["pump_wear"] = "pump_wear"
     head_loss: Annotated[float, limits(0.0, 0.6, "1")] = 0.0
     leak_m3h: Annotated[float, limits(0.0, 60.0, "m³/h")] = 0.0
+    vane_loss_m: Annotated[float, limits(0.0, 20.0, "m")] = 0.0
     pump: PumpNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
@@ -43,7 +48,7 @@ class PumpWear(Effect):
                 pump,
                 c0=kept * (pump.c0 + (pump.c1 + pump.c2 * q) * q),
                 c1=kept * (pump.c1 + 2.0 * pump.c2 * q),
-                c2=kept * pump.c2,
+                c2=kept * pump.c2 - self.vane_loss_m / pump.rated_flow_m3h**2,
             ),
             self.pump,
         )

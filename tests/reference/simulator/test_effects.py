@@ -16,6 +16,7 @@ from scipy.optimize import brentq, fsolve
 from wetwell.protocols.station.control import Control
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.simulator.inflow.recorded import RecordedInflow
+from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -325,11 +326,14 @@ def test_the_water_of_a_header_starts_from_what_runs_back_through_it(quiet_alpha
     assert main_m3h > 100.0
 
 
-@pytest.mark.parametrize(("loss", "leak_m3h"), [(0.2, 0.0), (0.0, 30.0), (0.1, 15.0)])
-def test_pump_wear_duty_of_one_pump(quiet_alpha, loss, leak_m3h):
-    effect = {"name": "pump_wear", "head_loss": loss, "leak_m3h": leak_m3h, "pump": 2}
+@pytest.mark.parametrize(
+    ("loss", "leak_m3h", "vane_loss_m"), [(0.2, 0.0, 0.0), (0.0, 30.0, 0.0), (0.0, 0.0, 3.0), (0.1, 15.0, 1.5)]
+)
+def test_pump_wear_duty_of_one_pump(quiet_alpha, loss, leak_m3h, vane_loss_m):
+    effect = {"name": "pump_wear", "head_loss": loss, "leak_m3h": leak_m3h, "vane_loss_m": vane_loss_m, "pump": 2}
     rows = run(quiet_alpha, effect, inflow_m3h=600.0, level_m=2.2, seconds=40)
-    worn = brentq(lambda q: (1 - loss) * head_m(1.0, q + leak_m3h) - STATIC_M - FRICTION * q**2, 0, 1e3, xtol=1e-12)
+    square = FRICTION + vane_loss_m / plant_parameters(quiet_alpha).rated_flow_m3h[1] ** 2
+    worn = brentq(lambda q: (1 - loss) * head_m(1.0, q + leak_m3h) - STATIC_M - square * q**2, 0, 1e3, xtol=1e-12)
     flows = [rows[f"pump{i}_flow_m3h"][-1] for i in (1, 2, 3)]
     np.testing.assert_allclose(flows, [duty_m3h(), worn, duty_m3h()], atol=EXACT)
 
