@@ -201,6 +201,8 @@ def back_flow_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, seco
     for m in range(plant.mains.size):
         pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
         leak_m3h, back_m3h = _standing_leak_m3h(plant, state, forcing, second, pumps), 0.0
+        if leak_m3h <= 0.0 and state.back_m3h[m] == 0.0:
+            continue
         if leak_m3h > 0.0:
             static_head_m = static_head_at_m(plant.mains[m], level_m, forcing.static_rise_m[m, second])
             if plant.mains[m].is_common_header:
