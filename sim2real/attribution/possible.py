@@ -1,13 +1,13 @@
 """What a posterior leaves possible: sets of effects as they were fitted, and how far each may be off."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
-from wetwell.sim2real.likelihood.posterior import CREDIBLE, SetProbability
+from wetwell.sim2real.likelihood.posterior import SetProbability, credible
 from wetwell.simulator.effects.effect import Effect
 
 MOST_SETS = 6
@@ -54,17 +54,10 @@ def possible_sets(hypotheses: Hypotheses, posterior: Sequence[SetProbability]) -
             probability=one.probability,
             spread=tuple(moved.effects for moved in _spread(hypothesis)),
         )
-        for one in _credible(one for one in posterior if one.verdict != "unknown")
+        for one in credible([one for one in posterior if one.verdict != "unknown"])[:MOST_SETS]
         for hypothesis in (hypotheses.of(one.effects),)
     ]
     return tuple(found)
-
-
-def _credible(sets: Iterable[SetProbability]) -> list[SetProbability]:
-    sets = list(sets)
-    told = np.cumsum([one.probability for one in sets])
-    needed = int(np.searchsorted(told, CREDIBLE * told[-1])) + 1
-    return sets[: min(needed, MOST_SETS)]
 
 
 def _spread(hypothesis: Hypothesis) -> list[Fit]:

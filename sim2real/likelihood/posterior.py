@@ -122,7 +122,7 @@ def shared(
         Those of some sets that are alike one of them.
     """
     found = {one.effects: one.probability for one in posterior if one.verdict == "effect"}
-    for one in _credible(posterior):
+    for one in credible(_sets_of(posterior)):
         others = alike(one.effects, [effects for effects in found if effects != one.effects])
         share = one.probability / (1.0 + len(others))
         for effects in others:
@@ -132,11 +132,14 @@ def shared(
     return tuple(sorted(changed, key=lambda one: -round(one.probability, DECIMALS)))
 
 
-def _credible(posterior: Sequence[SetProbability]) -> list[SetProbability]:
-    """Sets of effects, best first, until they have `CREDIBLE` of the probability of all of them."""
-    sets = [one for one in posterior if one.verdict == "effect"]
-    before = np.cumsum([0.0, *(one.probability for one in sets)])
-    return [one for one, told in zip(sets, before, strict=False) if told < CREDIBLE * before[-1]]
+def credible(answers: Sequence[SetProbability]) -> list[SetProbability]:
+    """The first of some answers, best first, until they have `CREDIBLE` of the probability of all of them."""
+    before = np.cumsum([0.0, *(one.probability for one in answers)])
+    return [one for one, told in zip(answers, before, strict=False) if told < CREDIBLE * before[-1]]
+
+
+def _sets_of(posterior: Sequence[SetProbability]) -> list[SetProbability]:
+    return [one for one in posterior if one.verdict == "effect"]
 
 
 def _log_prior(effects: tuple[str, ...], library: int, log_share: Callable[[tuple[str, ...]], float] | None) -> float:
@@ -173,7 +176,7 @@ def equivalents(posterior: Sequence[SetProbability], effects: Sequence[str]) -> 
     effects : sequence of str
     """
     found: dict[str, list[str]] = {name: [] for name in effects}
-    for one in _credible(posterior):
+    for one in credible(_sets_of(posterior)):
         gone, come = set(effects) - set(one.effects), set(one.effects) - set(effects)
         if len(gone) == len(come) == 1:
             found[gone.pop()].append(come.pop())
