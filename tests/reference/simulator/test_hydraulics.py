@@ -36,21 +36,14 @@ def individual_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
     return np.array(flows)
 
 
-def header_flows(curves, speed_ratio, static_head_m, friction_h2_m5):
+def header_flows(
+    curves, speed_ratio, static_head_m, friction_h2_m5, *, own_h2_m5=0.0, linear_flow_m3h=0.0, leak_m3h=0.0
+):
+    """At rest: without inertia what ran back before does not count."""
     flow_m3h = np.zeros(len(curves))
-    pumps = np.arange(len(curves))
     common_flows(
-        pumps,
-        np.array(curves),
-        np.array(speed_ratio),
-        static_head_m,
-        0.0,
-        friction_h2_m5,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        flow_m3h,
+        *(np.arange(len(curves)), np.array(curves), np.array(speed_ratio), static_head_m),
+        *(own_h2_m5, friction_h2_m5, linear_flow_m3h, 0.0, leak_m3h, 0.0, flow_m3h),
     )
     return flow_m3h
 
@@ -151,40 +144,14 @@ def test_a_loss_that_is_in_part_linear_against_brentq(linear_flow_m3h):
         return head_m - 2.0 - shared * total * (total + linear_flow_m3h)
 
     expected = flows(brentq(surplus_m, 2.0, 36.0, xtol=1e-13, rtol=1e-14))
-    flow_m3h = np.zeros(3)
-    common_flows(
-        np.arange(3),
-        np.array(curves),
-        np.array(speed_ratio),
-        2.0,
-        own,
-        shared,
-        linear_flow_m3h,
-        0.0,
-        0.0,
-        0.0,
-        flow_m3h,
-    )
+    flow_m3h = header_flows(curves, speed_ratio, 2.0, shared, own_h2_m5=own, linear_flow_m3h=linear_flow_m3h)
     assert flow_m3h == pytest.approx(expected, abs=TOLERANCE_M3H)
     (expected_m3h,) = (
         brentq_flow_m3h(PAPER_CURVE, 1.0, lambda flow: 2.0 + (own + shared) * flow * (flow + linear_flow_m3h)),
     )
     alone = individual_flow_m3h(np.array(PAPER_CURVE), 1.0, 2.0, own + shared, linear_flow_m3h, 0.0, 0.0)
     assert alone == pytest.approx(expected_m3h, abs=TOLERANCE_M3H)
-    one = np.zeros(3)
-    common_flows(
-        np.arange(3),
-        np.array(curves),
-        np.array([1.0, 0.0, 0.0]),
-        2.0,
-        own,
-        shared,
-        linear_flow_m3h,
-        0.0,
-        0.0,
-        0.0,
-        one,
-    )
+    one = header_flows(curves, [1.0, 0.0, 0.0], 2.0, shared, own_h2_m5=own, linear_flow_m3h=linear_flow_m3h)
     assert one.tolist() == [pytest.approx(expected_m3h, abs=TOLERANCE_M3H), 0.0, 0.0]
 
 
@@ -204,11 +171,8 @@ def test_what_runs_back_through_standing_pumps_is_missing_in_the_main(leak_m3h, 
         return head_m - static_head_m - shared * main * (abs(main) + linear_flow_m3h)
 
     header_m = brentq(surplus_m, 0.0, 80.0, xtol=1e-13, rtol=1e-14)
-    flow_m3h = np.zeros(3)
-    common_flows(
-        *(np.arange(3), np.array(curves), np.array(speed_ratio), static_head_m, 0.0, shared, linear_flow_m3h),
-        *(0.0, leak_m3h, 0.0, flow_m3h),
-    )
+    more = {"linear_flow_m3h": linear_flow_m3h, "leak_m3h": leak_m3h}
+    flow_m3h = header_flows(curves, speed_ratio, static_head_m, shared, **more)
     assert flow_m3h == pytest.approx(flows(header_m), abs=1e-6)
     back_m3h = header_back_flow_m3h(leak_m3h, static_head_m, shared, linear_flow_m3h, flow_m3h.sum())
     assert back_m3h == pytest.approx(leak_m3h * math.sqrt(header_m), abs=1e-6)
