@@ -29,5 +29,18 @@ def connect(place: Path | str, **options: Any) -> sqlite3.Connection:
     return database
 
 
+def of_key(*columns: str) -> str:
+    """Condition of a row by its key, whose values are ?1, ?2 and so on: found by the order, and compared once more.
+
+    Where a row between two pages is not where its key says, SQLite takes another one for it, and looks no further.
+
+    Examples
+    --------
+    >>> of_key("station", "time_ns")
+    'station = ?1 AND +station = ?1 AND time_ns = ?2 AND +time_ns = ?2'
+    """
+    return " AND ".join(f"{column} = ?{place} AND +{column} = ?{place}" for place, column in enumerate(columns, 1))
+
+
 def _text(content: bytes) -> str:
     return content.decode(errors="replace")

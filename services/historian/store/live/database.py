@@ -20,6 +20,7 @@ from wetwell.services.historian.store.interface import (
     day_of,
     span_of,
 )
+from wetwell.services.historian.store.live.connection import of_key
 from wetwell.services.historian.store.live.file import LiveFile
 from wetwell.services.historian.store.live.row_checksum import (
     event_checksum,
@@ -208,7 +209,7 @@ class LiveDatabase:
                 if tuple(key) not in known
             }
             database.executemany(
-                "DELETE FROM sample WHERE station = ? AND time_ns = ? AND seq = ?",
+                f"DELETE FROM sample WHERE {of_key('station', 'time_ns', 'seq')}",  # noqa: S608 - names of columns
                 [(row[5], row[0], row[1]) for place, row in enumerate(rows) if place not in others],
             )
 

@@ -6,14 +6,16 @@ import threading
 from pathlib import Path
 from typing import Literal
 
+from wetwell.services.historian.store.live.connection import of_key
+
 log = logging.getLogger(__name__)
 
 Table = Literal["sample", "event", "hour"]
 
 _ROW_OF: dict[Table, str] = {
-    "sample": "station = ? AND time_ns = ? AND seq = ?",
-    "event": "id = ?",
-    "hour": "station = ? AND hour_ns = ?",
+    "sample": of_key("station", "time_ns", "seq"),
+    "event": of_key("id"),
+    "hour": of_key("station", "hour_ns"),
 }
 _CONTENT: dict[Table, str] = {"sample": "data", "event": "payload", "hour": "data"}
 
@@ -55,7 +57,8 @@ class RefusedRows:
         count, is_damaged = 0, False
         for table, key in found:
             row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
-            database.execute(f"INSERT INTO refused SELECT ?, ?, {content} {row}", (table, str(key), *key))
+            put_aside = f"INSERT INTO refused SELECT '{table}', ?{len(key) + 1}, {content} {row}"
+            database.execute(put_aside, (*key, str(key)))
             deleted = database.execute(f"DELETE {row}", key).rowcount
             count += deleted
             if not deleted:

@@ -17,6 +17,8 @@ from wetwell.services.historian.store.live.salvage import damage_of
 PAGE = 4096
 ROWS_OF_A_PAGE = 60
 """Of samples that came alone, at the most."""
+INTERIOR = 2
+"""First byte of a page of SQLite whose rows stand between those of other pages."""
 SECTOR = 512
 STATIONS = ("alpha", "beta")
 TIMES = 3_000
@@ -193,6 +195,19 @@ def test_a_row_that_is_not_where_its_time_says_is_put_aside_in_the_end(content, 
         assert store.samples("alpha", 0, 2**62).seq.tolist() == [one for one in range(TIMES) if one != 1_500]
         assert store.damages > 0
         assert damage_of(tmp_path / "live.sqlite") == []
+
+
+def test_a_row_between_pages_that_says_an_earlier_time_than_all_costs_no_other_row(content, tmp_path):
+    """SQLite finds the first row of the table in its place, and would delete that."""
+    places = {one: content.index(sample("alpha", one).time.to_bytes(6, "big")) for one in range(50, TIMES)}
+    wrong, place = next(item for item in places.items() if content[item[1] // PAGE * PAGE] == INTERIOR)
+    changed = content[:place] + (-60 * NS_PER_S).to_bytes(6, "big", signed=True) + content[place + 6 :]
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        for _ in range(3):
+            store.live.put_aside_damaged("alpha", -(2**63), 2**62)
+        assert store.samples("alpha", -(2**63), 2**62).seq.tolist() == [one for one in range(TIMES) if one != wrong]
+    assert damage_of(tmp_path / "live.sqlite") == []
 
 
 def test_a_row_that_was_put_aside_meanwhile_is_no_damage_of_the_file(content, tmp_path):
