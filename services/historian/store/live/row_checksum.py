@@ -37,6 +37,14 @@ def is_sample_intact(
         return False
 
 
+def last_ns_of(size: int, data: bytes) -> int | None:
+    """Time of the last of several samples, by their data; None of one sample.
+
+    By the column that tells it rows are found. It has no part in the checksum, as it stands in what has.
+    """
+    return None if size == 1 else int.from_bytes(data[-8 * (size + 1) : -8 * size], "little", signed=True)
+
+
 def is_hour_intact(station: int, hour_ns: int, data: bytes, crc: int | None) -> bool:
     """Whether figures of an hour are what was written; those of an earlier version have no checksum."""
     try:

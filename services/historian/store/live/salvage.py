@@ -9,7 +9,12 @@ from typing import Any
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.store.live.connection import UNREADABLE, connect
 from wetwell.services.historian.store.live.end import End, read_end
-from wetwell.services.historian.store.live.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
+from wetwell.services.historian.store.live.row_checksum import (
+    is_event_intact,
+    is_hour_intact,
+    is_sample_intact,
+    last_ns_of,
+)
 from wetwell.services.historian.store.live.schema import schema_damages
 from wetwell.services.historian.store.live.station_names import station_rows
 from wetwell.services.historian.store.live.tally import miscounts
@@ -48,9 +53,9 @@ def damage_of(path: Path) -> list[str]:
             counts["messages"] = sum(not is_event_intact(*row) for row in messages)
             if version >= CHECKED_VERSION:
                 samples = database.execute(f"SELECT {_SAMPLE} FROM sample")  # noqa: S608 - names of above
-                counts["rows of samples"] = sum(not _is_sample(row) for row in samples)
+                counts["rows of samples"] = sum(_sample(row) != row for row in samples)
                 hours = database.execute("SELECT station, hour_ns, data, crc FROM hour")
-                counts["hours"] = sum(not _is_hour(row) for row in hours)
+                counts["hours"] = sum(not is_hour_intact(*row) for row in hours)
             if version >= COUNTED_VERSION:
                 told += map(str, miscounts(database))
                 known = read_end(path)  # after the database: it only goes on
@@ -77,13 +82,13 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
     target.execute("BEGIN IMMEDIATE")
     try:
         with _reading_what_it_can(damaged) as database:
-            for insert, rows, is_intact in _tables(database):
+            for insert, rows, taken in _tables(database):
                 for row in rows:
-                    if not is_intact(row):
+                    if (its := taken(row)) is None:
                         lost.add((insert, *row[:3]))
                         continue
                     with contextlib.suppress(sqlite3.IntegrityError, sqlite3.InterfaceError):
-                        saved += target.execute(insert, row).rowcount
+                        saved += target.execute(insert, its).rowcount
     except UNREADABLE:
         target.execute("ROLLBACK")
         return 0, 0
@@ -91,20 +96,24 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
     return saved, len(lost)
 
 
-def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], Callable[[Row], bool]]]:
-    """Of each table how a row is inserted, its rows as far as they can be read, and whether one is intact."""
+def _tables(database: sqlite3.Connection) -> Iterator[tuple[str, Iterator[Row], Callable[[Row], Row | None]]]:
+    """Of each table how a row is inserted, its rows as far as they can be read, and what is taken of one."""
     stations = station_rows(database)
-    yield "INSERT OR IGNORE INTO station VALUES (?, ?, ?, ?)", iter(stations), lambda _: True
+    yield "INSERT OR IGNORE INTO station VALUES (?, ?, ?, ?)", iter(stations), lambda row: row
     numbers = {row[0] for row in stations}
     samples = _all_samples(database, numbers)
-    yield "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", samples, _is_sample
+    yield "INSERT OR IGNORE INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?)", samples, _sample
     yield (
         "INSERT OR IGNORE INTO event (kind, station, time_ns, digest, payload, crc) VALUES (?, ?, ?, ?, ?, ?)",
         _events(database),
-        lambda row: is_event_intact(*row) and row[1] in numbers,
+        lambda row: row if is_event_intact(*row) and row[1] in numbers else None,
     )
     hours = _readable(database, "SELECT station, hour_ns, data, crc FROM hour")
-    yield "INSERT OR IGNORE INTO hour VALUES (?, ?, ?, ?)", iter(hours), _is_hour
+    yield (
+        "INSERT OR IGNORE INTO hour VALUES (?, ?, ?, ?)",
+        iter(hours),
+        lambda row: row if is_hour_intact(*row) else None,
+    )
 
 
 def _all_samples(database: sqlite3.Connection, stations: Iterable[int]) -> Iterator[Row]:
@@ -133,7 +142,7 @@ def _samples(database: sqlite3.Connection, station: int) -> Iterator[Row]:
         return
     last, _ = _read(database, f"{query} DESC", (station,))
     yield from last
-    begin_ns, end_ns = (next((row[1] for row in reversed(rows) if _is_sample(row)), None) for rows in (first, last))
+    begin_ns, end_ns = (next((row[1] for row in reversed(rows) if _sample(row)), None) for rows in (first, last))
     if begin_ns is not None and end_ns is not None:
         between = f"SELECT {_SAMPLE} FROM sample WHERE station = ? AND time_ns >= ? AND time_ns < ? ORDER BY time_ns"  # noqa: S608
         yield from _in_parts(database, between, (station,), (begin_ns, end_ns), NS_PER_S)
@@ -212,13 +221,12 @@ def _next_row(database: sqlite3.Connection, query: str, values: Row, count: int)
     return []
 
 
-def _is_sample(row: Row) -> bool:
+def _sample(row: Row) -> Row | None:
+    """A row of samples, with the time of the last one by their data; None if it is not what was written."""
     station, time_ns, seq, quality, data, size, _, crc = row
-    return is_sample_intact(station, time_ns, seq, quality, size, data, crc)
-
-
-def _is_hour(row: Row) -> bool:
-    return is_hour_intact(*row)
+    if not is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+        return None
+    return station, time_ns, seq, quality, data, size, last_ns_of(size, data), crc
 
 
 @contextlib.contextmanager

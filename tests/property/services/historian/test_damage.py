@@ -210,6 +210,32 @@ def test_a_row_between_pages_that_says_an_earlier_time_than_all_costs_no_other_r
     assert damage_of(tmp_path / "live.sqlite") == []
 
 
+@pytest.mark.parametrize("station", STATIONS)
+def test_a_row_that_says_the_time_of_its_last_sample_wrongly_is_found_and_kept(content, tmp_path, station):
+    """Who asks for a span finds it no more; by its data it has that time, or is alone."""
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        wrong = (
+            "UPDATE sample SET last_ns = 5 WHERE seq % 3 = 0 AND station = (SELECT id FROM station WHERE name = ?)"
+        )
+        store.file._writer.execute(wrong, (station,))
+        assert len(store.samples(station, 100, 2**62)) < TIMES - 1
+        assert len(damage_of(tmp_path / "live.sqlite")) == 1
+        assert store.live.put_aside_damaged(station, 0, 2**62) == 1
+        assert store.samples(station, 0, 2**62).seq.tolist() == list(range(TIMES))
+        assert store.live.put_aside_damaged(station, 0, 2**62) == 0
+    assert damage_of(tmp_path / "live.sqlite") == []
+
+
+def test_a_complete_day_is_filed_though_its_only_row_says_another_time(tmp_path):
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(Batch(samples=[pack("alpha", sample("alpha", number)) for number in (10_000, 40_000, 40_001)]))
+        store.file._writer.execute("UPDATE sample SET last_ns = crc, crc = NULL WHERE seq = 10000")
+        done = [store.maintain(10 * 86_400 * NS_PER_S) for _ in range(6)]
+        assert done[-1] is None
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == [10_000, 40_000, 40_001]
+
+
 def test_a_row_that_was_put_aside_meanwhile_is_no_damage_of_the_file(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
