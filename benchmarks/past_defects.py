@@ -41,7 +41,7 @@ PAST_DEFECTS = (
         "rows of samples are not checked when they are read",
         "41fcdb9",
         f"{STORE}/live/database.py",
-        "elif is_sample_intact(station, time_ns, seq, quality, size, data, crc):",
+        "elif is_sample_intact(station, time_ns, seq, quality, size, data, last_ns, crc):",
         "elif len(data) % (8 * size) == 0:",
     ),
     PastDefect(

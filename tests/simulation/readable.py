@@ -22,7 +22,7 @@ from wetwell.services.historian.store.live.row_checksum import is_sample_intact
 Row = tuple[str, int, int]
 """Station, time and number of a sample."""
 _ROWS = (
-    "SELECT name, s.time_ns, s.seq, s.quality, s.size, s.data, s.station, s.crc "
+    "SELECT name, s.time_ns, s.seq, s.quality, s.size, s.data, s.station, s.last_ns, s.crc "
     "FROM sample AS s JOIN station ON id = s.station"
 )
 _ORDERS = ("s.station, s.time_ns, s.seq", "s.station DESC, s.time_ns DESC, s.seq DESC")
@@ -98,8 +98,8 @@ class _View:
 
 
 def _intact(rows: sqlite3.Cursor) -> Iterator[Row]:
-    for name, time_ns, seq, quality, size, data, station, crc in rows:
-        if size == 1 and is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+    for name, time_ns, seq, quality, size, data, station, last_ns, crc in rows:
+        if size == 1 and is_sample_intact(station, time_ns, seq, quality, size, data, last_ns, crc):
             yield name, time_ns, seq
 
 

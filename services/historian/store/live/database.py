@@ -48,7 +48,7 @@ _TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} 
 _INSERT_SAMPLE = (
     "INSERT INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET quality = excluded.quality, "
     "data = excluded.data, size = excluded.size, last_ns = excluded.last_ns, crc = excluded.crc "
-    "WHERE NOT is_intact(station, time_ns, seq, quality, size, data, crc)"
+    "WHERE NOT is_intact(station, time_ns, seq, quality, size, data, last_ns, crc)"
 )
 _INSERT_EVENT = (
     "INSERT INTO event (kind, station, time_ns, digest, payload, crc) VALUES (?, ?, ?, ?, ?, ?) "
@@ -57,7 +57,7 @@ _INSERT_EVENT = (
 )
 """What comes again changes nothing, unless it was damaged meanwhile."""
 
-_PACKED = "time_ns, seq, size, quality, data, station, crc, last_ns, (SELECT id FROM station WHERE name = :station)"
+_PACKED = "time_ns, seq, size, quality, data, station, last_ns, crc, (SELECT id FROM station WHERE name = :station)"
 """A `PackedSamples`, and by what it is checked: a page that stands in the place of another has rows of elsewhere."""
 
 
@@ -295,10 +295,10 @@ class LiveDatabase:
         One that says the time of its last sample wrongly is not found where that is: a new file will have it right.
         """
         intact: list[PackedSamples] = []
-        for time_ns, seq, size, quality, data, station, crc, last_ns, asked in rows:
+        for time_ns, seq, size, quality, data, station, last_ns, crc, asked in rows:
             if station != asked:
                 self._file.is_damaged = True  # a page in the place of another
-            elif is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+            elif is_sample_intact(station, time_ns, seq, quality, size, data, last_ns, crc):
                 intact.append((time_ns, seq, size, quality, data))
                 self._file.is_damaged = self._file.is_damaged or last_ns != last_ns_of(size, data)
             else:

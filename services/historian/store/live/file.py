@@ -188,7 +188,7 @@ class LiveFile:
         try:
             database.execute("PRAGMA journal_mode = WAL")
             database.execute("PRAGMA synchronous = FULL")
-            database.create_function("is_intact", 7, is_sample_intact, deterministic=True)
+            database.create_function("is_intact", 8, is_sample_intact, deterministic=True)
             prepare(database, self._path, self._alone)
             database.execute("SELECT count(*) FROM station").fetchone()
             damages = schema_damages(database)

@@ -26,13 +26,16 @@ def hour_checksum(station: int, hour_ns: int, data: bytes) -> int:
 
 
 def is_sample_intact(
-    station: int, time_ns: int, seq: int, quality: int, size: int, data: bytes, crc: int | None
+    station: int, time_ns: int, seq: int, quality: int, size: int, data: bytes, last_ns: int | None, crc: int | None
 ) -> bool:
-    """Whether a row of samples is what was written; of one without a checksum only its form is known."""
+    """Whether a row of samples is what was written; of one without a checksum only its form is known.
+
+    A row whose head was changed may have its checksum in the place of the time of its last sample, and none.
+    """
     try:
         if crc is not None:
             return crc == sample_checksum(station, time_ns, seq, quality, size, data)
-        return size >= 1 and len(data) % (8 * size) == 0
+        return size >= 1 and len(data) % (8 * size) == 0 and last_ns == last_ns_of(size, data)
     except (TypeError, struct.error):  # a bit can turn a number into a text
         return False
 

@@ -223,8 +223,8 @@ def _next_row(database: sqlite3.Connection, query: str, values: Row, count: int)
 
 def _sample(row: Row) -> Row | None:
     """A row of samples, with the time of the last one by their data; None if it is not what was written."""
-    station, time_ns, seq, quality, data, size, _, crc = row
-    if not is_sample_intact(station, time_ns, seq, quality, size, data, crc):
+    station, time_ns, seq, quality, data, size, last_ns, crc = row
+    if not is_sample_intact(station, time_ns, seq, quality, size, data, last_ns, crc):
         return None
     return station, time_ns, seq, quality, data, size, last_ns_of(size, data), crc
 
