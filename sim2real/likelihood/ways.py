@@ -19,7 +19,7 @@ from wetwell.sim2real.likelihood.covariance import (
     Form,
     of_form,
 )
-from wetwell.sim2real.likelihood.scatter import scatter_of
+from wetwell.sim2real.likelihood.scatter import scatter_of, settled
 from wetwell.sim2real.residuals.bins import START_LEVEL, STOP_LEVEL
 
 POORLY = 0.1
@@ -156,23 +156,35 @@ class Seen:
     def _changing(self, ways: tuple[Way, ...]) -> tuple[Integers, float, Floats, Floats]:
         """What changes between cycles in each group, what not knowing it adds, and means with their variances."""
         if ways not in self._scattered:
-            block, form = self.block, self.form
-            precision, means, logs = np.zeros((3, len(ways), self._fixed.size))
-            scatter_of(
-                self.residuals,
-                block.variance + block.surge * block.of_inflow + (self.swing * form.swinging) ** 2,
-                block.allowed,
-                np.array([of_form(one.errors.form, form.fixed) * form.signature for one in ways]),
-                block.group,
-                np.array([one.errors.offset for one in ways]),
-                precision,
-                means,
-                logs,
+            precision, means, logs = self._weighed(
+                np.array([one.errors.offset for one in ways]), np.array([one.errors.form for one in ways])
             )
             changing, log_prior = _chosen(logs, ways)
             mean, of_mean = _picked(means, changing), 1.0 / _picked(precision, changing)
             self._scattered[ways] = changing, log_prior, mean, of_mean
         return self._scattered[ways]
+
+    def _weighed(self, offsets: Floats, forms: Floats) -> tuple[Floats, Floats, Floats]:
+        """(ways, groups) precision of means, the means, and logarithms of the ways in which cycles may differ."""
+        block, form = self.block, self.form
+        moved = block.surge * block.of_inflow + (self.swing * form.swinging) ** 2
+        moved = np.add(moved, (offsets[:, None] * block.allowed) ** 2)
+        alone = block.variance + np.square([of_form(one, form.fixed) * form.signature for one in forms])
+        precision, means, logs = np.zeros((3, offsets.size, self._fixed.size))
+        scatter_of(self.residuals, alone + moved, block.group, precision, means, logs)
+        settled(
+            self.residuals - means[:, block.group],
+            alone + 0.5 * moved,
+            np.sqrt(0.5 * moved),
+            precision,
+            np.argsort(block.group, kind="stable"),
+            np.r_[0, np.cumsum(np.bincount(block.group))],
+            block.cycle,
+            np.zeros((2, int(block.cycle.max()) + 1)),
+            np.vstack([np.argmax(logs, axis=0), np.tile(np.arange(offsets.size)[:, None], self._fixed.size)]),
+            logs,
+        )
+        return precision, means, logs
 
     def _variances(self, ways: Sequence[Way]) -> Floats:
         """(ways, groups) variances of what groups may be off."""

@@ -14,6 +14,7 @@ from wetwell.sim2real.likelihood.covariance import (
     HARDLY_DIFFERENT,
     LATE,
     POOR,
+    SWINGS,
     Allowance,
     Errors,
     Form,
@@ -24,11 +25,11 @@ from wetwell.sim2real.likelihood.covariance import (
 from wetwell.sim2real.likelihood.evidence import TRUSTED, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
-from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS
+from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS, Way
 from wetwell.sim2real.recording.regimes import IDLE, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, STOP_LEVEL, Bins
 
-CYCLES, EACH = 12, 3
+CYCLES = 12
 
 
 @pytest.fixture
@@ -37,18 +38,18 @@ def cells():
     return made(has_inflow=True)
 
 
-def made(*, has_inflow, is_each_second=True):
+def made(*, has_inflow, is_each_second=True, seconds=(0, 70, 80)):
     """A flow that runs and a level at rest: two spans of time in a cycle, the first of one bin, the next of two."""
-    half = CYCLES * EACH
+    half = CYCLES * len(seconds)
     signal = np.repeat([FLOW, LEVEL], half)
-    cycle = np.tile(np.repeat(np.arange(CYCLES), EACH), 2)
+    cycle = np.tile(np.repeat(np.arange(CYCLES), len(seconds)), 2)
     ones = np.ones(2 * half)
     bins = Bins(
         signal=signal,
         regime=np.where(signal == FLOW, STEADY, IDLE),
         cycle=cycle,
         pump=np.where(signal == FLOW, 0, -1),
-        second=1000 * cycle + np.tile([0, 70, 80], 2 * CYCLES),
+        second=1000 * cycle + np.tile(seconds, 2 * CYCLES),
         deviation=ones,
         floor=0.8 * ones,
         tolerance=0.1 * ones,
@@ -208,6 +209,30 @@ def test_cells_whose_form_may_be_off_by_much_say_little_of_what_all_have_alike(c
     form = replace(no_form(cells), signature=signature)
     found = evidence(cells, residuals, np.zeros((signature.size, 0)), form)
     assert found.log == pytest.approx(log_densities(cells, residuals, form).sum(), abs=1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_all_groups_share_in_a_cycle_is_no_error_of_form(seed):
+    """By itself each group seems to scatter by more than is allowed, for which a form that is off makes room."""
+    rng = np.random.default_rng(seed)
+    cells = made(has_inflow=True, seconds=(0, 1, 2, 5, 10, 20, 40, 80, 160, 320))
+    cells = replace(cells, blocks=tuple(replace(block, variance=0.001 * block.allowed**2) for block in cells.blocks))
+    of_cycle = 1.3 * rng.choice([-1.0, 1.0], CYCLES)
+    of_cell = np.concatenate([of_cycle[block.cycle] for block in cells.blocks])
+    residuals = (of_cell + 0.03 * rng.normal(size=of_cell.size)) * cells.allowed
+    form = replace(no_form(cells), signature=16.0 * cells.allowed, fixed=np.full(of_cell.size, 0.97))
+    shifted = Way(errors=Errors(offset=0.5, form=0.0), is_poor=True)
+    log = 0.0
+    for block in cells.blocks:
+        groups, spans = block.span.size, int(block.span.max()) + 1
+        assert groups >= 5
+        its, allowance = form.chosen(block.rows), everywhere(block, GOOD, HARDLY_DIFFERENT, shifted.errors)
+        whole = dense(block, its, replace(allowance, swing=SWINGS[0]))
+        log -= 0.5 * float(residuals[block.rows] @ np.linalg.solve(whole, residuals[block.rows]))
+        log -= 0.5 * np.linalg.slogdet(whole)[1]
+        log += log_prior(SPAN_WAYS[:1] * spans, SPAN_WAYS) + log_prior(OWN_WAYS[:1] * groups, OWN_WAYS)
+        log += log_prior((shifted,) * groups, CHANGING_WAYS)
+    assert evidence(cells, residuals, np.zeros((of_cell.size, 0)), form).log > log
 
 
 def test_further_effects_are_weighed_as_the_evidence_weighs_its_own(cells):
