@@ -8,7 +8,7 @@ import numpy as np
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.presence import (
-    are_there,
+    are_needed,
     is_only_late,
     own_signature,
     strengths_of,
@@ -47,6 +47,8 @@ class Hypothesis:
         Whether none of its effects may be neutral, and none that is told could do another's work.
     told : tuple of str
         Its effects that matter, in order of the alphabet. The others are companions: too small to be told.
+    needed : tuple of str
+        Those that matter, but for the one that the recording needs least, where it does not need it.
     """
 
     fit: Fit
@@ -54,6 +56,7 @@ class Hypothesis:
     form: Form
     is_there: bool
     told: tuple[str, ...]
+    needed: tuple[str, ...]
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -97,7 +100,9 @@ class Hypotheses:
         self._fitter, self._cells, self._each = fitter, cells, each
         self._plain = self._means(fitter.plain)
         none = evidence_of_none(cells, self._plain)
-        self._none = Hypothesis(fit=fitter.plain, evidence=none, form=no_form(cells), is_there=True, told=())
+        self._none = Hypothesis(
+            fit=fitter.plain, evidence=none, form=no_form(cells), is_there=True, told=(), needed=()
+        )
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
         self._factors: dict[tuple[str, ...], float] = {}
 
@@ -119,19 +124,23 @@ class Hypotheses:
         return sorted(found, key=lambda one: -one.evidence.log)
 
     def add(self, fits: Sequence[Fit]) -> None:
-        """Weigh fits, but for those that explain far less than others, and keep the best of each set of names."""
+        """Weigh fits, but for those that explain far less than others, and keep the best of each set of names.
+
+        Beside an effect that is not needed, or too small to be told, a set is weighed without that, too.
+        """
         costs = [self._fitter.cost(fit) for fit in fits]
         least, plain = min(costs, default=0.0), self._fitter.cost(self._fitter.plain)
         most = min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain)
         hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
-        found = list(self._each(self._weighed, hopeful))
-        is_known = {*self._best, *(one.effects for one in found)}
-        alone = [self._fitter.only(one.fit, one.told) for one in found if one.is_there and one.told not in is_known]
-        refined = self._each(self._fitter.refine, [fit for fit in alone if fit is not None])
-        for one in [*found, *self._each(self._weighed, refined)]:
-            known = self._best.get(one.effects)
-            if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
-                self._best[one.effects] = one
+        while hopeful:
+            found = list(self._each(self._weighed, hopeful))
+            for one in found:
+                known = self._best.get(one.effects)
+                if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
+                    self._best[one.effects] = one
+            fewer = {one.needed: one.fit for one in found if one.needed not in self._best}
+            alone = [self._fitter.only(fit, names) for names, fit in fewer.items()]
+            hopeful = list(self._each(self._fitter.refine, [fit for fit in alone if fit is not None]))
 
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""
@@ -216,14 +225,17 @@ class Hypotheses:
             if not is_only_late(fit, member, self._fitter.station.materiality.time_s)
             and self._matters(signature, shown.form, shown.form.late - late)
         ]
+        is_needed = are_needed(found, [len(one.neutral) for one in members])
+        least = min(told, key=lambda member: found.needed[member], default=None)
         return Hypothesis(
             fit=fit,
             evidence=found,
             form=shown.form,
             is_there=shown.may_each_lack
-            and are_there(found, [len(one.neutral) for one in members])
+            and bool(is_needed.all())
             and self._are_apart(fit.position, of_member, told, shown.signatures, shown.slopes),
             told=tuple(sorted(fit.names[member] for member in told)),
+            needed=tuple(sorted(fit.names[member] for member in told if is_needed[member] or member != least)),
         )
 
     def _form(self, fit: Fit, signatures: Sequence[Floats], explained: Floats, late: Sequence[Floats]) -> Form:

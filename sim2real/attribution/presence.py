@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.special import gammaincinv
 
-from wetwell.protocols.arrays import Floats
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.fitting import Fit
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import LATE
@@ -16,7 +16,7 @@ SURE = 0.95
 """Probability with which the recording must be likelier with an effect than without it."""
 
 
-def are_there(found: Evidence, strengths: Sequence[int]) -> bool:
+def are_needed(found: Evidence, strengths: Sequence[int]) -> Flags:
     r"""Whether the recording needs each effect of a set: whether it can be neutral is asked of the simulator.
 
     $$2 \ln \frac{p(z \mid \hat x)}{p(z \mid \hat x_{-i},\ \text{without } i)} > \chi^2_{.95}$$
@@ -29,9 +29,13 @@ def are_there(found: Evidence, strengths: Sequence[int]) -> bool:
     found : Evidence
     strengths : sequence of int
         How many strengths each effect has: the degrees of freedom of χ².
+
+    Returns
+    -------
+    is_needed : (effects,) array
     """
     quantiles = 2.0 * gammaincinv(np.maximum(strengths, 1) / 2.0, SURE)  # scipy.stats would take .3 s to load
-    return bool(np.all(found.needed > quantiles))
+    return np.asarray(found.needed > quantiles, dtype=np.bool_)
 
 
 def strengths_of(fit: Fit) -> list[dict[int, float]]:

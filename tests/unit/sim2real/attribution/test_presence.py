@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wetwell.sim2real.attribution.presence import SURE, are_there, own_signature, unshifted
+from wetwell.sim2real.attribution.presence import SURE, are_needed, own_signature, unshifted
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 
@@ -25,14 +25,11 @@ def needed(*squares):
 @pytest.mark.parametrize("strengths", [1, 2, 3])
 def test_an_effect_is_there_where_the_recording_is_surely_likelier_with_it(strengths):
     quantile = stats.chi2.ppf(SURE, strengths)
-    assert are_there(needed(1.001 * quantile), [strengths])
-    assert not are_there(needed(0.999 * quantile), [strengths])
+    assert are_needed(needed(1.001 * quantile, 0.999 * quantile), [strengths, strengths]).tolist() == [True, False]
 
 
-def test_each_effect_of_a_set_must_be_there():
-    assert are_there(needed(), [])
-    assert are_there(needed(9.0, 9.0), [1, 2])
-    assert not are_there(needed(9.0, 0.0), [1, 1])
+def test_without_effects_nothing_is_needed():
+    assert are_needed(needed(), []).size == 0
 
 
 def test_of_two_effects_that_undo_each_other_neither_has_anything_of_its_own():
