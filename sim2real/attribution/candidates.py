@@ -74,6 +74,11 @@ class Candidate:
         """Whether the values themselves show how strong it is, whatever else there is: so it is tried."""
         return self.name in OF_TELEMETRY
 
+    @property
+    def is_limit(self) -> bool:
+        """Whether readings pass its strength one by one."""
+        return EFFECTS[self.name].is_limit
+
     def effect(self, point: Floats) -> Effect:
         """Effect with its free parameters at a point, each normalised to its range; as it is in the last period."""
         return self._in_period(point, self.periods)

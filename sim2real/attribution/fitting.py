@@ -131,25 +131,33 @@ class Fitter:
         return -float(weighed @ plain) / squares if squares > 0.0 else np.inf
 
     def refine(self, fit: Fit) -> Fit:
-        """Levenberg and Marquardt's method from where a fit stands, within the ranges."""
+        """Levenberg and Marquardt's method from where a fit stands, within the ranges.
+
+        Limits have no slope that leads anywhere: where that ends they are tried nearer to neutral and further off, and
+        it goes on from there. So are the strengths of the last candidate where nothing led down.
+        """
         if fit.position.size == 0:
             return fit
         current, damping = fit, 1e-2
+        is_limit = np.concatenate(
+            [np.full(p.size, c.is_limit) for c, p in zip(fit.candidates, fit.points, strict=True)]
+        )
+        is_last = np.arange(is_limit.size) >= is_limit.size - fit.points[-1].size
         for _ in range(ROUNDS):
             slopes = self._differences(current, np.asarray)[self.rows]
             gradient = slopes.T @ current.residuals[self.rows]
             squares = slopes.T @ slopes
             x = current.position
             is_bound = ((x <= 0.0) & (gradient > 0.0)) | ((x >= 1.0) & (gradient < 0.0)) | (np.diag(squares) <= 0.0)
-            if is_bound.all():
-                return self._scanned(fit)
-            moved, damping = self._moved(current, gradient, squares, ~is_bound, damping)
-            if moved is None:
-                return self._scanned(fit) if current is fit else current
-            gain = self.cost(current) - self.cost(moved)
+            is_free, moved = ~(is_bound | is_limit), None
+            if is_free.any():
+                moved, damping = self._moved(current, gradient, squares, is_free, damping)
+            if moved is None or self.cost(current) - self.cost(moved) < SETTLED * self.cost(moved):
+                its = current if moved is None else moved
+                moved = self._scanned(its, is_limit | is_last if its is fit else is_limit)
+                if moved is its:
+                    return its
             current = moved
-            if gain < SETTLED * self.cost(current):
-                break
         return current
 
     def _moved(
@@ -167,19 +175,17 @@ class Fitter:
             damping *= 6.0
         return None, damping
 
-    def _scanned(self, fit: Fit) -> Fit:
-        """Fit with the last candidate's strengths tried nearer to neutral and further off: limits have no slope."""
+    def _scanned(self, fit: Fit, is_tried: Flags) -> Fit:
+        """Fit with some parameters, where they are strengths, nearer to neutral and further off."""
         best = fit
-        for k, free in enumerate(fit.candidates[-1].free):
-            if free.neutral is None:
-                continue
-            neutral = free.normalised(free.neutral)
+        neutral = np.concatenate([c.neutral(point) for c, point in zip(fit.candidates, fit.points, strict=True)])
+        for k in np.flatnonzero(is_tried & (neutral != fit.position)):
             for factors in SCANS:
-                start = best.points[-1]
+                start = best.position
                 for factor in factors:
-                    point = start.copy()
-                    point[k] = min(max(neutral + factor * (start[k] - neutral), 0.0), 1.0)
-                    tried = self.at(fit.candidates, (*fit.points[:-1], point))
+                    position = start.copy()
+                    position[k] = min(max(neutral[k] + factor * (start[k] - neutral[k]), 0.0), 1.0)
+                    tried = self.at(fit.candidates, fit.split(position))
                     if tried is not None and self.cost(tried) < self.cost(best):
                         best = tried
         return best

@@ -24,6 +24,7 @@ class FlowLowCutoff(Effect):
 
     component: ClassVar[Component] = "flow_meter"
     neutral: ClassVar[dict[str, float]] = {"cutoff_m3h": 0.0}
+    is_limit: ClassVar[bool] = True
 
     name: Literal["flow_low_cutoff"] = "flow_low_cutoff"
     cutoff_m3h: Annotated[float, limits(0.0, 200.0, "m³/h")]

@@ -94,6 +94,15 @@ def test_what_comes_beside_a_fit_lets_it_give_way(fitter, lag, alpha):
     assert found["water_inertia"]["inertia_s2_m2"] == pytest.approx(400.0, rel=0.2)
 
 
+def test_a_limit_that_stands_wrong_is_put_right_though_another_effect_came_last(alpha):
+    fitter = fitter_of(alpha, [EFFECTS["flow_meter_lag"](lag_s=4.0), EFFECTS["flow_low_cutoff"](cutoff_m3h=70.0)])
+    limit, lag = candidate(alpha, "flow_low_cutoff"), candidate(alpha, "flow_meter_lag")
+    lag = replace(lag, free=lag.free[:1])
+    wrong, right = (np.array([limit.free[0].normalised(cutoff_m3h)]) for cutoff_m3h in (95.0, 70.0))
+    found = fitter.refine(fitter.at([limit, lag], [wrong, np.array([0.05])]))
+    assert fitter.cost(found) <= 1.01 * fitter.cost(fitter.refine(fitter.at([lag, limit], [np.array([0.05]), right])))
+
+
 def test_each_form_of_an_effect_has_a_promise_of_its_own(fitter, lag, alpha):
     """What a wave does there and back is not linear in its time: each start of it is replayed."""
     inertia = candidate(alpha, "water_inertia")
