@@ -75,6 +75,11 @@ class Candidate:
         return self.name in OF_TELEMETRY
 
     @property
+    def is_layout(self) -> bool:
+        """Whether its presence is its strength, such as that of a header: what others do, they do otherwise then."""
+        return all(free.neutral is None for free in self.free)
+
+    @property
     def is_limit(self) -> bool:
         """Whether readings pass its strength one by one."""
         return EFFECTS[self.name].is_limit
@@ -124,7 +129,7 @@ class Candidate:
         base = np.array(
             [free.normalised(min(max(guess.get(free.name, free.start), free.low), free.high)) for free in self.free]
         )
-        if not any(free.neutral is not None for free in self.free):
+        if self.is_layout:
             return [[base], *([[np.full(base.size, 0.5)]] if base.size else [])]
         grids = [[base]] if any(free.name in guess for free in self.free) else []
         if grids and self.is_pattern:

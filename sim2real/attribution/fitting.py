@@ -105,30 +105,32 @@ class Fitter:
         """Sum of squares over the bins that are fitted."""
         return float("inf") if fit is None else float(np.sum(fit.residuals[self.rows] ** 2))
 
-    def along(self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]]) -> list[Fit]:
-        """A candidate alone at several starts.
+    def along(
+        self, candidate: Candidate, start_grids: Sequence[Sequence[Floats]], beside: Fit | None = None
+    ) -> list[Fit]:
+        """A candidate at several starts, alone or beside others.
 
         Of a grid of rising strength those are left out that are far from what the one before makes likely, as if all
         were linear; a grid that leads away is left.
         """
-        found = []
+        found, beside = [], beside or self.plain
         for grid in start_grids:
             place, away = 0, 0
             while place < len(grid) and away < MOST_AWAY:
-                tried = self.at((candidate,), (grid[place],))
-                scale = np.inf if tried is None else self._best_scale(tried)
+                tried = self.at((*beside.candidates, candidate), (*beside.points, grid[place]))
+                scale = np.inf if tried is None else self._best_scale(beside, tried)
                 found += [] if tried is None else [tried]
                 away = away + 1 if scale <= 0.0 else 0
                 place = place + 1 if away else _next_place(place, scale, len(grid))
         return found
 
-    def _best_scale(self, tried: Fit) -> float:
-        """Times the change that an effect makes alone at which it fits best, as if all were linear."""
-        plain = residuals_of(self.plain.residuals[self.rows])
-        change = residuals_of(tried.residuals[self.rows]) - plain
-        weighed = weights_of(plain) * change
+    def _best_scale(self, before: Fit, tried: Fit) -> float:
+        """Times the change that an effect makes at which it fits best, as if all were linear."""
+        left = residuals_of(before.residuals[self.rows])
+        change = residuals_of(tried.residuals[self.rows]) - left
+        weighed = weights_of(left) * change
         squares = float(weighed @ change)
-        return -float(weighed @ plain) / squares if squares > 0.0 else np.inf
+        return -float(weighed @ left) / squares if squares > 0.0 else np.inf
 
     def refine(self, fit: Fit) -> Fit:
         """Levenberg and Marquardt's method from where a fit stands, within the ranges.

@@ -57,25 +57,36 @@ class Trials:
         self._guesses = guesses
         self._progress = progress
         self._each = each
+        self._in_layout: dict[tuple[Candidate, ...], Mapping[Candidate, Alone]] = {}
 
     @cached_property
     def _alone(self) -> dict[Candidate, tuple[Alone, Fit]]:
         """Of each candidate what it does alone, and its best fit without refinement."""
-        found, plain = {}, self._means(self._fitter.plain)
+        found = {}
         tried = self._each(self._tried, self._guesses)
         for k, (candidate, fits) in enumerate(zip(self._guesses, tried, strict=True)):
             if fits:
-                alone = Alone(
-                    candidate=candidate,
-                    points=tuple(fit.points[0] for fit in fits),
-                    changes=np.array([self._means(fit) - plain for fit in fits]),
-                )
-                found[candidate] = alone, min(fits, key=self._fitter.cost)
+                found[candidate] = self._doing(self._fitter.plain, fits), min(fits, key=self._fitter.cost)
             self._progress(0.3 * (k + 1) / len(self._guesses))
         return found
 
-    def _tried(self, candidate: Candidate) -> list[Fit]:
-        return self._fitter.along(candidate, self._start_grids(candidate))
+    def _tried(self, candidate: Candidate, beside: Fit | None = None) -> list[Fit]:
+        return self._fitter.along(candidate, self._start_grids(candidate), beside)
+
+    def _alones(self, base: Fit) -> Mapping[Candidate, Alone]:
+        """What each candidate does alone; where the base has another layout of the station, what it does in that."""
+        layout = tuple(one for one in base.candidates if one.is_layout)
+        if layout not in self._in_layout:
+            station = self._fitter.only(base, [one.name for one in layout])
+            if not layout or station is None:
+                self._in_layout[layout] = {one: alone for one, (alone, _) in self._alone.items()}
+            else:
+                others = [one for one in self._guesses if one not in layout]
+                tried = self._each(lambda one: self._tried(one, station), others)
+                self._in_layout[layout] = {
+                    one: self._doing(station, fits) for one, fits in zip(others, tried, strict=True) if fits
+                }
+        return self._in_layout[layout]
 
     def _means(self, fit: Fit) -> Floats:
         """(cells,) residuals themselves."""
@@ -109,13 +120,14 @@ class Trials:
             The same, as what the others come beside.
         """
         pairs = list(zip(bases, besides, strict=True))
-        promises = self._each(lambda pair: self._promising(*pair), pairs)
+        alones = [self._alones(base) for base in bases]
+        promises = self._each(lambda pair: self._promising(*pair), zip(bases, besides, alones, strict=True))
         likely = [(base, one) for base, its in zip(bases, promises, strict=True) for one in its]
         tried = list(self._each(lambda pair: self._at(*pair), likely))
         firsts = []
         for base, beside in pairs:
             own = [fit for (its, _), fit in zip(likely, tried, strict=True) if its is base and fit is not None]
-            promised = beside.promises([self._doing(base, fit) for fit in own])
+            promised = beside.promises([self._doing(base, [fit]) for fit in own])
             best: dict[str, tuple[Fit, Promise]] = {}
             for k in sorted(range(len(own)), key=lambda k: -promised[k][0].gain):
                 best.setdefault(own[k].candidates[-1].name, (own[k], promised[k][0]))
@@ -123,15 +135,18 @@ class Trials:
         firsts.sort(key=lambda one: -one[2].position.size)  # the longest first, so that all cores end together
         return list(self._each(lambda one: self._refined(*one), firsts))
 
-    def _doing(self, base: Fit, fit: Fit) -> Alone:
-        """What the last effect of a fit does beside the others, as it was replayed."""
+    def _doing(self, base: Fit, fits: Sequence[Fit]) -> Alone:
+        """What the last effect of some fits does beside a base, as it was replayed."""
+        before = self._means(base)
         return Alone(
-            candidate=fit.candidates[-1], points=fit.points[-1:], changes=(self._means(fit) - self._means(base))[None]
+            candidate=fits[0].candidates[-1],
+            points=tuple(fit.points[-1] for fit in fits),
+            changes=np.array([self._means(fit) - before for fit in fits]),
         )
 
-    def _promising(self, base: Fit, beside: Beside) -> list[Promise]:
+    def _promising(self, base: Fit, beside: Beside, alones: Mapping[Candidate, Alone]) -> list[Promise]:
         """Starts of the effects that may come beside a fit, the most promising effects first."""
-        free = [alone for candidate, (alone, _) in self._alone.items() if candidate.name not in base.names]
+        free = [alone for candidate, alone in alones.items() if candidate.name not in base.names]
         of_name: dict[str, list[Promise]] = {}
         for one in chain.from_iterable(beside.promises(free)):
             if one.gain > LEAST_PROMISED:
@@ -155,7 +170,7 @@ class Trials:
         refined = fitter.refine(fit if nearer is None else min(fit, nearer, key=fitter.cost))
         if fitter.cost(refined) <= fitter.cost(current):
             return refined
-        ((stays, *_),) = beside.still.promises([self._alone[fit.candidates[-1]][0]])
+        ((stays, *_),) = beside.still.promises([self._alones(current)[fit.candidates[-1]]])
         again = self._at(current, stays)
         found = [refined] if again is None else [refined, fitter.refine(again)]
         return min(found, key=fitter.cost)

@@ -68,6 +68,17 @@ def test_a_set_is_weighed_without_what_it_does_not_need(alpha):
     assert hypotheses.possible[0].told == ("flow_meter_gain", "static_head_bias")
 
 
+def test_what_an_effect_does_beside_a_header_is_tried_in_that_layout(alpha):
+    """Pumps with mains of their own lose nothing through the valves of others: alone a leak does nothing."""
+    header, leak = of_all(alpha, "common_header"), of_all(alpha, "check_valve_leak")
+    truth = [EFFECTS["common_header"](shared_fraction=0.9), EFFECTS["check_valve_leak"](leak_m3h=6.0)]
+    fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, [header, leak])
+    alone = fitter.refine(fitter.at([header], [np.array([0.8])]))
+    (both,) = trials.with_one_more([alone], hypotheses.beside([alone]))
+    (found,) = (effect for effect in both.effects if effect.name == "check_valve_leak")
+    assert found.leak_m3h == pytest.approx(6.0, rel=0.1)
+
+
 @pytest.mark.check
 def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start():
     """Four pumps share a main, so that each moves little, and its meter reads 0 under 30 m³/h.
