@@ -135,8 +135,8 @@ class Fitter:
     def refine(self, fit: Fit) -> Fit:
         """Levenberg and Marquardt's method from where a fit stands, within the ranges.
 
-        Limits have no slope that leads anywhere: where that ends they are tried nearer to neutral and further off, and
-        it goes on from there. So are the strengths of the last candidate where nothing led down.
+        Limits have no slope that leads anywhere: where that ends they are tried nearer to neutral and further off,
+        and it goes on from there. So are the strengths of the last candidate where nothing led down.
         """
         if fit.position.size == 0:
             return fit
