@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Floats, Integers
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.presence import (
     are_needed,
@@ -128,10 +128,7 @@ class Hypotheses:
 
         Beside an effect that is not needed, or too small to be told, a set is weighed without that, too.
         """
-        costs = [self._fitter.cost(fit) for fit in fits]
-        least, plain = min(costs, default=0.0), self._fitter.cost(self._fitter.plain)
-        most = min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain)
-        hopeful = [fit for fit, cost in zip(fits, costs, strict=True) if cost < most]
+        hopeful = self._hopeful(fits)
         while hopeful:
             found = list(self._each(self._weighed, hopeful))
             for one in found:
@@ -141,6 +138,19 @@ class Hypotheses:
             fewer = {one.needed: one.fit for one in found if one.needed not in self._best}
             alone = [self._fitter.only(fit, names) for names, fit in fewer.items()]
             hopeful = list(self._each(self._fitter.refine, [fit for fit in alone if fit is not None]))
+
+    def _hopeful(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Fits that explain nearly as much as the best one: of the loss, or of what the likelihood is surprised by.
+
+        A limit may take much of the loss in seconds in which a model is often wrong.
+        """
+        if not fits:
+            return []
+        cells = np.array([self._plain, *(self._means(fit) for fit in fits)]).T
+        squares = np.diag(cell_weights(self._none.evidence, self._none.form).products(cells))
+        losses = np.array([self._fitter.cost(fit) for fit in (self._fitter.plain, *fits)])
+        is_hopeful = np.any([_is_near_best(one) for one in (losses, squares)], axis=0)
+        return [fit for fit, it_is in zip(fits, is_hopeful, strict=True) if it_is]
 
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""
@@ -294,3 +304,9 @@ class Hypotheses:
         wrong = cells.allowed**2 + (LATE[2] * late) ** 2 + 2.0 * GOOD.form**2 * others
         own = unshifted(cells, signature, late)
         return bool(np.any(cells.group_squares(own) > cells.group_squares(np.sqrt(wrong))))
+
+
+def _is_near_best(left: Floats) -> Flags:
+    """Whether each sum of squares but the first, that of no effects, is near the least one."""
+    plain, least = left[0], left[1:].min()
+    return np.asarray(left[1:] < min(least + HOPELESS[0] * (plain - least) + HOPELESS[1], plain), dtype=np.bool_)

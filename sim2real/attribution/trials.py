@@ -145,14 +145,17 @@ class Trials:
         )
 
     def _promising(self, base: Fit, beside: Beside, alones: Mapping[Candidate, Alone]) -> list[Promise]:
-        """Starts of the effects that may come beside a fit, the most promising effects first."""
+        """Starts of the effects that may come beside a fit: patterns that the values show, and the most promising.
+
+        What steps do to a level that is wrong says nothing of what they do to one that is right.
+        """
         free = [alone for candidate, alone in alones.items() if candidate.name not in base.names]
         of_name: dict[str, list[Promise]] = {}
         for one in chain.from_iterable(beside.promises(free)):
-            if one.gain > LEAST_PROMISED:
+            if one.gain > LEAST_PROMISED or one.candidate.is_pattern:
                 of_name.setdefault(one.candidate.name, []).append(one)
         starts = [sorted(its, key=lambda one: -one.gain)[:MOST_STARTS] for its in of_name.values()]
-        starts.sort(key=lambda its: -its[0].gain)
+        starts.sort(key=lambda its: (not its[0].candidate.is_pattern, -its[0].gain))
         return list(chain.from_iterable(starts[:MOST_TRIED]))
 
     def _at(self, current: Fit, promise: Promise) -> Fit | None:

@@ -68,6 +68,37 @@ def test_a_set_is_weighed_without_what_it_does_not_need(alpha):
     assert hypotheses.possible[0].told == ("flow_meter_gain", "static_head_bias")
 
 
+def test_what_explains_less_of_the_loss_than_a_limit_is_weighed_where_it_surprises_more(alpha):
+    """A limit takes seconds of starts away, in which a right model is often wrong."""
+    area, limit = of_all(alpha, "sump_area_profile"), of_all(alpha, "flow_low_cutoff")
+    truth = [
+        EFFECTS["water_inertia"](inertia_s2_m2=400.0),
+        EFFECTS["sump_area_profile"](bottom_factor=0.92, height_m=1.2),
+    ]
+    fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, [area, limit])
+    singles = trials.singles()
+    explained = {fit.names[0]: fitter.cost(fitter.plain) - fitter.cost(fit) for fit in singles}
+    assert explained["sump_area_profile"] < 0.4 * explained["flow_low_cutoff"]
+    hypotheses.add(singles)
+    assert hypotheses.possible[0].told == ("sump_area_profile",)
+
+
+def test_steps_that_the_values_show_are_tried_though_others_promise_more(alpha, monkeypatch):
+    """What they do to a level that is wrong says little of what they do to one that is right."""
+    monkeypatch.setattr("wetwell.sim2real.attribution.trials.MOST_TRIED", 1)
+    truth = [
+        EFFECTS["sump_area_profile"](bottom_factor=0.4, height_m=1.2),
+        EFFECTS["level_quantisation"](quantum_m=0.04),
+        EFFECTS["static_head_bias"](offset_m=5.0),
+    ]
+    candidates = [of_all(alpha, one.name) for one in truth]
+    fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, candidates)
+    (area,) = (fit for fit in trials.singles() if fit.names == ("sump_area_profile",))
+    (both,) = trials.with_one_more([area], hypotheses.beside([area]))
+    assert both.names == ("sump_area_profile", "level_quantisation")
+    assert fitter.cost(both) < fitter.cost(area)
+
+
 def test_what_an_effect_does_beside_a_header_is_tried_in_that_layout(alpha):
     """Pumps with mains of their own lose nothing through the valves of others: alone a leak does nothing."""
     header, leak = of_all(alpha, "common_header"), of_all(alpha, "check_valve_leak")
