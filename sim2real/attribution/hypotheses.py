@@ -103,6 +103,7 @@ class Hypotheses:
         self._none = Hypothesis(
             fit=fitter.plain, evidence=none, form=no_form(cells), is_there=True, told=(), needed=()
         )
+        self._surprise = cell_weights(none, self._none.form)
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
         self._factors: dict[tuple[str, ...], float] = {}
 
@@ -147,7 +148,7 @@ class Hypotheses:
         if not fits:
             return []
         cells = np.array([self._plain, *(self._means(fit) for fit in fits)]).T
-        squares = np.diag(cell_weights(self._none.evidence, self._none.form).products(cells))
+        squares = np.diag(self._surprise.products(cells))
         losses = np.array([self._fitter.cost(fit) for fit in (self._fitter.plain, *fits)])
         is_hopeful = np.any([_is_near_best(one) for one in (losses, squares)], axis=0)
         return [fit for fit, it_is in zip(fits, is_hopeful, strict=True) if it_is]

@@ -76,16 +76,15 @@ class Trials:
     def _alones(self, base: Fit) -> Mapping[Candidate, Alone]:
         """What each candidate does alone; where the base has another layout of the station, what it does in that."""
         layout = tuple(one for one in base.candidates if one.is_layout)
+        if not layout:
+            return {one: alone for one, (alone, _) in self._alone.items()}
         if layout not in self._in_layout:
-            station = self._fitter.only(base, [one.name for one in layout])
-            if not layout or station is None:
-                self._in_layout[layout] = {one: alone for one, (alone, _) in self._alone.items()}
-            else:
-                others = [one for one in self._guesses if one not in layout]
-                tried = self._each(lambda one: self._tried(one, station), others)
-                self._in_layout[layout] = {
-                    one: self._doing(station, fits) for one, fits in zip(others, tried, strict=True) if fits
-                }
+            station = self._fitter.only(base, [one.name for one in layout]) or self._fitter.plain
+            others = [one for one in self._guesses if one not in layout]
+            tried = self._each(lambda one: self._tried(one, station), others)
+            self._in_layout[layout] = {
+                one: self._doing(station, fits) for one, fits in zip(others, tried, strict=True) if fits
+            }
         return self._in_layout[layout]
 
     def _means(self, fit: Fit) -> Floats:

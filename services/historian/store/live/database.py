@@ -300,7 +300,8 @@ class LiveDatabase:
                 self._file.is_damaged = True  # a page in the place of another
             elif is_sample_intact(station, time_ns, seq, quality, size, data, last_ns, crc):
                 intact.append((time_ns, seq, size, quality, data))
-                self._file.is_damaged = self._file.is_damaged or last_ns != last_ns_of(size, data)
+                if last_ns != last_ns_of(size, data):
+                    self._file.is_damaged = True
             else:
                 self._file.refused.note("sample", station, time_ns, seq)
         return intact
