@@ -74,11 +74,12 @@ def columns_of_no_use(replay: Replay, bins: Bins, given: Sequence[str]) -> list[
     if not given:
         return []
     absent = [name for name in given if name not in replay.traces.columns]
-    left_out = dictionary(_covariates(replay, bins), bins.regime != IDLE)[1]
+    left_out = dictionary(covariates_of(replay, bins), bins.regime != IDLE)[1]
     return [*((name, "has values in less than half of the rows") for name in absent), *left_out.items()]
 
 
-def _covariates(replay: Replay, bins: Bins) -> dict[Place, Floats]:
+def covariates_of(replay: Replay, bins: Bins) -> dict[Place, Floats]:
+    """(bins,) values of what a correction may go with, as the simulator sees it."""
     prediction = replay.run()
     flow_m3h = later(replay.readings(())[0], 1.0)  # a correction goes by the flow of the second before
     return bin_covariates(replay.traces, bins, prediction.plant, prediction.level_m, flow_m3h)
@@ -107,11 +108,11 @@ def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
     residuals : StationResiduals
     """
     bins = residuals.bins
-    covariates = _covariates(replay, bins)
+    covariates = covariates_of(replay, bins)
     atoms, _ = dictionary(covariates, bins.regime != IDLE)
     shop = Workshop(replay, residuals)
     found: list[Tried] = []
-    for proposals_of_term in _first_of_each(shop.proposals(atoms, covariates)):
+    for proposals_of_term in _first_of_each(shop.proposals(shop.addends(atoms), covariates, shop.plain)):
         tried = next((one for one in map(shop.tried, proposals_of_term) if one is not None), None)
         if tried is not None and (daily := _of_calendar(tried.proposal, atoms)) is not None:
             tried = max(tried, shop.tried(daily) or tried, key=lambda one: one.proposal.log)

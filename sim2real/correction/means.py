@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
+from scipy.sparse import csr_array
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.likelihood.covariance import DIFFERING, GOOD_FORM, POOR_FORM
@@ -51,10 +52,9 @@ class Means:
     group_material: Floats
     group_wrong: Floats
 
-    def of(self, columns: Floats) -> Floats:
-        """(cells, k) means of (bins, k) columns."""
-        sums = [np.bincount(self.of_bin, column, self.counts.size) for column in columns.T]
-        return np.array(sums).reshape(-1, self.counts.size).T / self.counts[:, None]
+    def of(self, columns: Floats, factor: float | Floats = 1.0) -> Floats:
+        """(cells, k) means of (bins, k) columns, each times a factor, or (bins,) factors."""
+        return _sums(self.of_bin, self.counts.size, factor) @ columns / self.counts[:, None]
 
     def middle(self, residuals: Floats) -> Floats:
         """(bins,) median of the residuals of the group that a bin is of."""
@@ -71,12 +71,16 @@ class Means:
         """The means, but some cells say nothing."""
         return replace(self, weight=np.where(cells, 0.0, self.weight))
 
-    def products(self, columns: Floats) -> Floats:
-        """(k, k) products of (cells, k) columns under the inverse of C, by Woodbury's identity."""
+    def weighed(self, columns: Floats) -> Floats:
+        """(cells, k) columns times the inverse of C, by Woodbury's identity."""
         weighted = columns * self.weight[:, None]
-        by_group = np.array([np.bincount(self.group, column) for column in weighted.T]).T
         ones = np.bincount(self.group, self.weight) + self.group_wrong**-2
-        return np.asarray(columns.T @ weighted - by_group.T @ (by_group / ones[:, None]), dtype=np.float64)
+        alike = (_sums(self.group, self.group_wrong.size) @ weighted) / ones[:, None]
+        return np.asarray(weighted - self.weight[:, None] * alike[self.group], dtype=np.float64)
+
+    def products(self, columns: Floats) -> Floats:
+        """(k, k) products of (cells, k) columns under the inverse of C."""
+        return np.asarray(columns.T @ self.weighed(columns), dtype=np.float64)
 
     def matters(self, signature: Floats) -> bool:
         """Whether (bins,) changes of the residuals are more than what is material, in some group."""
@@ -91,6 +95,12 @@ class Means:
         first, second = self.of(np.column_stack([one, other])).T
         wrong = self.allowed**2 + 2.0 * GOOD_FORM**2 * np.maximum(first**2, second**2)
         return bool(np.all(np.bincount(self.group, (first - second) ** 2) <= np.bincount(self.group, wrong)))
+
+
+def _sums(places: Integers, size: int, factor: float | Floats = 1.0) -> csr_array:
+    """(size, n) matrix that sums what is in each place, each times a factor, or (n,) factors."""
+    count = places.size
+    return csr_array((np.broadcast_to(factor, count), (places, np.arange(count))), (size, count))
 
 
 def means_of(bins: Bins, plain: Floats) -> Means:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -58,10 +59,8 @@ class Gram:
 
     Parameters
     ----------
-    means : Means
-    residuals : (bins,) array
-    columns : (bins, k) array
-        Change of the residuals with the size of each addend.
+    products : (1 + k, 1 + k) array
+        Of the means of the residuals, and of their changes with the size of each addend, under the inverse of C.
 
     Attributes
     ----------
@@ -73,8 +72,8 @@ class Gram:
     .. [1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
 
-    def __init__(self, means: Means, residuals: Floats, columns: Floats) -> None:
-        self._products = TEMPER * means.products(means.of(np.column_stack([residuals, columns])))
+    def __init__(self, products: Floats) -> None:
+        self._products = TEMPER * products
         self.nothing = -0.5 * float(self._products[0, 0])
 
     def gain(self, chosen: Sequence[int] | Integers, base: Floats | None = None) -> tuple[float, Floats]:
@@ -109,30 +108,65 @@ class Gram:
         return np.asarray(np.linalg.inv(inner + np.eye(rows.size) / SIZE_PRIOR**2))
 
 
-def proposals(
-    means: Means, residuals: Floats, atoms: Sequence[Atom], sensitivities: Mapping[Target, Floats]
-) -> list[Proposal]:
-    """The best addends of each target, and the best of each smaller number; the most probable proposal first.
+class Addends:
+    """What may be added, and what it does to the cells as a correction of a target.
 
     Parameters
     ----------
     means : Means
-    residuals : (bins,) array
     atoms : sequence of Atom
-    sensitivities : mapping of (bins,) arrays
-        Change of the residuals with a constant correction of each target; what a correction that varies does is taken
-        to be its product with that.
+
+    Attributes
+    ----------
+    of_atom : dict of int to list of int
+        Columns of each atom by its number; that of the offset is of -1.
     """
-    found: list[Proposal] = []
-    for target, slope in sensitivities.items():
-        columns = [slope]
-        of_atom: dict[int, list[int]] = {-1: [0]}
-        for number, atom in enumerate(atoms):
-            of_atom[number] = list(range(len(columns), len(columns) + atom.columns.shape[1]))
-            columns += [slope * values for values in atom.columns.T]
-        gram = Gram(means, residuals, np.array(columns).T)
-        found += _path(target, gram, atoms, of_atom)
-    return sorted(found, key=lambda one: -one.log)
+
+    def __init__(self, means: Means, atoms: Sequence[Atom]) -> None:
+        self.means, self.atoms = means, tuple(atoms)
+        shapes = [np.ones((means.of_bin.size, 1)), *(atom.columns for atom in atoms)]
+        self._shapes = np.hstack(shapes)
+        self._kept: dict[Target, tuple[Floats, Floats]] = {}
+        ends = np.cumsum([0, *(one.shape[1] for one in shapes)]).tolist()
+        self.of_atom = {number: list(range(*its)) for number, its in enumerate(pairwise(ends), start=-1)}
+
+    def gram(self, target: Target, slope: Floats, left: Floats) -> Gram:
+        """Of all addends of a target; what does not hang on the residuals is kept.
+
+        Parameters
+        ----------
+        target : Target
+        slope : (bins,) array
+            Change of the residuals with a constant correction of it; what a correction that varies does is taken to
+            be its product with that.
+        left : (cells, 1) array
+            Means of the residuals.
+        """
+        if target not in self._kept:
+            responses = self.means.of(self._shapes, slope)
+            weighed = self.means.weighed(responses)
+            self._kept[target] = weighed, responses.T @ weighed
+        weighed, inner = self._kept[target]
+        along = weighed.T @ left
+        return Gram(np.block([[self.means.products(left), along.T], [along, inner]]))
+
+
+def proposals(addends: Addends, residuals: Floats, slopes: Mapping[Target, Floats]) -> list[Proposal]:
+    """The best addends of each target, and the best of each smaller number; the most probable proposal first.
+
+    Parameters
+    ----------
+    addends : Addends
+    residuals : (bins,) array
+    slopes : mapping of (bins,) arrays
+        Change of the residuals with a constant correction of each target.
+    """
+    left = addends.means.of(residuals[:, None])
+    paths = (
+        _path(target, addends.gram(target, slope, left), addends.atoms, addends.of_atom)
+        for target, slope in slopes.items()
+    )
+    return sorted(chain.from_iterable(paths), key=lambda one: -one.log)
 
 
 def _path(target: Target, gram: Gram, atoms: Sequence[Atom], of_atom: Mapping[int, list[int]]) -> list[Proposal]:

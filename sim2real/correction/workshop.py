@@ -11,7 +11,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import Atom, near
 from wetwell.sim2real.correction.means import Means, means_of
-from wetwell.sim2real.correction.selection import PROPOSED, Gram, Proposal, proposals
+from wetwell.sim2real.correction.selection import PROPOSED, Addends, Gram, Proposal, proposals
 from wetwell.sim2real.correction.target import Target, targets_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import asinh_loss
@@ -51,9 +51,10 @@ class Workshop:
 
     def __init__(self, replay: Replay, residuals: StationResiduals) -> None:
         self._replay, self._residuals = replay, residuals
-        self.plain = residuals.of(replay.run())
+        prediction = replay.run()
+        self._plant, self.plain = prediction.plant, residuals.of(prediction)
         self._means = means_of(residuals.bins, self.plain)
-        self.nothing = Gram(self._means, self.bounded(self.plain), np.zeros((self.plain.size, 0))).nothing
+        self.nothing = _gram(self._means, self.bounded(self.plain), np.zeros((self.plain.size, 0))).nothing
         self._sensitivities: dict[Target, Floats] = {}
 
     @property
@@ -81,20 +82,24 @@ class Workshop:
         """
         return self._residuals.of(self._replay.run([effect]))
 
-    def sensitivities(self, targets: Sequence[Target]) -> dict[Target, Floats]:
-        """(bins,) slope of the residuals over a constant correction of each target that they see."""
-        slopes = {target: self._sensitivity(target) for target in targets}
-        return {target: slope for target, slope in slopes.items() if np.any(np.abs(slope) > 0.0)}
-
-    def _sensitivity(self, target: Target) -> Floats:
-        """(bins,) slope; kept."""
+    def sensitivity(self, target: Target) -> Floats:
+        """(bins,) slope of the residuals over a constant correction of a target; kept."""
         found = self._sensitivities.get(target)
         if found is None:
             constant = Proposal(target=target, atoms=(), sizes=np.zeros(1), log=0.0)
             found = self._sensitivities[target] = self.slopes(constant, self.plain)[:, 0]
         return found
 
-    def proposals(self, atoms: Sequence[Atom], covariates: Mapping[Place, Floats]) -> list[Proposal]:
+    def addends(self, atoms: Sequence[Atom]) -> Addends:
+        """What may be added to a correction."""
+        return Addends(self._means, atoms)
+
+    @property
+    def targets(self) -> list[Target]:
+        """All that may be corrected, of all pumps and mains first."""
+        return sorted(targets_of(self._plant), key=lambda target: not target.is_of_all)
+
+    def proposals(self, addends: Addends, covariates: Mapping[Place, Floats], residuals: Floats) -> list[Proposal]:
         r"""The best proposals of the best terms, of each for all pumps or mains or for the one that fits better.
 
         All terms are looked at first, of all pumps and mains; then the best ones, of each pump or main, too; then
@@ -102,35 +107,48 @@ class Workshop:
         the loss would see, $z - z_1 + z_1'$, with $z_1$ those under the best proposal and $z_1'$ what `bounded` makes
         of them.
 
+        Parameters
+        ----------
+        addends : Addends
+        covariates : mapping of (bins,) arrays
+        residuals : (bins,) array
+            Without any effect, or beside some: slopes hardly change with these.
+
         References
         ----------
         .. [1] P. J. Huber, Robust Statistics, 1981, section 7.8: pseudo-observations.
         """
-        targets = targets_of(self._replay.run().plant)
-        slopes = self.sensitivities([target for target in targets if target.is_of_all])
-        if not slopes:
+        targets = self.targets
+        looked = self._seen_in_residuals([target for target in targets if target.is_of_all])
+        if not looked:
             return []
-        found = proposals(self._means, self.plain, atoms, slopes)
+
+        def proposed(left: Floats) -> list[Proposal]:
+            return proposals(addends, left, {one: self.sensitivity(one) for one in looked})
+
+        found = proposed(residuals)
         likely = list(dict.fromkeys(one.target.term for one in found))[:PROPOSED]
-        slopes |= self.sensitivities([one for one in targets if one.term in likely and not one.is_of_all])
-        looked = [target for target in slopes if target.term in likely]
+        looked = self._seen_in_residuals([one for one in targets if one.term in likely])
         for _ in range(LOOKS):
-            seen = self._seen(found[0], slopes[found[0].target])
-            found = proposals(self._means, seen, atoms, {target: slopes[target] for target in looked})
+            seen = self._seen(residuals, found[0])
+            found = proposed(seen)
             looked = [next(one.target for one in found if one.target.term == term) for term in likely]
         finer: list[Proposal] = []
         for target in looked:
             nearest = [one for one in found if one.target == target]
             for width in WIDTHS:
                 around = [other for atom in nearest[0].atoms for other in near(atom, covariates[atom.place], width)]
-                nearest = proposals(self._means, seen, around, {target: slopes[target]})
+                nearest = proposals(self.addends(around), seen, {target: self.sensitivity(target)})
             finer += nearest
         return sorted(finer, key=lambda one: -one.log)
 
-    def _seen(self, best: Proposal, slope: Floats) -> Floats:
+    def _seen_in_residuals(self, targets: Sequence[Target]) -> list[Target]:
+        return [target for target in targets if np.any(np.abs(self.sensitivity(target)) > 0.0)]
+
+    def _seen(self, residuals: Floats, best: Proposal) -> Floats:
         """(bins,) residuals as a fit under the loss would see them, near to a proposal."""
-        after = self.plain + slope * (best.columns(slope.size) @ best.sizes)
-        return self.plain - after + self.bounded(after)
+        after = residuals + self.sensitivity(best.target) * (best.columns(residuals.size) @ best.sizes)
+        return residuals - after + self.bounded(after)
 
     def tried(self, proposal: Proposal) -> Tried | None:
         """A proposal refined in the simulator; None where no station works with it, or none of it matters.
@@ -162,8 +180,8 @@ class Workshop:
 
     def of_target(self, target: Target, like: Proposal) -> Tried | None:
         """The most probable correction of a target with the addends of another one's; None as of `tried`."""
-        columns = self._sensitivity(target)[:, None] * like.columns(self.plain.size)
-        gram = Gram(self._means, self.bounded(self.plain), columns)
+        columns = self.sensitivity(target)[:, None] * like.columns(self.plain.size)
+        gram = _gram(self._means, self.bounded(self.plain), columns)
         return self.tried(replace(like, target=target, sizes=gram.gain(range(like.sizes.size))[1]))
 
     def _nearest(self, proposal: Proposal, start: Floats, least: float, slopes: Floats | None = None) -> Tried | None:
@@ -186,7 +204,7 @@ class Workshop:
         root = np.sqrt(np.where(off == 0.0, 1.0, asinh_loss(known) / known))
         together = means.of_groups(tried.slopes)
         columns = together + root[:, None] * (tried.slopes - together)
-        gram = Gram(means, middle + root * off, columns)
+        gram = _gram(means, middle + root * off, columns)
         return gram.gain(range(tried.proposal.sizes.size), tried.proposal.sizes)[1]
 
     def _material(self, found: Tried) -> Proposal:
@@ -207,7 +225,7 @@ class Workshop:
         residuals = self.under(effect_of(proposal))
         if slopes is None:
             slopes = self.slopes(proposal, residuals)
-        gram = Gram(self._means, self.bounded(residuals), slopes)
+        gram = _gram(self._means, self.bounded(residuals), slopes)
         log = proposal.log_prior + gram.at(proposal.sizes) - self.nothing
         return Tried(proposal=replace(proposal, log=log), residuals=residuals, slopes=slopes, gram=gram)
 
@@ -247,6 +265,11 @@ class Workshop:
             change = self._step(self._means.without(held), tried) - tried.proposal.sizes
             found[held[of_bin]] += tried.slopes[held[of_bin]] @ change
         return found
+
+
+def _gram(means: Means, residuals: Floats, columns: Floats) -> Gram:
+    """Of (bins,) residuals and (bins, k) columns."""
+    return Gram(means.products(means.of(np.column_stack([residuals, columns]))))
 
 
 def effect_of(proposal: Proposal) -> LearntCorrection:

@@ -7,7 +7,7 @@ from scipy.stats import multivariate_normal
 from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import dictionary
 from wetwell.sim2real.correction.means import Means
-from wetwell.sim2real.correction.selection import SIZE_PRIOR, TEMPER, Gram, proposals
+from wetwell.sim2real.correction.selection import SIZE_PRIOR, TEMPER, Addends, Gram, proposals
 from wetwell.sim2real.correction.target import Target, targets_of
 from wetwell.simulator.parameters import plant_parameters
 
@@ -51,12 +51,12 @@ def test_products_are_those_of_the_whole_covariance(means):
 def test_evidence_is_that_of_a_normal_distribution(means):
     rng = np.random.default_rng(2)
     residuals, columns = rng.normal(size=2 * CELLS), rng.normal(size=(2 * CELLS, 2))
-    gram = Gram(means, residuals, columns)
     r, a, c = means.of(residuals[:, None])[:, 0], means.of(columns), covariance(means) / TEMPER
+    gram = Gram(means.products(np.column_stack([r, a])))
     dense = multivariate_normal.logpdf(r, cov=c + SIZE_PRIOR**2 * a @ a.T) - multivariate_normal.logpdf(r, cov=c)
     log, sizes = gram.gain([0, 1])
     assert log - gram.nothing == pytest.approx(dense, rel=1e-8)
-    moved = Gram(means, residuals + columns @ sizes, columns)
+    moved = Gram(means.products(np.column_stack([r + a @ sizes, a])))
     assert moved.at(sizes) == pytest.approx(log, rel=1e-9)
     spread = np.linalg.inv(a.T @ np.linalg.solve(c, a) + np.eye(2) / SIZE_PRIOR**2)
     np.testing.assert_allclose(gram.covariance([0, 1]), spread, rtol=1e-8)
@@ -81,7 +81,8 @@ def test_term_covariate_and_size_of_a_known_cause_are_found(means, covariates, s
     slopes = {target: rng.normal(0.0, 60.0, 2 * CELLS) for target in (LOSS, SPEED)}
     wave = 0.2 * np.cos(2.0 * np.pi * (covariates[Place("hour_of_day")] - 5.0) / 24.0)
     residuals = rng.normal(0.0, 1.0, 2 * CELLS) - slopes[SPEED] * wave
-    best = proposals(means, residuals, atoms, slopes)[0]
+    addends = Addends(means, atoms)
+    best = proposals(addends, residuals, slopes)[0]
     assert best.target == SPEED
     assert [atom.place for atom in best.atoms] == [Place("hour_of_day")]
     part = best.atoms[0].part(best.sizes[1:])
@@ -94,7 +95,8 @@ def test_noise_has_no_correction(means, covariates, seed):
     rng = np.random.default_rng([10, seed])
     atoms, _ = dictionary(covariates, np.ones(2 * CELLS, dtype=bool))
     slopes = {target: rng.normal(0.0, 60.0, 2 * CELLS) for target in (LOSS, SPEED)}
-    assert proposals(means, rng.normal(0.0, 1.0, 2 * CELLS), atoms, slopes)[0].log < 0.0
+    addends = Addends(means, atoms)
+    assert proposals(addends, rng.normal(0.0, 1.0, 2 * CELLS), slopes)[0].log < 0.0
 
 
 def test_columns_that_say_nothing_are_named_with_the_reason(covariates):
