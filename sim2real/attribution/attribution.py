@@ -10,13 +10,13 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
-from wetwell.sim2real.attribution.informed import informed
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
-from wetwell.sim2real.attribution.intervals import are_sized, intervals_of, sharpened
+from wetwell.sim2real.attribution.intervals import are_sized, informed, intervals_of, sharpened
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
 from wetwell.sim2real.attribution.search import MOST_CHANGED, changed, in_order, search
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
+from wetwell.sim2real.attribution.unnamed import unnamed_beside
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import (
@@ -120,9 +120,13 @@ def attribute(
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search(fitter, trials, hypotheses)
     hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
-    tested_names = [fit.names[0] for fit in singles]
-    log_share = partial(priors.log_share, tested=tested_names)
-    while verdict_of(posterior := posterior_of(hypotheses.weights(), len(singles), log_share)) == "effect":
+    hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, each))
+    log_share = partial(priors.log_share, tested=[fit.names[0] for fit in singles])
+
+    def weighed() -> tuple[SetProbability, ...]:
+        return posterior_of(hypotheses.weights(), len(singles), log_share, hypotheses.unnamed_weights())
+
+    while verdict_of(posterior := weighed()) == "effect":
         names = best_set(posterior)
         likely = hypotheses.of(names)
         its_ends = sharpened(likely.fit, intervals_of(fitter, likely.fit, residuals.bins), likely.evidence)

@@ -70,6 +70,11 @@ class Candidate:
         return EFFECTS[self.name].component
 
     @property
+    def log_prior(self) -> float:
+        """Logarithm of how probable it is among others of its kind, where not all are alike."""
+        return 0.0
+
+    @property
     def is_pattern(self) -> bool:
         """Whether the values themselves show how strong it is, whatever else there is: so it is tried."""
         return self.name in OF_TELEMETRY

@@ -21,7 +21,7 @@ from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import GOOD, LATE, OFFSET, POOR_FORM, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
-from wetwell.sim2real.likelihood.posterior import Weight
+from wetwell.sim2real.likelihood.posterior import UnnamedWeight, Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.rates import rate_of
 from wetwell.simulator.effects.effect import Effect
@@ -106,6 +106,7 @@ class Hypotheses:
         self._surprise = cell_weights(none, self._none.form)
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
         self._factors: dict[tuple[str, ...], float] = {}
+        self._unnamed: list[Hypothesis] = []
 
     @property
     def possible(self) -> list[Hypothesis]:
@@ -153,6 +154,22 @@ class Hypotheses:
         is_hopeful = np.any([_is_near_best(one) for one in (losses, squares)], axis=0)
         return [fit for fit, it_is in zip(fits, is_hopeful, strict=True) if it_is]
 
+    def add_unnamed(self, fits: Sequence[Fit]) -> None:
+        """Weigh fits whose last candidate is a correction.
+
+        Those are left out that explain far less than the best set, and those that say what a set says.
+        """
+        best = self.weighed[0].fit
+        hopeful = [
+            fit for fit in self._hopeful([best, *fits]) if fit is not best and not self._is_known(self._means(fit))
+        ]
+        found = self._each(self._weighed, list(self._each(self._fitter.refine, hopeful)))
+        self._unnamed += [one for one in found if one.is_there and one.fit.names[-1] in one.told]
+
+    def _is_known(self, residuals: Floats) -> bool:
+        """Whether no material difference parts (cells,) residuals from those of a set that may be the answer."""
+        return any(self._is_within(one.evidence.residuals - residuals, 1.0) for one in self.possible)
+
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
@@ -183,6 +200,15 @@ class Hypotheses:
                 log_flexible=self._factors.get(one.effects, -np.inf),
             )
             for one in weighed
+        ]
+
+    def unnamed_weights(self) -> list[UnnamedWeight]:
+        """Corrections that may be what is unknown, but for those that no material difference parts from a set."""
+        return [
+            UnnamedWeight(acting=tuple(sorted(fit.names[:-1])), log=one.evidence.log + fit.candidates[-1].log_prior)
+            for one in self._unnamed
+            for fit in (one.fit,)
+            if not self._is_known(one.evidence.residuals)
         ]
 
     def beside(self, fits: Sequence[Fit]) -> list[Beside]:

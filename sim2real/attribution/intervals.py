@@ -1,4 +1,4 @@
-"""Intervals of fitted parameters: noise of every kind, and what a model that is right may still be off."""
+"""Intervals of fitted parameters, and the fit that other stations make likelier."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -232,3 +232,28 @@ def _profile(fitter: Fitter, fit: Fit, x: Floats, parameter: int) -> tuple[float
                 moved[parameter] = float(x[parameter] > neutral)
         ends.append(float(moved[parameter]))
     return min(ends), max(ends)
+
+
+def informed(fitter: Fitter, fit: Fit, priors: Priors) -> Fit:
+    r"""The most probable fit under a normal prior of its parameters.
+
+    $$x' = x + C' P (m - x), \qquad C' = (I + C P)^{-1} C$$
+
+    with the points x of the fit, their covariance C as of `covariance_of`, and mean m and precision P of the prior,
+    but for parameters that contradict it.
+
+    Parameters
+    ----------
+    fitter : Fitter
+    fit : Fit
+    priors : Priors
+        Without one for its parameters the fit stays as it is.
+    """
+    known, x = known_of(fit, priors), fit.position
+    if not known.precision.any():
+        return fit
+    covariance = covariance_of(fitter, fit, fitter.bins, fitter.loss_slopes(fit)[fitter.rows])
+    known = agreeing(known, x, covariance)
+    step = narrowed(covariance, known) @ (known.precision * (known.mean - x))
+    moved = fitter.at(fit.candidates, fit.split(np.clip(x + step, 0.0, 1.0)))
+    return fit if moved is None else moved

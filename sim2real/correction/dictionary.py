@@ -7,11 +7,10 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.correction.bin_covariates import Place
+from wetwell.sim2real.likelihood.posterior import FURTHER_PRIOR
 from wetwell.simulator.corrections.parts import SHAPES, Shape, shapes_at
-from wetwell.simulator.effects.station.correction_part import PartTable
+from wetwell.simulator.effects.station.correction_part import MOST_SIZE, PartTable
 
-PART_PRIOR = 0.1
-"""Probability of one more addend, shared by what it may go with, and by the shapes of each. [1]"""
 KNOWN_RANGE = (0.01, 0.99)
 """Quantiles of a covariate between which its shapes are known."""
 DECAYS_S = (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
@@ -49,7 +48,8 @@ class Atom:
     columns : array
         Dimensionless.
     log_prior : float
-        Logarithm of the probability that it acts, as one of its dictionary.
+        Logarithm of the probability that it acts: one more addend is as usual as one more effect, and it is one of
+        its dictionary.
     """
 
     place: Place
@@ -75,7 +75,7 @@ class Atom:
             column=self.place.column,
             noise=_short(self.place.noise),
             shape=self.shape,
-            size=float(np.clip(_short(size), -4.0, 4.0)),
+            size=float(np.clip(_short(size), -MOST_SIZE, MOST_SIZE)),
             centre=_short(centre),
             scale=_short(self.scale),
             **known,
@@ -107,7 +107,7 @@ def dictionary(covariates: Mapping[Place, Floats], is_running: Floats) -> tuple[
         if known.size and np.unique(known).size >= (2 if place.covariate == "pumps_on_main" else LEAST_CYCLES):
             atoms += _atoms(place, values, known)
     places = [atom.place[:2] for atom in atoms]
-    shares = [PART_PRIOR / len(set(places)) / places.count(place) for place in places]
+    shares = [FURTHER_PRIOR / len(set(places)) / places.count(place) for place in places]
     found = [replace(atom, log_prior=float(np.log(share))) for atom, share in zip(atoms, shares, strict=True)]
     return tuple(found), left_out
 

@@ -56,17 +56,37 @@ class Weight:
     log_flexible: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnnamedWeight:
+    """Something unknown that acts through a term of the model, with its evidence.
+
+    Attributes
+    ----------
+    acting : tuple of str
+        Effects beside which it acts.
+    log : float
+        Logarithm of its evidence, and of its probability among all that may act so.
+    """
+
+    acting: tuple[str, ...]
+    log: float
+
+
 def posterior_of(
-    weights: Sequence[Weight], library: int, log_share: Callable[[tuple[str, ...]], float] | None = None
+    weights: Sequence[Weight],
+    library: int,
+    log_share: Callable[[tuple[str, ...]], float] | None = None,
+    unnamed: Sequence[UnnamedWeight] = (),
 ) -> tuple[SetProbability, ...]:
     r"""Probabilities of the answers, best first; they sum to 1.
 
-    $$U = \frac{u \sum_S \pi_S\,L_S F_S}{Z}, \qquad
+    $$U = \frac{u}{Z} \sum_S \pi_S \left(\tfrac12 L_S F_S + \tfrac12 \sum_T \rho_T\,L_{S,T}\right), \qquad
     P(\text{unknown}) = (1 - \epsilon)\, U + \epsilon\, (1 - U), \qquad
     P(S) = (1 - P(\text{unknown})) \frac{\pi_S\,L_S}{\sum_{S'} \pi_{S'}\,L_{S'}}, \qquad
     \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
 
-    with the evidence L, the flexible factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q,
+    with the evidence L of a set S, and of a correction T of a term beside it, of which ρ is probable; the flexible
+    factor F, `UNKNOWN_PRIOR` u, `NONE_PRIOR` p₀, `FURTHER_PRIOR` q,
     n effects in the library, the sum Z of this numerator and of $(1 - u) \sum_S \pi_S\,L_S$, and `MISJUDGED` ε. The
     probability of an answer is the sum over all sets S that tell it.
 
@@ -78,6 +98,8 @@ def posterior_of(
         Number of effects that are tested.
     log_share : callable, optional
         Logarithm of the share of a set among those of its size, in the place of 1 / n: `Priors.log_share`.
+    unnamed : sequence of UnnamedWeight
+        Corrections T that were weighed.
 
     Examples
     --------
@@ -88,8 +110,11 @@ def posterior_of(
     """
     priors = np.array([_log_prior(weight.acting, library, log_share) for weight in weights])
     sets = priors + np.array([weight.log for weight in weights])
-    unknown = priors + np.array([weight.log + weight.log_flexible for weight in weights])
-    odds = np.log(UNKNOWN_PRIOR / (1.0 - UNKNOWN_PRIOR)) + logsumexp(unknown) - logsumexp(sets)
+    unknown = [
+        *(prior + weight.log + weight.log_flexible for prior, weight in zip(priors, weights, strict=True)),
+        *(_log_prior(one.acting, library, log_share) + one.log for one in unnamed),
+    ]
+    odds = np.log(0.5 * UNKNOWN_PRIOR / (1.0 - UNKNOWN_PRIOR)) + logsumexp(unknown) - logsumexp(sets)
     is_unknown = MISJUDGED + (1.0 - 2.0 * MISJUDGED) * float(expit(odds))
     shares = (1.0 - is_unknown) * np.exp(sets - logsumexp(sets))
     answers: dict[tuple[str, ...], float] = {}

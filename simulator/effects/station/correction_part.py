@@ -9,7 +9,10 @@ from wetwell.protocols.recordings.covariates import COVARIATE_PATTERN
 from wetwell.protocols.station.table import Finite, Positive, Table
 from wetwell.simulator.corrections.parts import SHAPES, Column, Covariate, Shape, shape_at
 
-Size = Annotated[float, Field(ge=-4.0, le=4.0, allow_inf_nan=False)]
+MOST_SIZE = 4.0
+"""Size of an addend at the most, as a share of the term's reference. [1]"""
+
+Size = Annotated[float, Field(ge=-MOST_SIZE, le=MOST_SIZE, allow_inf_nan=False)]
 
 
 class PartTable(Table):

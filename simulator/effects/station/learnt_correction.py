@@ -17,10 +17,12 @@ from wetwell.simulator.corrections.parts import (
     Term,
 )
 from wetwell.simulator.effects.effect import Component, Effect, MainNumber, PumpNumber, limits
-from wetwell.simulator.effects.station.correction_part import PartTable
+from wetwell.simulator.effects.station.correction_part import MOST_SIZE, PartTable
 from wetwell.simulator.hydraulics import pump_head_m
 from wetwell.simulator.parameters import PlantParameters
 
+LEAST_OFFSET = -0.9
+"""Of the term, at the least. [1]"""
 LEAST_LEFT = 0.05
 """Share of a term that a correction has to leave of it. [1]"""
 COMPONENT_OF: dict[Term, Component] = {
@@ -72,7 +74,7 @@ class LearntCorrection(Effect):
 
     name: Literal["learnt_correction"] = "learnt_correction"
     term: Term
-    offset: Annotated[float, limits(-0.9, 4.0, "1")] = 0.0
+    offset: Annotated[float, limits(LEAST_OFFSET, MOST_SIZE, "1")] = 0.0
     part: Annotated[tuple[PartTable, ...], Field(max_length=3)] = ()
     pump: PumpNumber = 0
     main: MainNumber = 0

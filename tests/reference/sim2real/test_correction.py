@@ -72,6 +72,18 @@ def test_a_drift_that_nobody_named_gets_its_equation(diagnosis):
     assert swing.ci[0] < swing.size < swing.ci[1]
 
 
+@pytest.mark.parametrize(
+    ("library", "answer"),
+    [(("static_head_bias", "flow_meter_gain"), "unknown"), (("friction_bias", "static_head_bias"), "effect")],
+)
+def test_a_friction_that_the_library_lacks_is_no_lift(library, answer):
+    """A lift comes near, and far nearer than any discrepancy of the readings: a correction of the losses is right."""
+    rough = truth("friction_bias", 970_941, factor=0.75, smoothness=0.2)
+    told = diagnose(run(rough, truth=False), rough.station, only=library)
+    assert told.verdict == answer
+    assert [effect.name for effect in told.effects] == (["friction_bias"] if answer == "effect" else [])
+
+
 def test_the_page_shows_equation_and_residuals_against_what_it_goes_by(diagnosis):
     page = gap_page(diagnosis.report(), diagnosis)
     assert "An equation for what nobody has named" in page

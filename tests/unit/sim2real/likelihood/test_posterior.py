@@ -5,6 +5,7 @@ import pytest
 
 from wetwell.sim2real.likelihood.posterior import (
     CREDIBLE,
+    UnnamedWeight,
     Weight,
     best_set,
     equivalents,
@@ -40,6 +41,20 @@ def test_probabilities_sum_to_1_and_the_best_comes_first():
 )
 def test_the_verdict_is_what_is_most_probable(weights, verdict):
     assert verdict_of(posterior_of(weights, 25)) == verdict
+
+
+@pytest.mark.parametrize(("log", "verdict"), [(490.0, "effect"), (520.0, "unknown")])
+def test_what_corrects_a_term_better_than_any_set_is_unknown(log, verdict):
+    sets = [NONE, weight("static_head_bias", log=500.0)]
+    assert verdict_of(posterior_of(sets, 25, unnamed=[UnnamedWeight(acting=(), log=log)])) == verdict
+
+
+def test_a_correction_beside_an_effect_costs_what_the_effect_does():
+    alone, beside = (
+        posterior_of([NONE], 25, unnamed=[UnnamedWeight(acting=acting, log=3.0)]) for acting in ((), ("ragging",))
+    )
+    assert alone[0].verdict == "unknown"
+    assert beside[0].verdict == "none"
 
 
 def test_a_further_effect_has_to_earn_its_place():
