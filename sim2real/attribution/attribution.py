@@ -121,6 +121,7 @@ def attribute(
     search(fitter, trials, hypotheses)
     hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
     hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, each))
+    hypotheses.settle()
     log_share = partial(priors.log_share, tested=[fit.names[0] for fit in singles])
 
     def weighed() -> tuple[SetProbability, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.attribution.fitting import Fit, Fitter
+from wetwell.sim2real.attribution.fitting import ROUNDS, Fit, Fitter
 from wetwell.sim2real.attribution.presence import (
     are_needed,
     is_only_late,
@@ -32,6 +32,11 @@ MOST_COMPANIONS = 1
 """Effects of a set that are too small to be told: the inertia of the water beside a lag."""
 FLEXED = 4
 """Sets, the best first, beside which something unknown is weighed: it needs what explains most."""
+
+MORE_GAINED = 4.0
+"""Times what a first step promises that settling has gained at the most, on looked-at recordings."""
+WORTH_A_STEP = 1.0
+"""By what a step has to make the recording likelier, in the logarithm: less tells no two sets apart."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,6 +175,23 @@ class Hypotheses:
         """Whether no material difference parts (cells,) residuals from those of a set that may be the answer."""
         return any(self._is_within(one.evidence.residuals - residuals, 1.0) for one in self.possible)
 
+    def settle(self) -> None:
+        """Take what may be the answer to where the recording is likeliest, as long as another answer is near.
+
+        A fit is where another loss is least. What a step along the slopes gains is replayed, and weighed anew.
+        """
+        settled: set[int] = set()
+        while True:
+            ranked = sorted([*self.weighed, *self._unnamed], key=lambda one: -one.evidence.log)
+            near = [one for one in ranked[:FLEXED] if _at_most(one) >= ranked[0].evidence.log]
+            leading = [one for one in near if id(one) not in settled]
+            if not leading or len({one.told for one in near}) == 1:
+                return
+            after = {id(one): found for one, found in zip(leading, self._each(self._settled, leading), strict=True)}
+            settled |= {id(one) for one in after.values()}
+            self._best = {effects: after.get(id(one), one) for effects, one in self._best.items()}
+            self._unnamed = [after.get(id(one), one) for one in self._unnamed]
+
     def of(self, effects: Sequence[str]) -> Hypothesis:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
@@ -223,6 +245,18 @@ class Hypotheses:
             slopes=shown.slopes,
             position=fit.position,
         )
+
+    def _settled(self, one: Hypothesis) -> Hypothesis:
+        for _ in range(ROUNDS):
+            if one.evidence.gained <= WORTH_A_STEP:
+                break
+            position = np.clip(one.fit.position + one.evidence.step, 0.0, 1.0)
+            moved = self._fitter.at(one.fit.candidates, one.fit.split(position))
+            nearer = one if moved is None else self._weighed(moved)
+            if nearer.evidence.log <= one.evidence.log + WORTH_A_STEP:
+                break
+            one = nearer
+        return one
 
     def _flexible(self, one: Hypothesis) -> float:
         return flexible_factor(one.evidence, one.form)
@@ -331,6 +365,11 @@ class Hypotheses:
         wrong = cells.allowed**2 + (LATE[2] * late) ** 2 + 2.0 * GOOD.form**2 * others
         own = unshifted(cells, signature, late)
         return bool(np.any(cells.group_squares(own) > cells.group_squares(np.sqrt(wrong))))
+
+
+def _at_most(one: Hypothesis) -> float:
+    """Logarithm of the evidence that a hypothesis may have once it is settled."""
+    return one.evidence.log + MORE_GAINED * one.evidence.gained
 
 
 def _is_near_best(left: Floats) -> Flags:

@@ -77,6 +77,8 @@ class Evidence:
         At the most probable parameters near the fit.
     step : (parameters,) array
         To these parameters from the fit, over their ranges.
+    gained : float
+        By what the step makes the recording likelier than it is at the fit, in the logarithm, if slopes hold.
     precision : (parameters, parameters) array
         Inverse of the covariance of the parameters, over their ranges.
     stirred : tuple of Stirred
@@ -90,6 +92,7 @@ class Evidence:
     by_block: Floats
     residuals: Floats
     step: Floats
+    gained: float
     precision: Floats
     stirred: tuple[Stirred, ...]
     needed: Floats
@@ -152,6 +155,7 @@ def evidence(
         by_block=by_block,
         residuals=residuals + slopes @ step,
         step=step,
+        gained=0.5 * (float(inner[0, 0]) - peak),
         precision=precision,
         stirred=tuple(one for _, _, one in likely),
         needed=np.array([_needed(inner, one, 1 + count + k, count, peak) for k, one in enumerate(members)]),

@@ -12,6 +12,9 @@ from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.trials import Trials
+from wetwell.sim2real.attribution.unnamed import unnamed
+from wetwell.sim2real.correction.selection import Proposal
+from wetwell.sim2real.correction.target import targets_of
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
@@ -21,6 +24,7 @@ from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.sim2real.trial.cases import trial_case
 from wetwell.sim2real.truth import truth_plant
 from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -131,3 +135,31 @@ def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start()
     assert fitter.cost(both) < 0.5 * fitter.cost(alone)
     (limit,) = (effect for effect in both.effects if effect.name == "flow_low_cutoff")
     assert limit.cutoff_m3h == pytest.approx(truth.deviations[1].parameters["cutoff_m3h"], rel=0.06)
+
+
+def test_near_sets_are_settled_where_the_recording_is_likeliest(alpha):
+    """The friction, which is the truth, is behind only because it was fitted too high."""
+    traces = recorded(alpha, [EFFECTS["friction_bias"](factor=1.2)])
+    friction, lift = (of_all(alpha, name) for name in ("friction_bias", "static_head_bias"))
+    fitter, _, hypotheses, _ = searched(traces, alpha, [friction, lift])
+    best = fitter.refine(fitter.at([lift], [lift.start_grids({"offset_m": 1.0})[0][0]]))
+    loss_exponent = friction.free[1].normalised(2.0)
+    off = fitter.at([friction], [np.array([friction.free[0].normalised(1.3), loss_exponent])])
+    hypotheses.add([best, off])
+    assert hypotheses.weighed[0].told == ("static_head_bias",)
+    hypotheses.settle()
+    settled = hypotheses.of(["friction_bias"])
+    assert settled.fit.effects[0].factor == pytest.approx(1.2, abs=0.01)
+    assert hypotheses.weighed[0] is settled
+
+
+def test_a_correction_that_says_what_a_set_says_is_that_set(alpha):
+    traces = recorded(alpha, [EFFECTS["friction_bias"](factor=1.2)])
+    friction, lift = (of_all(alpha, name) for name in ("friction_bias", "static_head_bias"))
+    loss = next(one for one in targets_of(plant_parameters(alpha)) if one.term == "head_loss")
+    correction, point = unnamed(Proposal(target=loss, atoms=(), sizes=np.array([0.2]), log=1.0))
+    for library, unknown in (([lift], 1), ([friction, lift], 0)):
+        fitter, _, hypotheses, trials = searched(traces, alpha, library)
+        hypotheses.add(trials.singles())
+        hypotheses.add_unnamed([fitter.at([correction], [point])])
+        assert len(hypotheses.unnamed_weights()) == unknown
