@@ -22,8 +22,6 @@ from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.effects.station.correction_part import MOST_SIZE
 from wetwell.simulator.effects.station.learnt_correction import LEAST_OFFSET
 
-LEARNT = "learnt_correction"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unnamed(Candidate):
@@ -56,7 +54,7 @@ def unnamed(proposal: Proposal) -> tuple[Unnamed, Floats]:
         for k, low in enumerate(lows)
     )
     point = np.array([one.normalised(float(size)) for one, size in zip(free, proposal.sizes, strict=True)])
-    return Unnamed(name=LEARNT, fixed=(), free=free, proposal=proposal), np.clip(point, 0.0, 1.0)
+    return Unnamed(name="learnt_correction", fixed=(), free=free, proposal=proposal), np.clip(point, 0.0, 1.0)
 
 
 def unnamed_beside(replay: Replay, residuals: StationResiduals, fitter: Fitter, best: Fit, each: Each) -> list[Fit]:
