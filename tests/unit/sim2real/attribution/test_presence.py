@@ -16,6 +16,7 @@ def needed(*squares):
         by_block=np.zeros(0),
         residuals=np.zeros(0),
         step=np.zeros(0),
+        gained=0.0,
         precision=np.zeros((0, 0)),
         stirred=(),
         needed=np.array(squares),
