@@ -10,14 +10,13 @@ from wetwell.sim2real.attribution.candidates import Candidate, FreeParameter
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.correction.dictionary import dictionary
-from wetwell.sim2real.correction.learning import covariates_of
+from wetwell.sim2real.correction.learning import covariates_of, of_each_target
 from wetwell.sim2real.correction.selection import Proposal
 from wetwell.sim2real.correction.workshop import Workshop, effect_of
 from wetwell.sim2real.recording.regimes import IDLE
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.simulator.corrections.parts import Term
 from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.effects.station.correction_part import MOST_SIZE
 from wetwell.simulator.effects.station.learnt_correction import LEAST_OFFSET
@@ -77,11 +76,8 @@ def unnamed_beside(replay: Replay, residuals: StationResiduals, fitter: Fitter, 
     bases = {one.names: one for one in (fitter.plain, *without) if one is not None}
 
     def proposed(base: Fit) -> list[tuple[Fit, Unnamed, Floats]]:
-        first: dict[Term, Proposal] = {}
-        for one in shop.proposals(addends, covariates, residuals_of(base.residuals)):
-            if one.log > 0.0:
-                first.setdefault(one.target.term, one)
-        return [(base, *unnamed(one)) for one in first.values()]
+        found = of_each_target(shop.proposals(addends, covariates, residuals_of(base.residuals)))
+        return [(base, *unnamed(first)) for first, *_ in found if first.log > 0.0]
 
     tried = chain.from_iterable(each(proposed, bases.values()))
     found = each(lambda one: fitter.at((*one[0].candidates, one[1]), (*one[0].points, one[2])), tried)

@@ -64,8 +64,8 @@ def _of_calendar(proposal: Proposal, atoms: Sequence[Atom]) -> Proposal | None:
     return None if found == list(proposal.atoms) else replace(proposal, atoms=tuple(found))
 
 
-def _first_of_each(found: Sequence[Proposal]) -> list[list[Proposal]]:
-    """Proposals of each target, in their order."""
+def of_each_target(found: Sequence[Proposal]) -> list[list[Proposal]]:
+    """Proposals of each target, of which there is one a term, in their order."""
     return [[one for one in found if one.target == target] for target in dict.fromkeys(one.target for one in found)]
 
 
@@ -112,7 +112,7 @@ def learn(replay: Replay, residuals: StationResiduals) -> Learnt | None:
     atoms, _ = dictionary(covariates, bins.regime != IDLE)
     shop = Workshop(replay, residuals)
     found: list[Tried] = []
-    for proposals_of_term in _first_of_each(shop.proposals(shop.addends(atoms), covariates, shop.plain)):
+    for proposals_of_term in of_each_target(shop.proposals(shop.addends(atoms), covariates, shop.plain)):
         tried = next((one for one in map(shop.tried, proposals_of_term) if one is not None), None)
         if tried is not None and (daily := _of_calendar(tried.proposal, atoms)) is not None:
             tried = max(tried, shop.tried(daily) or tried, key=lambda one: one.proposal.log)
