@@ -17,6 +17,8 @@ SURGES = (0.0, *TIMES[:3])
 """Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
 of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what
 the station file makes of it. Each as likely. [1]"""
+RAIN = TIMES[3]
+"""Variance that rain adds to the level, over what the drift of the inflow at rest makes of it. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,7 +168,8 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     $$\sigma^2 = \overline{f} / n, \qquad a^2 = m^2 + 1 - \overline{f}$$
 
     with the share f of a bin's variance that is noise, which the n bins of a cell average away, the material size m,
-    and the rest of that variance, which is what a right model may be off.
+    and the rest of that variance, which is what a right model may be off. Several pumps run because it rains: what an
+    inflow without a meter does to the level then, it may do alike in all storms.
 
     Parameters
     ----------
@@ -192,6 +195,9 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     counts = np.bincount(of_bin).astype(np.float64)
     noise = np.bincount(of_bin, bins.floor) / counts
     variance, allowed = noise / counts, allowed_size(np.bincount(of_bin, bins.material) / counts, noise)
+    if not has_inflow:
+        in_storms = ((signal == LEVEL) & (regime == MULTI_PUMP))[group]
+        allowed[in_storms] = np.hypot(allowed, np.sqrt(RAIN * variance))[in_storms]
     in_storm = np.bincount(bins.cycle, bins.regime == MULTI_PUMP) > 0.0
     block_of = (signal * len(REGIMES) + regime)[group]
     blocks = []

@@ -9,10 +9,10 @@ from scipy.linalg import solve
 from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.likelihood.cells import Block, Cells
+from wetwell.sim2real.likelihood.cells import RAIN, Block, Cells
 from wetwell.sim2real.likelihood.covariance import SWINGS, Allowance, Form, no_form, projected
 from wetwell.sim2real.likelihood.jumps import jumping
-from wetwell.sim2real.likelihood.rain import RAIN, log_priors, rainy_cells
+from wetwell.sim2real.likelihood.rain import log_priors, rainy_cells
 from wetwell.sim2real.likelihood.ways import Seen, Ways, right_ways
 
 TRUSTED = 0.01

@@ -3,12 +3,9 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
-from wetwell.sim2real.likelihood.cells import TIMES, Block
+from wetwell.sim2real.likelihood.cells import RAIN, Block
 from wetwell.sim2real.likelihood.covariance import expected_squares
 from wetwell.sim2real.likelihood.ways import POORLY
-
-RAIN = TIMES[3]
-"""Variance that rain adds to the level, over what the drift of the inflow at rest makes of it. [1]"""
 
 
 def rainy_cells(block: Block, residuals: Floats) -> tuple[Flags, float]:

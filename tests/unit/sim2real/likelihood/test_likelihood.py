@@ -8,7 +8,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from wetwell.sim2real.likelihood.cells import cells_of
+from wetwell.sim2real.likelihood.cells import RAIN, cells_of
 from wetwell.sim2real.likelihood.covariance import (
     GOOD,
     HARDLY_DIFFERENT,
@@ -24,9 +24,9 @@ from wetwell.sim2real.likelihood.covariance import (
 )
 from wetwell.sim2real.likelihood.evidence import TRUSTED, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
-from wetwell.sim2real.likelihood.rain import RAIN, rainy_cells
+from wetwell.sim2real.likelihood.rain import rainy_cells
 from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS, Way
-from wetwell.sim2real.recording.regimes import IDLE, STEADY
+from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, STOP_LEVEL, Bins
 
 CYCLES = 12
@@ -38,15 +38,15 @@ def cells():
     return made(has_inflow=True)
 
 
-def made(*, has_inflow, is_each_second=True, seconds=(0, 70, 80)):
-    """A flow that runs and a level at rest: two spans of time in a cycle, the first of one bin, the next of two."""
+def made(*, has_inflow, is_each_second=True, seconds=(0, 70, 80), of_level=IDLE):
+    """A flow that runs and a level at rest, or in another regime: a span of one bin in a cycle, and one of two."""
     half = CYCLES * len(seconds)
     signal = np.repeat([FLOW, LEVEL], half)
     cycle = np.tile(np.repeat(np.arange(CYCLES), len(seconds)), 2)
     ones = np.ones(2 * half)
     bins = Bins(
         signal=signal,
-        regime=np.where(signal == FLOW, STEADY, IDLE),
+        regime=np.where(signal == FLOW, STEADY, of_level),
         cycle=cycle,
         pump=np.where(signal == FLOW, 0, -1),
         second=1000 * cycle + np.tile(seconds, 2 * CYCLES),
@@ -313,6 +313,15 @@ def test_only_what_is_far_over_the_allowed_size_asks_for_something_unknown(cells
 def of_many_blocks(signals=(FLOW, HEAD, POWER)):
     """Flow, head and power in five regimes: a bin in each of twelve cycles."""
     signal, regime, cycle = (one.ravel() for one in np.meshgrid(signals, range(5), range(CYCLES)))
+@pytest.mark.parametrize(("regime", "is_unknown"), [(IDLE, True), (MULTI_PUMP, False)])
+def test_storms_may_all_do_alike_to_a_level_whose_inflow_nobody_measures(regime, is_unknown):
+    cells = made(has_inflow=False, of_level=regime)
+    (level,) = (block for block in cells.blocks if block.signal == LEVEL)
+    residuals = np.sqrt(cells.variance) * np.random.default_rng(31).normal(size=cells.group.size)
+    residuals[level.rows] += 6.0 * np.sqrt(level.variance)
+    assert (unknown_in(cells, residuals) > 3.0) == is_unknown
+
+
     ones = np.ones(signal.size)
     bins = Bins(
         signal=signal,
