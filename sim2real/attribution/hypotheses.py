@@ -1,6 +1,6 @@
 """Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +35,8 @@ FLEXED = 4
 
 MORE_GAINED = 4.0
 """Times what a first step promises that settling has gained at the most, on looked-at recordings."""
+STEPS = (1.0, 0.5, 0.25)
+"""Parts of a step that are tried: slopes do not hold for all of it."""
 WORTH_A_STEP = 1.0
 """By what a step has to make the recording likelier, in the logarithm: less tells no two sets apart."""
 
@@ -240,7 +242,9 @@ class Hypotheses:
     def _beside(self, fit: Fit) -> Beside:
         shown = self._shown(fit)
         return Beside(
-            weights=cell_weights(evidence(self._cells, shown.residuals, shown.slopes, shown.form), shown.form),
+            weights=cell_weights(
+                evidence(self._cells, shown.residuals, shown.slopes, shown.form, fit.position), shown.form
+            ),
             residuals=shown.residuals,
             slopes=shown.slopes,
             position=fit.position,
@@ -250,10 +254,10 @@ class Hypotheses:
         for _ in range(ROUNDS):
             if one.evidence.gained <= WORTH_A_STEP:
                 break
-            position = np.clip(one.fit.position + one.evidence.step, 0.0, 1.0)
-            moved = self._fitter.at(one.fit.candidates, one.fit.split(position))
-            nearer = one if moved is None else self._weighed(moved)
-            if nearer.evidence.log <= one.evidence.log + WORTH_A_STEP:
+            nearer = next(
+                (its for its in self._steps(one) if its.evidence.log > one.evidence.log + WORTH_A_STEP), None
+            )
+            if nearer is None:
                 break
             one = nearer
         return one
@@ -263,6 +267,14 @@ class Hypotheses:
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))
+
+    def _steps(self, one: Hypothesis) -> Iterator[Hypothesis]:
+        """A hypothesis a step further, then half of it, and so on."""
+        for part in STEPS:
+            position = one.fit.position + part * one.evidence.step
+            moved = self._fitter.at(one.fit.candidates, one.fit.split(position))
+            if moved is not None:
+                yield self._weighed(moved)
 
     def _shown(self, fit: Fit) -> _Shown:
         cells, residuals = self._cells, self._means(fit)
@@ -289,7 +301,7 @@ class Hypotheses:
             Member(parameters=np.flatnonzero(of_member == k), neutral=neutral, absent=signature)
             for k, (neutral, signature) in enumerate(zip(strengths_of(fit), shown.signatures, strict=True))
         ]
-        found = evidence(self._cells, shown.residuals, shown.slopes, shown.form, members)
+        found = evidence(self._cells, shown.residuals, shown.slopes, shown.form, fit.position, members)
         told = [
             member
             for member, (signature, late) in enumerate(zip(shown.signatures, shown.late, strict=True))

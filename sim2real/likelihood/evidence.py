@@ -103,6 +103,7 @@ def evidence(
     residuals: Floats,
     slopes: Floats,
     form: Form,
+    position: Floats,
     members: Sequence[Member] = (),
 ) -> Evidence:
     r"""Laplace's approximation around a fit.
@@ -122,6 +123,8 @@ def evidence(
     slopes : (cells, parameters) array
         Change of the residuals over the range of each parameter, at the fit.
     form : Form
+    position : (parameters,) array
+        Of the fit, 0 to 1 over these ranges: none is left.
     members : sequence of Member
         The effects.
 
@@ -131,7 +134,7 @@ def evidence(
     """
     count = slopes.shape[1]
     columns, step = np.column_stack([residuals, slopes, *(one.absent for one in members)]), np.zeros(count)
-    fitted = slice(0, 1 + count)
+    fitted, room = slice(0, 1 + count), np.clip([0.0 - position, 1.0 - position], -TRUSTED, TRUSTED)
     for _ in range(WEIGHINGS if count else 1):
         left = residuals + slopes @ step
         likely = [
@@ -139,12 +142,12 @@ def evidence(
         ]
         inner = np.sum([products for _, products, _ in likely], axis=0)
         precision, slope = inner[1 : 1 + count, 1 : 1 + count], inner[1 : 1 + count, 0]
-        step = _step(precision, slope)
+        step = _step(precision, slope, room)
     along = np.r_[1.0, step]
     by_block = np.array([log - 0.5 * float(along @ products[fitted, fitted] @ along) for log, products, _ in likely])
     peak = float(along @ inner[fitted, fitted] @ along)
     logs = [
-        _of_part(inner[fitted, fitted], fixed) + 0.5 * peak
+        _of_part(inner[fitted, fitted], fixed, room) + 0.5 * peak
         for fixed in (
             dict(chain.from_iterable(one.items() for one in parts))
             for parts in product(*(_partly(one.neutral) for one in members))
@@ -158,16 +161,23 @@ def evidence(
         gained=0.5 * (float(inner[0, 0]) - peak),
         precision=precision,
         stirred=tuple(one for _, _, one in likely),
-        needed=np.array([_needed(inner, one, 1 + count + k, count, peak) for k, one in enumerate(members)]),
+        needed=np.array([_needed(inner, one, 1 + count + k, room, peak) for k, one in enumerate(members)]),
     )
 
 
-def _step(precision: Floats, slope: Floats) -> Floats:
-    """To the most probable parameters, within `TRUSTED` of the fit."""
-    if slope.size == 0:
-        return np.zeros(0)
-    step = -solve(precision + np.eye(slope.size) * TRUSTED**-2, slope, assume_a="pos")
-    return np.asarray(step * min(1.0, TRUSTED / max(float(np.abs(step).max()), TRUSTED)), dtype=np.float64)
+def _step(precision: Floats, slope: Floats, room: Floats) -> Floats:
+    """To the most probable parameters in the (2, parameters) room around the fit."""
+    step, is_free = np.zeros(slope.size), np.ones(slope.size, dtype=np.bool_)
+    inner = precision + np.eye(slope.size) * TRUSTED**-2
+    while is_free.any():
+        pull = slope[is_free] + inner[np.ix_(is_free, ~is_free)] @ step[~is_free]
+        step[is_free] = -solve(inner[np.ix_(is_free, is_free)], pull, assume_a="pos")
+        within = np.clip(step, *room)
+        if np.array_equal(within, step):
+            break
+        is_free &= within == step
+        step = within
+    return step
 
 
 def _partly(neutral: Mapping[int, float]) -> list[dict[int, float]]:
@@ -176,7 +186,7 @@ def _partly(neutral: Mapping[int, float]) -> list[dict[int, float]]:
     return [{}, *alone] if len(neutral) > 1 else [{}]
 
 
-def _of_part(inner: Floats, fixed: Mapping[int, float]) -> float:
+def _of_part(inner: Floats, fixed: Mapping[int, float], room: Floats) -> float:
     """Logarithm of the integral over the parameters that are not fixed, each at its way from the fit."""
     first = np.zeros(inner.shape[0])
     first[0] = 1.0
@@ -184,21 +194,22 @@ def _of_part(inner: Floats, fixed: Mapping[int, float]) -> float:
         first[1 + k] = way
     free = [1 + k for k in range(inner.shape[0] - 1) if k not in fixed]
     volume = np.linalg.slogdet(np.eye(len(free)) + inner[np.ix_(free, free)] / (2.0 * np.pi))[1]
-    return -0.5 * (_least(inner, first, free) + float(volume))
+    return -0.5 * (_least(inner, first, free, room) + float(volume))
 
 
-def _needed(inner: Floats, member: Member, column: int, count: int, peak: float) -> float:
-    """Of an effect whose absence is a column behind those of the `count` parameters."""
+def _needed(inner: Floats, member: Member, column: int, room: Floats, peak: float) -> float:
+    """Of an effect whose absence is a column behind those of the parameters."""
     first = np.zeros(inner.shape[0])
     first[0] = first[column] = 1.0
-    return _least(inner, first, [1 + k for k in range(count) if k not in member.parameters]) - peak
+    others = [1 + k for k in range(room.shape[1]) if k not in member.parameters]
+    return _least(inner, first, others, room) - peak
 
 
-def _least(inner: Floats, first: Floats, free: Sequence[int]) -> float:
+def _least(inner: Floats, first: Floats, free: Sequence[int], room: Floats) -> float:
     """Least weighed sum of squares of columns of which some are free, near the fit."""
     slope = inner[free] @ first
     precision = inner[np.ix_(free, free)]
-    step = _step(precision, slope)
+    step = _step(precision, slope, room[:, np.asarray(free, dtype=np.int64) - 1])
     return float(first @ inner @ first + 2.0 * slope @ step + step @ precision @ step)
 
 
@@ -226,7 +237,7 @@ def cell_weights(found: Evidence, form: Form) -> Weights:
 
 def evidence_of_none(cells: Cells, residuals: Floats) -> Evidence:
     """Evidence without any effect."""
-    return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells))
+    return evidence(cells, residuals, np.zeros((residuals.size, 0)), no_form(cells), np.zeros(0))
 
 
 def weighed(

@@ -30,6 +30,8 @@ from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, STOP_LEVEL, Bins
 
 CYCLES = 12
+MIDDLE = np.array([0.5, 0.5])
+"""Of the ranges of two parameters."""
 
 
 @pytest.fixture
@@ -207,7 +209,7 @@ def test_cells_whose_form_may_be_off_by_much_say_little_of_what_all_have_alike(c
     residuals = (0.1 * rng.normal(size=signature.size) + np.where(is_explained, 0.0, 1.5)) * cells.allowed
     residuals += 0.175 * signature * rng.normal(size=signature.size)
     form = replace(no_form(cells), signature=signature)
-    found = evidence(cells, residuals, np.zeros((signature.size, 0)), form)
+    found = evidence(cells, residuals, np.zeros((signature.size, 0)), form, np.zeros(0))
     assert found.log == pytest.approx(log_densities(cells, residuals, form).sum(), abs=1.0)
 
 
@@ -232,14 +234,14 @@ def test_what_all_groups_share_in_a_cycle_is_no_error_of_form(seed):
         log -= 0.5 * np.linalg.slogdet(whole)[1]
         log += log_prior(SPAN_WAYS[:1] * spans, SPAN_WAYS) + log_prior(OWN_WAYS[:1] * groups, OWN_WAYS)
         log += log_prior((shifted,) * groups, CHANGING_WAYS)
-    assert evidence(cells, residuals, np.zeros((of_cell.size, 0)), form).log > log
+    assert evidence(cells, residuals, np.zeros((of_cell.size, 0)), form, np.zeros(0)).log > log
 
 
 def test_further_effects_are_weighed_as_the_evidence_weighs_its_own(cells):
     rng = np.random.default_rng(4)
     residuals, slopes = rng.normal(size=cells.group.size), rng.normal(size=(cells.group.size, 2))
     form = some_form(cells, rng)
-    found = evidence(cells, residuals, 1e-3 * slopes, form)
+    found = evidence(cells, residuals, 1e-3 * slopes, form, MIDDLE)
     np.testing.assert_allclose(cell_weights(found, form).products(1e-3 * slopes), found.precision)
 
 
@@ -252,7 +254,7 @@ def test_a_parameter_is_integrated_over_its_range(cells):
     logs = log_densities(cells, residuals + grid[:, None] * slope).sum(axis=0)
     best = int(np.argmax(logs))
     expected = float(np.log(np.sum(np.exp(logs - logs[best])) * (grid[1] - grid[0])) + logs[best])
-    found = evidence(cells, residuals + grid[best] * slope, slope[:, None], no_form(cells))
+    found = evidence(cells, residuals + grid[best] * slope, slope[:, None], no_form(cells), MIDDLE[:1])
     assert found.log == pytest.approx(expected, abs=0.25)
     inner = np.exp(logs - logs[best])
     variance = float(np.sum(inner * (grid - grid[best]) ** 2) / inner.sum())
@@ -265,9 +267,21 @@ def test_no_fit_is_weighed_further_away_than_its_slopes_hold(cells, away):
     rng = np.random.default_rng(21)
     slopes = 1e4 * rng.normal(size=(cells.group.size, 2)) * cells.allowed[:, None]
     residuals = np.sqrt(cells.variance) * rng.normal(size=cells.group.size) - slopes @ (away, 0.1 * away)
-    found = evidence(cells, residuals, slopes, no_form(cells))
+    found = evidence(cells, residuals, slopes, no_form(cells), MIDDLE)
     assert np.abs(found.step).max() == pytest.approx(min(away, TRUSTED), rel=0.05)
     np.testing.assert_allclose(found.residuals, residuals + slopes @ found.step)
+
+
+def test_no_fit_is_weighed_beyond_its_ranges_and_the_others_make_up_for_it(cells):
+    """An exponent at the end of its range held all others where the fit had left them."""
+    rng = np.random.default_rng(22)
+    slopes = 400.0 * rng.normal(size=(cells.group.size, 2)) * cells.allowed[:, None]
+    slopes[:, 1] += 0.5 * slopes[:, 0]
+    residuals = np.sqrt(cells.variance) * rng.normal(size=cells.group.size) - slopes @ (0.008, 0.004)
+    found = evidence(cells, residuals, slopes, no_form(cells), np.array([1.0, 0.3]))
+    least = np.linalg.lstsq(slopes[:, 1:] / cells.allowed[:, None], -residuals / cells.allowed, rcond=None)[0]
+    assert found.step == pytest.approx([0.0, float(least[0])], rel=0.1, abs=1e-9)
+    assert 0.004 < found.step[1] < TRUSTED
 
 
 def test_what_needs_an_effect_that_goes_straight_is_its_distance_from_neutral(cells):
@@ -279,12 +293,12 @@ def test_what_needs_an_effect_that_goes_straight_is_its_distance_from_neutral(ce
     members = [
         Member(parameters=np.array([k]), neutral={k: way}, absent=way * slopes[:, k] * (1 + k)) for k in range(2)
     ]
-    found = evidence(cells, residuals, slopes, no_form(cells), members)
+    found = evidence(cells, residuals, slopes, no_form(cells), MIDDLE, members)
     for k in range(2):
         away = way * (1 + k) - found.step[k]
         assert found.needed[k] == pytest.approx(away**2 / np.linalg.inv(found.precision)[k, k], rel=0.05)
     limit = Member(parameters=np.array([0]), neutral={0: way}, absent=members[0].absent)
-    blunt = evidence(cells, residuals, np.zeros((cells.group.size, 1)), no_form(cells), [limit])
+    blunt = evidence(cells, residuals, np.zeros((cells.group.size, 1)), no_form(cells), MIDDLE[:1], [limit])
     assert blunt.needed[0] > 10.0
 
 
@@ -293,8 +307,19 @@ def test_an_offset_under_the_allowed_size_gains_little_and_one_over_it_does(cell
     noise = np.sqrt(cells.variance) * np.random.default_rng(8).normal(size=cells.group.size)
     for size, least, most in ((0.3, -np.inf, 1.0), (8.0, 10.0, np.inf)):
         offset = size * cells.allowed
-        with_effect = evidence(cells, noise, offset[:, None], replace(no_form(cells), signature=offset)).log
+        with_effect = evidence(
+            cells, noise, offset[:, None], replace(no_form(cells), signature=offset), MIDDLE[:1]
+        ).log
         assert least < with_effect - evidence_of_none(cells, noise + offset).log < most, size
+
+
+@pytest.mark.parametrize(("regime", "is_unknown"), [(IDLE, True), (MULTI_PUMP, False)])
+def test_storms_may_all_do_alike_to_a_level_whose_inflow_nobody_measures(regime, is_unknown):
+    cells = made(has_inflow=False, of_level=regime)
+    (level,) = (block for block in cells.blocks if block.signal == LEVEL)
+    residuals = np.sqrt(cells.variance) * np.random.default_rng(31).normal(size=cells.group.size)
+    residuals[level.rows] += 6.0 * np.sqrt(level.variance)
+    assert (unknown_in(cells, residuals) > 3.0) == is_unknown
 
 
 def unknown_in(cells, residuals):
@@ -313,15 +338,6 @@ def test_only_what_is_far_over_the_allowed_size_asks_for_something_unknown(cells
 def of_many_blocks(signals=(FLOW, HEAD, POWER)):
     """Flow, head and power in five regimes: a bin in each of twelve cycles."""
     signal, regime, cycle = (one.ravel() for one in np.meshgrid(signals, range(5), range(CYCLES)))
-@pytest.mark.parametrize(("regime", "is_unknown"), [(IDLE, True), (MULTI_PUMP, False)])
-def test_storms_may_all_do_alike_to_a_level_whose_inflow_nobody_measures(regime, is_unknown):
-    cells = made(has_inflow=False, of_level=regime)
-    (level,) = (block for block in cells.blocks if block.signal == LEVEL)
-    residuals = np.sqrt(cells.variance) * np.random.default_rng(31).normal(size=cells.group.size)
-    residuals[level.rows] += 6.0 * np.sqrt(level.variance)
-    assert (unknown_in(cells, residuals) > 3.0) == is_unknown
-
-
     ones = np.ones(signal.size)
     bins = Bins(
         signal=signal,
