@@ -13,7 +13,7 @@ from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import are_sized, informed, intervals_of, sharpened
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
-from wetwell.sim2real.attribution.search import MOST_CHANGED, changed, in_order, search
+from wetwell.sim2real.attribution.search import MOST_CHANGED, Search, changed, in_order
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.attribution.unnamed import unnamed_beside
@@ -21,6 +21,7 @@ from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import (
     SetProbability,
+    UnnamedWeight,
     best_set,
     equivalents,
     posterior_of,
@@ -118,16 +119,23 @@ def attribute(
     hypotheses = Hypotheses(fitter, cells, each)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
-    search(fitter, trials, hypotheses)
-    hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
-    hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, each))
-    hypotheses.settle()
+    search = Search(fitter, trials, hypotheses)
+    search.around_the_best()
     log_share = partial(priors.log_share, tested=[fit.names[0] for fit in singles])
 
-    def weighed() -> tuple[SetProbability, ...]:
-        return posterior_of(hypotheses.weights(), len(singles), log_share, hypotheses.unnamed_weights())
+    def beside_corrections() -> list[UnnamedWeight]:
+        hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
+        hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, each))
+        hypotheses.settle()
+        return hypotheses.unnamed_weights()
 
-    while verdict_of(posterior := weighed()) == "effect":
+    def weighed(unnamed: Sequence[UnnamedWeight]) -> tuple[SetProbability, ...]:
+        return posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
+
+    unnamed = beside_corrections()
+    if verdict_of(weighed(unnamed)) == "unknown" and search.beside_others():
+        unnamed = beside_corrections()
+    while verdict_of(posterior := weighed(unnamed)) == "effect":
         names = best_set(posterior)
         likely = hypotheses.of(names)
         its_ends = sharpened(likely.fit, intervals_of(fitter, likely.fit, residuals.bins), likely.evidence)

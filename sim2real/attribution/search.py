@@ -13,15 +13,15 @@ from wetwell.simulator.effects import EFFECTS
 MOST_EFFECTS = 4
 """Effects of a set: three, and the inertia that the water of each main has."""
 
+MOST_EXTENDED = 4
+"""Sets beside which one more effect is tried where something unknown is the most probable, the best ones first."""
+
 MOST_CHANGED = 4
 """Single effects that are tried so, those that explain most first."""
 
 
-def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
-    """Weigh sets of effects until no neighbour of the most probable one is left to try.
-
-    Greedy choices are taken back: each effect of a set makes room for every other, the rest kept. A set may have a
-    companion that is too small to be told.
+class Search:
+    """Weighs sets of effects until no neighbour of the most probable one is left to try.
 
     Parameters
     ----------
@@ -30,17 +30,39 @@ def search(fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
     hypotheses : Hypotheses
         Holds the single effects; those with several are added.
     """
-    tried: set[frozenset[str]] = {frozenset()}
-    while True:
-        best = hypotheses.weighed[0].fit
-        bases = [best] if len(best.names) < MOST_EFFECTS else []
-        if len(best.names) > 1:
-            bases += [base for k in range(len(best.names)) if (base := fitter.without(best, k)) is not None]
-        bases = [base for base in bases if frozenset(base.names) not in tried]
-        if not bases:
-            return
-        tried |= {frozenset(base.names) for base in bases}
-        hypotheses.add(trials.with_one_more(bases, hypotheses.beside(bases)))
+
+    def __init__(self, fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
+        self._fitter, self._trials, self._hypotheses = fitter, trials, hypotheses
+        self._tried: set[frozenset[str]] = {frozenset()}
+
+    def around_the_best(self) -> None:
+        """Try one more effect beside the most probable set, and beside it without each of its effects.
+
+        Greedy choices are taken back: each effect of a set makes room for every other, the rest kept. A set may have
+        a companion that is too small to be told.
+        """
+        while True:
+            best = self._hypotheses.weighed[0].fit
+            fewer = [self._fitter.without(best, member) for member in range(len(best.names))]
+            if not self._extended([best, *(base for base in fewer if base is not None and base.names)]):
+                return
+
+    def beside_others(self) -> bool:
+        """Try one more effect beside the sets next in line, and say whether a more probable one was found."""
+        best = self._hypotheses.weighed[0]
+        self._extended([one.fit for one in self._hypotheses.possible[:MOST_EXTENDED]])
+        if self._hypotheses.weighed[0] is best:
+            return False
+        self.around_the_best()
+        return True
+
+    def _extended(self, fits: Sequence[Fit]) -> bool:
+        """Weigh some fits with one more effect, and say whether there was one of which that was not known."""
+        bases = [fit for fit in fits if len(fit.names) < MOST_EFFECTS and frozenset(fit.names) not in self._tried]
+        self._tried |= {frozenset(base.names) for base in bases}
+        if bases:
+            self._hypotheses.add(self._trials.with_one_more(bases, self._hypotheses.beside(bases)))
+        return bool(bases)
 
 
 def in_order(fitter: Fitter, fit: Fit, ends: Floats) -> tuple[Fit, Floats]:
