@@ -1,0 +1,75 @@
+"""Which sets are tried, and in which order, with sets whose probability is given."""
+
+from types import SimpleNamespace
+
+from wetwell.sim2real.attribution.search import MOST_EXTENDED, Search
+
+
+class Given:
+    """Fits are frozen sets of one letter each; how probable each is stands in a table."""
+
+    def __init__(self, logs):
+        self._logs, self._known, self.tried = logs, {(name,) for (name, *more) in logs if not more}, []
+
+    def without(self, fit, member):
+        return made(name for k, name in enumerate(fit.names) if k != member)
+
+    def beside(self, bases):
+        return [None for _ in bases]
+
+    def with_one_more(self, bases, _):
+        self.tried += [base.names for base in bases]
+        return [made((*base.names, name)) for base in bases for name in "abcdefgh" if name not in base.names]
+
+    def add(self, fits):
+        self._known |= {fit.names for fit in fits if fit.names in self._logs}
+
+    @property
+    def weighed(self):
+        ranked = sorted(self._known, key=lambda names: -self._logs[names])
+        return [self._hypothesis(names) for names in ranked]
+
+    possible = weighed
+
+    def _hypothesis(self, names):
+        self._made = getattr(self, "_made", {})
+        return self._made.setdefault(names, SimpleNamespace(fit=made(names)))
+
+
+def made(names):
+    return SimpleNamespace(names=tuple(sorted(names)))
+
+
+def searched(logs):
+    given = Given({tuple(sorted(names)): log for names, log in logs.items()})
+    return given, Search(given, given, given)
+
+
+def test_greedy_choices_are_taken_back():
+    given, search = searched({"a": 5.0, "b": 1.0, "c": 0.0, "ab": 6.0, "bc": 9.0})
+    search.around_the_best()
+    assert given.weighed[0].fit.names == ("b", "c")
+
+
+def test_one_more_effect_is_tried_beside_the_sets_that_are_next_in_line():
+    """The friction and the rags are each far behind the sensor that is off, and together before it."""
+    given, search = searched({"a": 5.0, "b": 3.0, "c": 2.0, "d": 1.0, "e": 0.0, "bf": 9.0, "bfg": 12.0})
+    search.around_the_best()
+    assert given.weighed[0].fit.names == ("a",)
+    assert search.beside_others()
+    assert given.weighed[0].fit.names == ("b", "f", "g"), "and on from there"
+
+
+def test_nothing_is_tried_twice_and_a_search_that_finds_nothing_says_so():
+    given, search = searched(dict.fromkeys("abcdef", 1.0) | {"a": 5.0})
+    search.around_the_best()
+    assert not search.beside_others()
+    assert not search.beside_others()
+    assert len(given.tried) == len(set(given.tried)) == MOST_EXTENDED
+
+
+def test_no_set_grows_beyond_three_effects_and_an_inertia():
+    logs = {"abcde"[: k + 1]: float(k) for k in range(5)}
+    given, search = searched(dict.fromkeys("abcde", -9.0) | logs)
+    search.around_the_best()
+    assert max(len(one.fit.names) for one in given.weighed) == 4
