@@ -21,11 +21,13 @@ from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import (
     SetProbability,
+    UnknownShare,
     UnnamedWeight,
     best_set,
     equivalents,
     posterior_of,
     shared,
+    unknown_shares,
     verdict_of,
 )
 from wetwell.sim2real.likelihood.priors import EVEN, Priors
@@ -59,6 +61,8 @@ class Attribution:
         Bins that are fitted, and those on which gaps are measured.
     posterior : tuple of SetProbability
         Best first.
+    unknown : tuple of UnknownShare
+        Ways in which something unknown may act, if it does.
     possible : tuple of PossibleSet
         Sets that may be the truth, as they were fitted.
     not_tested : tuple of NotTested
@@ -75,6 +79,7 @@ class Attribution:
     training: Flags
     validation: Flags
     posterior: tuple[SetProbability, ...]
+    unknown: tuple[UnknownShare, ...]
     possible: tuple[PossibleSet, ...]
     not_tested: tuple[NotTested, ...] = ()
 
@@ -162,6 +167,7 @@ def attribute(
         training=training,
         validation=validation,
         posterior=posterior,
+        unknown=unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed),
         possible=possible_sets(hypotheses, posterior),
         not_tested=not_tested,
     )

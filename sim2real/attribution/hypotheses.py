@@ -227,12 +227,18 @@ class Hypotheses:
         ]
 
     def unnamed_weights(self) -> list[UnnamedWeight]:
-        """Corrections that may be what is unknown, but for those that no material difference parts from a set."""
+        """Corrections that may be what is unknown, the likeliest."""
+        likely = sorted(self._unnamed, key=lambda one: -one.evidence.log)[:FLEXED]
         return [
-            UnnamedWeight(acting=tuple(sorted(fit.names[:-1])), log=one.evidence.log + fit.candidates[-1].log_prior)
-            for one in self._unnamed
-            for fit in (one.fit,)
-            if not self._is_known(one.evidence.residuals)
+            UnnamedWeight(
+                acting=tuple(sorted(fit.names[:-1])),
+                component=correction.component,
+                log=one.evidence.log + correction.log_prior,
+                log_flexible=factor,
+                is_apart=not self._is_known(one.evidence.residuals),
+            )
+            for one, factor in zip(likely, self._each(self._flexible, likely), strict=True)
+            for fit, correction in ((one.fit, one.fit.candidates[-1]),)
         ]
 
     def beside(self, fits: Sequence[Fit]) -> list[Beside]:
@@ -262,12 +268,6 @@ class Hypotheses:
             one = nearer
         return one
 
-    def _flexible(self, one: Hypothesis) -> float:
-        return flexible_factor(one.evidence, one.form)
-
-    def _means(self, fit: Fit) -> Floats:
-        return self._cells.means(residuals_of(fit.residuals))
-
     def _steps(self, one: Hypothesis) -> Iterator[Hypothesis]:
         """A hypothesis a step further, then half of it, and so on."""
         for part in STEPS:
@@ -275,6 +275,12 @@ class Hypotheses:
             moved = self._fitter.at(one.fit.candidates, one.fit.split(position))
             if moved is not None:
                 yield self._weighed(moved)
+
+    def _flexible(self, one: Hypothesis) -> float:
+        return flexible_factor(one.evidence, one.form)
+
+    def _means(self, fit: Fit) -> Floats:
+        return self._cells.means(residuals_of(fit.residuals))
 
     def _shown(self, fit: Fit) -> _Shown:
         cells, residuals = self._cells, self._means(fit)

@@ -17,9 +17,9 @@ from wetwell.sim2real.recording.regimes import IDLE
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.simulator.effects.effect import Effect
+from wetwell.simulator.effects.effect import Component, Effect
 from wetwell.simulator.effects.station.correction_part import MOST_SIZE
-from wetwell.simulator.effects.station.learnt_correction import LEAST_OFFSET
+from wetwell.simulator.effects.station.learnt_correction import COMPONENT_OF, LEAST_OFFSET
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +33,11 @@ class Unnamed(Candidate):
     """
 
     proposal: Proposal
+
+    @property
+    def component(self) -> Component:
+        """Component that its term belongs to."""
+        return COMPONENT_OF[self.proposal.target.term]
 
     @property
     def log_prior(self) -> float:

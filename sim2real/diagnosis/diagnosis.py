@@ -13,6 +13,7 @@ from wetwell.sim2real.attribution.attribution import Attribution, attribute
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.correction.learning import columns_of_no_use, learn
+from wetwell.sim2real.diagnosis.components import component_probability
 from wetwell.sim2real.diagnosis.correction import Correction, weighed
 from wetwell.sim2real.diagnosis.findings import found_effects, noise_check, ranking, where_it_lies
 from wetwell.sim2real.diagnosis.limitations import limitations
@@ -45,7 +46,7 @@ from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
 from wetwell.sim2real.residuals.conditions import conditions_of as conditions_of_bins
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.simulator.effects import EFFECTS, effects_of
+from wetwell.simulator.effects import effects_of
 from wetwell.simulator.effects.effect import Component
 
 
@@ -69,7 +70,7 @@ class Diagnosis:
     correction: Correction | None
     remarks: tuple[str, ...]
     posterior: tuple[SetProbability, ...]
-    component_probability: dict[str, float]
+    component_probability: dict[Component, float]
     conditions: Conditions
     seed: int
     own_station: Station
@@ -195,8 +196,9 @@ def diagnose(
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
     excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
-    unknown = localise(excess, found.plain, bins, plain.plant)
-    blamed = unknown if found.accepted is None else found.accepted.candidates[0].component
+    pattern = localise(excess, found.plain, bins, plain.plant)
+    by_component = component_probability(found.posterior, found.unknown, pattern)
+    blamed = next(iter(by_component)) if found.accepted is None else found.accepted.candidates[0].component
     effects = () if found.accepted is None else found.accepted.effects
     tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
     correction: Correction | None = None
@@ -219,7 +221,7 @@ def diagnose(
         remarks=tuple(remarks),
         gap=gap_of(found.plain, found.after, bins, found.validation, rng),
         posterior=found.posterior,
-        component_probability=_by_component(found.posterior, unknown),
+        component_probability=by_component,
         conditions=conditions_of(traces, station),
         seed=seed,
         own_station=station,
@@ -258,13 +260,3 @@ def _recordings(traces: Traces) -> tuple[DiagnosedRecording, ...]:
             )
         )
     return tuple(found)
-
-
-def _by_component(posterior: tuple[SetProbability, ...], unknown: Component) -> dict[str, float]:
-    """Probability of each component in which something may be, the largest first."""
-    found: dict[str, float] = {}
-    for one in posterior:
-        components = {unknown} if one.verdict == "unknown" else {EFFECTS[name].component for name in one.effects}
-        for component in components:
-            found[component] = found.get(component, 0.0) + one.probability
-    return dict(sorted(found.items(), key=lambda pair: -pair[1]))

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import expit, logsumexp, softmax
+
+from wetwell.simulator.effects.effect import Component
 
 Verdict = Literal["effect", "none", "unknown"]
 
@@ -64,12 +66,41 @@ class UnnamedWeight:
     ----------
     acting : tuple of str
         Effects beside which it acts.
+    component : str
+        In which it acts.
     log : float
         Logarithm of its evidence, and of its probability among all that may act so.
+    log_flexible : float
+        Of how much more probable the recording is if it has another form than the correction.
+    is_apart : bool
+        Whether a material difference parts it from each set; else it is that set under another name, and says no
+        more than where something unknown would act.
     """
 
     acting: tuple[str, ...]
+    component: Component
     log: float
+    log_flexible: float
+    is_apart: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnknownShare:
+    """One way in which something unknown may act.
+
+    Attributes
+    ----------
+    acting : tuple of str
+        Effects beside which it acts.
+    component : str or None
+        In which it acts; None where it is a discrepancy of the readings.
+    share : float
+        Of the probability of something unknown.
+    """
+
+    acting: tuple[str, ...]
+    component: Component | None
+    share: float
 
 
 def posterior_of(
@@ -80,7 +111,8 @@ def posterior_of(
 ) -> tuple[SetProbability, ...]:
     r"""Probabilities of the answers, best first; they sum to 1.
 
-    $$U = \frac{u}{Z} \sum_S \pi_S \left(\tfrac12 L_S F_S + \tfrac12 \sum_T \rho_T\,L_{S,T}\right), \qquad
+    $$U = \frac{u}{Z} \sum_S \pi_S \left(\tfrac12 L_S F_S
+    + \tfrac12 \sum_T \rho_T\,L_{S,T}\,\tfrac12 (1 + F_{S,T})\right), \qquad
     P(\text{unknown}) = (1 - \epsilon)\, U + \epsilon\, (1 - U), \qquad
     P(S) = (1 - P(\text{unknown})) \frac{\pi_S\,L_S}{\sum_{S'} \pi_{S'}\,L_{S'}}, \qquad
     \pi_\emptyset = p_0, \quad \pi_S = (1 - p_0)\,q^{|S| - 1} / n$$
@@ -110,10 +142,7 @@ def posterior_of(
     """
     priors = np.array([_log_prior(weight.acting, library, log_share) for weight in weights])
     sets = priors + np.array([weight.log for weight in weights])
-    unknown = [
-        *(prior + weight.log + weight.log_flexible for prior, weight in zip(priors, weights, strict=True)),
-        *(_log_prior(one.acting, library, log_share) + one.log for one in unnamed),
-    ]
+    unknown = _logs_of_unknown(weights, [one for one in unnamed if one.is_apart], library, log_share)
     odds = np.log(0.5 * UNKNOWN_PRIOR / (1.0 - UNKNOWN_PRIOR)) + logsumexp(unknown) - logsumexp(sets)
     is_unknown = MISJUDGED + (1.0 - 2.0 * MISJUDGED) * float(expit(odds))
     shares = (1.0 - is_unknown) * np.exp(sets - logsumexp(sets))
@@ -126,6 +155,38 @@ def posterior_of(
     ]
     found.append(SetProbability(effects=(), verdict="unknown", probability=is_unknown))
     return tuple(sorted(found, key=lambda one: -one.probability))
+
+
+def unknown_shares(
+    weights: Sequence[Weight],
+    library: int,
+    log_share: Callable[[tuple[str, ...]], float] | None = None,
+    unnamed: Sequence[UnnamedWeight] = (),
+) -> tuple[UnknownShare, ...]:
+    """How probable each way is in which something unknown may act, if it does; the parameters are of `posterior_of`.
+
+    A correction that is a set under another name counts here: it says where.
+    """
+    places = [*((one.acting, None) for one in weights), *((one.acting, one.component) for one in unnamed)]
+    shares = softmax(_logs_of_unknown(weights, unnamed, library, log_share))
+    return tuple(
+        UnknownShare(acting=acting, component=component, share=float(share))
+        for (acting, component), share in zip(places, shares, strict=True)
+    )
+
+
+def _logs_of_unknown(
+    weights: Sequence[Weight],
+    unnamed: Sequence[UnnamedWeight],
+    library: int,
+    log_share: Callable[[tuple[str, ...]], float] | None,
+) -> list[float]:
+    """Logarithms of the probabilities of something unknown: as a discrepancy beside sets, then through the plant."""
+    ways = [
+        *((one.acting, one.log + one.log_flexible) for one in weights),
+        *((one.acting, one.log + np.log(0.5) + np.logaddexp(0.0, one.log_flexible)) for one in unnamed),
+    ]
+    return [_log_prior(acting, library, log_share) + float(log) for acting, log in ways]
 
 
 def shared(

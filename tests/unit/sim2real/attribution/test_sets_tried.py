@@ -6,7 +6,7 @@ from wetwell.sim2real.attribution.search import MOST_EXTENDED, Search
 
 
 class Given:
-    """Fits are frozen sets of one letter each; how probable each is stands in a table."""
+    """Effects are letters; how probable each set of them is stands in a table."""
 
     def __init__(self, logs):
         self._logs, self._known, self.tried = logs, {(name,) for (name, *more) in logs if not more}, []

@@ -11,6 +11,7 @@ from wetwell.sim2real.likelihood.posterior import (
     equivalents,
     posterior_of,
     shared,
+    unknown_shares,
     verdict_of,
 )
 
@@ -19,6 +20,12 @@ NONE = Weight(effects=(), acting=(), log=0.0, log_flexible=-9.0)
 
 def weight(*effects, log, log_flexible=-9.0):
     return Weight(effects=effects, acting=effects, log=log, log_flexible=log_flexible)
+
+
+def correction(log, *acting, log_flexible=-9.0, is_apart=True):
+    return UnnamedWeight(
+        acting=acting, component="rising_main", log=log, log_flexible=log_flexible, is_apart=is_apart
+    )
 
 
 def test_probabilities_sum_to_1_and_the_best_comes_first():
@@ -46,13 +53,27 @@ def test_the_verdict_is_what_is_most_probable(weights, verdict):
 @pytest.mark.parametrize(("log", "verdict"), [(490.0, "effect"), (520.0, "unknown")])
 def test_what_corrects_a_term_better_than_any_set_is_unknown(log, verdict):
     sets = [NONE, weight("static_head_bias", log=500.0)]
-    assert verdict_of(posterior_of(sets, 25, unnamed=[UnnamedWeight(acting=(), log=log)])) == verdict
+    assert verdict_of(posterior_of(sets, 25, unnamed=[correction(log)])) == verdict
+
+
+def test_something_unknown_may_have_another_form_than_its_correction():
+    sets = [NONE, weight("static_head_bias", log=500.0)]
+    for log_flexible, verdict in ((-9.0, "effect"), (60.0, "unknown")):
+        near = correction(460.0, log_flexible=log_flexible)
+        assert verdict_of(posterior_of(sets, 25, unnamed=[near])) == verdict
+
+
+def test_a_correction_that_is_a_set_says_where_and_no_more():
+    sets = [NONE, weight("static_head_bias", log=500.0, log_flexible=10.0)]
+    same = correction(600.0, is_apart=False)
+    assert posterior_of(sets, 25, unnamed=[same]) == posterior_of(sets, 25)
+    where = unknown_shares(sets, 25, unnamed=[same])
+    assert max(where, key=lambda one: one.share).component == "rising_main"
+    assert sum(one.share for one in where) == pytest.approx(1.0)
 
 
 def test_a_correction_beside_an_effect_costs_what_the_effect_does():
-    alone, beside = (
-        posterior_of([NONE], 25, unnamed=[UnnamedWeight(acting=acting, log=3.0)]) for acting in ((), ("ragging",))
-    )
+    alone, beside = (posterior_of([NONE], 25, unnamed=[correction(3.0, *acting)]) for acting in ((), ("ragging",)))
     assert alone[0].verdict == "unknown"
     assert beside[0].verdict == "none"
 

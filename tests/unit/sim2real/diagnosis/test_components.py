@@ -1,0 +1,42 @@
+"""In which component something may be."""
+
+import pytest
+
+from wetwell.sim2real.diagnosis.components import component_probability
+from wetwell.sim2real.likelihood.posterior import SetProbability, UnknownShare
+
+
+def answer(probability, verdict, *effects):
+    return SetProbability(effects=effects, verdict=verdict, probability=probability)
+
+
+def way(share, component, *acting):
+    return UnknownShare(acting=acting, component=component, share=share)
+
+
+def test_an_effect_is_in_its_component_and_something_unknown_in_that_of_its_term():
+    posterior = [answer(0.7, "unknown"), answer(0.2, "effect", "friction_bias", "pump_wear"), answer(0.1, "none")]
+    unknown = [way(0.75, "sump", "friction_bias"), way(0.25, None)]
+    found = component_probability(posterior, unknown, "telemetry")
+    assert list(found) == ["rising_main", "sump", "pump", "telemetry"], "the most probable first"
+    assert found["sump"] == pytest.approx(0.7 * 0.75)
+    assert found["rising_main"] == pytest.approx(0.7 * 0.75 + 0.2), "beside what is unknown, or alone"
+    assert found["telemetry"] == pytest.approx(0.7 * 0.25), "where the pattern of the readings points"
+
+
+def test_two_effects_of_a_component_count_once():
+    found = component_probability([answer(1.0, "effect", "friction_bias", "static_head_bias")], [], "sump")
+    assert found == {"rising_main": 1.0}
+
+
+@pytest.mark.parametrize("pattern", ["drive", "power_meter"])
+def test_a_change_of_the_power_is_whose_pattern_it_has(pattern):
+    found = component_probability([answer(1.0, "unknown")], [way(1.0, "drive")], pattern)
+    assert found == {pattern: 1.0}
+
+
+def test_of_components_that_are_as_probable_that_of_what_is_unknown_comes_first():
+    """Water in a long main has inertia at each such station: no crew goes out for it."""
+    found = component_probability([answer(1.0, "unknown")], [way(1.0, "sump", "water_inertia")], "telemetry")
+    assert list(found) == ["sump", "rising_main"]
+    assert found == {"sump": 1.0, "rising_main": 1.0}
