@@ -17,7 +17,7 @@ NONE_PRIOR = 0.5
 """Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
-MISJUDGED = 0.2
+MISJUDGED = 0.15
 """Probability that the likelihood takes unknown for known, or the other way round: what acts is too small to be seen
 beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
 CREDIBLE = 0.95
@@ -138,7 +138,7 @@ def posterior_of(
     >>> far = Weight(effects=("ragging",), acting=("ragging",), log=-90.0, log_flexible=0.0)
     >>> best = posterior_of([Weight(effects=(), acting=(), log=0.0, log_flexible=-9.0), far], 25)[0]
     >>> best.verdict, round(best.probability, 2)
-    ('none', 0.8)
+    ('none', 0.85)
     """
     priors = np.array([_log_prior(weight.acting, library, log_share) for weight in weights])
     sets = priors + np.array([weight.log for weight in weights])
