@@ -35,7 +35,7 @@ FLEXED = 4
 
 MORE_GAINED = 4.0
 """Times what a first step promises that settling has gained at the most, on looked-at recordings."""
-STEPS = (1.0, 0.5, 0.25)
+PARTS_OF_A_STEP = (1.0, 0.5, 0.25)
 """Parts of a step that are tried: slopes do not hold for all of it."""
 WORTH_A_STEP = 1.0
 """By what a step has to make the recording likelier, in the logarithm: less tells no two sets apart."""
@@ -270,7 +270,7 @@ class Hypotheses:
 
     def _steps(self, one: Hypothesis) -> Iterator[Hypothesis]:
         """A hypothesis a step further, then half of it, and so on."""
-        for part in STEPS:
+        for part in PARTS_OF_A_STEP:
             position = one.fit.position + part * one.evidence.step
             moved = self._fitter.at(one.fit.candidates, one.fit.split(position))
             if moved is not None:
