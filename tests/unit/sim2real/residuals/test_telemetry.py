@@ -89,7 +89,17 @@ def test_a_level_that_is_stored_to_a_centimetre_is_no_gap(recorded, step_m, is_t
 
 
 @pytest.mark.parametrize(
-    ("quantum", "stored"), [(0.0408, 0.01), (0.0217, 0.01), (0.0293, 0.01), (0.0337, 0.001), (0.027, 0.0)]
+    ("quantum", "stored"),
+    [
+        (0.0408, 0.01),
+        (0.0217, 0.01),
+        (0.0192, 0.01),
+        (0.0152, 0.01),
+        (0.0131, 0.01),
+        (0.0293, 0.01),
+        (0.0337, 0.001),
+        (0.027, 0.0),
+    ],
 )
 def test_a_coarse_level_is_told_from_a_held_one_whatever_it_was_stored_in(recorded, quantum, stored):
     station, recording = recorded
