@@ -43,8 +43,9 @@ class Search:
         """
         while True:
             best = self._hypotheses.weighed[0].fit
-            fewer = [self._fitter.without(best, member) for member in range(len(best.names))]
-            if not self._extended([best, *(base for base in fewer if base is not None and base.names)]):
+            members = range(len(best.names)) if len(best.names) > 1 else ()
+            fewer = [self._fitter.without(best, member) for member in members]
+            if not self._extended([best, *(base for base in fewer if base is not None)]):
                 return
 
     def beside_others(self) -> bool:

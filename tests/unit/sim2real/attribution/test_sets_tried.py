@@ -9,7 +9,8 @@ class Given:
     """Effects are letters; how probable each set of them is stands in a table."""
 
     def __init__(self, logs):
-        self._logs, self._known, self.tried = logs, {(name,) for (name, *more) in logs if not more}, []
+        self._logs, self._known, self.tried = logs, {names for names in logs if len(names) == 1}, []
+        self._hypotheses = {names: SimpleNamespace(fit=made(names)) for names in logs}
 
     def without(self, fit, member):
         return made(name for k, name in enumerate(fit.names) if k != member)
@@ -26,14 +27,9 @@ class Given:
 
     @property
     def weighed(self):
-        ranked = sorted(self._known, key=lambda names: -self._logs[names])
-        return [self._hypothesis(names) for names in ranked]
+        return [self._hypotheses[names] for names in sorted(self._known, key=lambda names: -self._logs[names])]
 
     possible = weighed
-
-    def _hypothesis(self, names):
-        self._made = getattr(self, "_made", {})
-        return self._made.setdefault(names, SimpleNamespace(fit=made(names)))
 
 
 def made(names):
