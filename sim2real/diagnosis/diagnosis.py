@@ -190,7 +190,7 @@ def diagnose(
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
     check_plausible(traces, station, regimes, plain)
-    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
+    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt)
     bins = residuals.bins
     found = attribute(replay, residuals, regimes, candidates, progress, each, priors)
     verdict = verdict_of(found.posterior)

@@ -60,7 +60,7 @@ def evidences(
     regimes = regimes_of(traces, station)
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
-    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
+    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt)
     if residuals.bins.size == 0:
         raise ValueError("what is recorded shows nothing")
     condition = conditions_of(residuals.bins, traces, station)

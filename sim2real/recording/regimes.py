@@ -68,6 +68,22 @@ def regimes_of(traces: Traces, station: Station) -> Regimes:
     return found
 
 
+def first_runs(traces: Traces, regimes: Regimes) -> Flags:
+    """(pumps, n) whether a pump has yet to end its first run since a recording, or a part of one, begins.
+
+    Nobody knows how long it stood before, or since when it runs: what gathers in that time is another one than a
+    replay takes it to be. Acts by hand count as they are, and so does a pump that hardly ever runs, or stops.
+    """
+    runs = regimes.of_pumps != IDLE
+    is_begin = np.r_[True, np.diff(traces.part) != 0]
+    begin, of_part = np.maximum.accumulate(np.where(is_begin, np.arange(is_begin.size), 0)), np.cumsum(is_begin) - 1
+    ended = np.cumsum(np.c_[np.zeros(traces.pumps), runs[:, :-1] & ~runs[:, 1:]], axis=1)
+    count = np.array([np.bincount(of_part, one) for one in np.diff(ended, axis=1, append=ended[:, -1:])])
+    by_hand = np.bincount(of_part, traces.by_hand.is_commanding) > 0.0
+    is_first = (ended == ended[:, begin]) & (count >= FEWEST_CYCLES)[:, of_part] & ~by_hand[of_part]
+    return np.asarray(is_first, dtype=np.bool_)
+
+
 def _of_intervals(regime: Integers, last: Integers, span_s: int, order: tuple[int, ...]) -> Integers:
     """(rows,) the last in an order of the regimes that an interval meets."""
     rank = np.argsort(order)[regime]

@@ -63,6 +63,18 @@ def repeated(values: Floats) -> Flags:
     return same
 
 
+def is_change(values: Floats) -> Flags:
+    """(..., n) whether a value is another one than the known one before; what the first one was before is not known.
+
+    Examples
+    --------
+    >>> is_change(np.array([2.0, np.nan, 2.0, 3.0, 3.0]))
+    array([False, False, False,  True, False])
+    """
+    is_known = np.isfinite(values)
+    return is_known & ~repeated(values) & (np.cumsum(is_known, axis=-1) > 1)
+
+
 def trailing_means(values: Floats, span_s: int) -> Floats:
     """(..., n) mean of each value and those before it, `span_s` together; fewer at the beginning.
 

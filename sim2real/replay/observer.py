@@ -106,7 +106,7 @@ class Observer:
         Returns
         -------
         (n,) array
-            i; 0 where there is no value. [m]
+            i, also where there is no value: of a level that is held, only changes are one. [m]
         """
         left = np.zeros(self.level_m.size)
         is_known = np.isfinite(self.level_m)
@@ -266,13 +266,13 @@ def _leave(
     misread_m: Floats,
     left_m: Floats,
 ) -> None:
-    """Write what an error of the balance or of the reading leaves before each value."""
+    """Write what an error of the balance or of the reading leaves before each value, and between values."""
     level, inflow = 0.0, 0.0
     for k in range(is_known.size):
         level += inflow + gained_m[k]
         inflow *= inflow_kept
+        left_m[k] = level + misread_m[k]
         if is_known[k]:
-            left_m[k] = level + misread_m[k]
             level -= level_gain[k] * left_m[k]
             inflow -= inflow_gain[k] * left_m[k]
 

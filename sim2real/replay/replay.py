@@ -13,11 +13,12 @@ from wetwell.protocols.recordings.covariates import COVARIATE_PREFIX
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.column_noise import course_of
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes_of
-from wetwell.sim2real.recording.seconds import repeated, trailing_means
+from wetwell.sim2real.recording.seconds import is_change, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.changing import Acting, Changing, in_period
 from wetwell.sim2real.replay.inflow_process import MOST_SQUARE, InflowProcess, learnt_process
 from wetwell.sim2real.replay.kernel import replay_seconds
+from wetwell.sim2real.replay.level_filter import BEGUN_ANEW
 from wetwell.sim2real.replay.metered_inflow import metered_inflow
 from wetwell.sim2real.replay.observer import (
     Observer,
@@ -153,19 +154,21 @@ class Replay:
         read = self._run(acting, plant).reading
         return np.array([later(one, _delay_s(plant, name)) for name, one in zip(PUMP_METERS, read, strict=True)])
 
-    def doubt(self) -> Doubt:
-        r"""What the moments that the rows do not show leave open in what is predicted.
+    def doubt(self, is_level_held: bool) -> Doubt:
+        r"""What the moments that the rows do not show, or a level that is held, leave open in what is predicted.
 
         $$\sigma^2 = \frac{(y_\text{early} - y_\text{late})^2 + (y_\text{long} - y_\text{short})^2}{24}$$
 
-        for starts and stops that lie anywhere in what is possible, one as likely as another, each by itself.
+        for starts and stops that lie anywhere in what is possible, one as likely as another, each by itself. Of a
+        level that is held, only its changes are known.
         """
+        observer = self._observer_of_changes if is_level_held else self.observer
         placements = self.traces.drives.placements
         if not placements:
-            return Doubt(level_m=self.observer.deviation_m, signals={}, observer=self.observer)
+            return Doubt(level_m=observer.deviation_m, signals={}, observer=observer)
         plant = self._plant(self.own)
         early, late, long, short = (
-            self._predicted(plant, *self._computed(self.own, plant, _records(plant), placement, self.observer))
+            self._predicted(plant, *self._computed(self.own, plant, _records(plant), placement, observer))
             for placement in placements
         )
 
@@ -176,10 +179,10 @@ class Replay:
         signals = {
             name: spread(*(one.signals[name] for one in (early, late, long, short))) for name in self.traces.signals
         }
-        level_m = self.observer.deviation_m
+        level_m = observer.deviation_m
         if level_m is not None and self.traces.span_s > 1:  # the observer knows of instants only
             level_m = np.hypot(level_m, spread(*(one.level_m for one in (early, late, long, short))))
-        return Doubt(level_m=level_m, signals=signals, observer=self.observer)
+        return Doubt(level_m=level_m, signals=signals, observer=observer)
 
     def _plant(self, acting: Sequence[Effect]) -> PlantParameters:
         plant = self._configured
@@ -238,9 +241,9 @@ class Replay:
         is_held = observer.level_m is not traces.level_m
         observer = self._of_lagging_level(observer, plant.sensors[LEVEL])
         observer = observer.of_late_level(int(plant.sensors[LEVEL].delay_s))
-        known = np.flatnonzero(np.isfinite(observer.level_m))
-        first = observer.level_m[known[:FIRST]]  # a single value may be wrong
-        first_level_m = float(np.median(first)) if known.size else self.station.middle_level_m
+        told_m = later(traces.level_m, -int(plant.sensors[LEVEL].delay_s))
+        first = told_m[np.isfinite(told_m)][:FIRST]  # a single value may be wrong
+        first_level_m = float(np.median(first)) if first.size else self.station.middle_level_m
         level_m = np.empty(traces.seconds)
         reading = np.zeros((len(PUMP_METERS), pumps, traces.seconds))
         replay_seconds(
@@ -272,9 +275,13 @@ class Replay:
 
     @cached_property
     def _observer_of_changes(self) -> Observer:
-        """The same where only changes of the level are sent: a value that repeats the last one is none."""
+        """The same where only changes of the level are sent: it begins with the first one."""
         level_m = self.traces.level_m
-        return self._observer_of(np.where(repeated(level_m), np.nan, level_m))
+        observer = self._observer_of(np.where(is_change(level_m), level_m, np.nan))
+        first = np.flatnonzero(np.isfinite(observer.level_m))[:1]
+        level_gain, sensor_gain = observer.level_gain.copy(), observer.sensor_gain.copy()
+        level_gain[first] = sensor_gain[:, first] = BEGUN_ANEW
+        return replace(observer, level_gain=level_gain, sensor_gain=sensor_gain)
 
     def _observer_of(self, level_m: Floats) -> Observer:
         """Observer of a level; where the inflow is not measured, as the process that rows at rest show."""

@@ -9,7 +9,16 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.materiality import Materiality
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, REGIMES, START_RAMP, STEADY, STOP_RAMP, Regimes
+from wetwell.sim2real.recording.regimes import (
+    IDLE,
+    MULTI_PUMP,
+    REGIMES,
+    START_RAMP,
+    STEADY,
+    STOP_RAMP,
+    Regimes,
+    first_runs,
+)
 from wetwell.sim2real.recording.seconds import repeated, since_changes, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Doubt, Prediction
@@ -126,6 +135,7 @@ def pump_residuals(
     has_lost = traces.is_each_second and traces.value != "held"
     block = max(round(BLOCK_S / traces.rate_s), 1)
     has_water = ~is_drained(traces, station, plain)
+    has_past = ~first_runs(traces, regimes)
     found = []
     for name, recorded in traces.signals.items():
         expected = plain.signals[name]
@@ -136,7 +146,7 @@ def pump_residuals(
                 open_ = np.hypot(open_, doubt.signals[name][pump])
             if traces.span_s > 1:
                 open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
-            known = np.where(is_shown[pump] & has_water, recorded[pump], np.nan)
+            known = np.where(is_shown[pump] & has_water & has_past[pump], recorded[pump], np.nan)
             one = _one_pump(
                 name, pump, known, expected[pump], open_, regimes, noise, station.materiality, patterns.get(name)
             )

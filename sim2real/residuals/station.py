@@ -1,5 +1,6 @@
 """How far a prediction is from a recording, all signals together, in units of noise."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -26,11 +27,30 @@ class _Part(Protocol):
 
 
 class StationResiduals:
-    """Residuals of a recording; which they are and what they weigh is the same for every prediction."""
+    """Residuals of a recording; which they are and what they weigh is the same for every prediction.
 
-    def __init__(self, traces: Traces, station: Station, regimes: Regimes, plain: Prediction, doubt: Doubt) -> None:
+    Parameters
+    ----------
+    traces : Traces
+    station : Station
+    regimes : Regimes
+    plain : Prediction
+        Of the station as it is.
+    doubt_where : callable
+        What a right model may be off, by whether the level is held.
+    """
+
+    def __init__(
+        self,
+        traces: Traces,
+        station: Station,
+        regimes: Regimes,
+        plain: Prediction,
+        doubt_where: Callable[[bool], Doubt],
+    ) -> None:
         self.telemetry = telemetry_residuals(traces, station, regimes)
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
+        doubt = doubt_where("level_m" in patterns and patterns["level_m"].deadband > 0.0)
         self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, doubt, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
             level = level_residuals(traces, station, regimes, plain, doubt, patterns)

@@ -97,7 +97,7 @@ def look_at(recording: Recording, station: Station) -> Seen:
     replay = Replay(traces, station, effects_of(station))
     plain = replay.run()
     check_plausible(traces, station, regimes, plain)
-    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt())
+    residuals = StationResiduals(traces, station, regimes, plain, replay.doubt)
     bins, z = residuals.bins, residuals.of(plain)
     series = _series(bins, z, traces.start_ns)
     look = Look(

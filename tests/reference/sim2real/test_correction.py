@@ -44,7 +44,7 @@ def residuals_of(recording, station):
     traces = traces_of(recording, station)
     replay = Replay(traces, station, effects_of(station))
     regimes = regimes_of(traces, station)
-    return replay, StationResiduals(traces, station, regimes, replay.run(), replay.doubt())
+    return replay, StationResiduals(traces, station, regimes, replay.run(), replay.doubt)
 
 
 @pytest.fixture(scope="module")

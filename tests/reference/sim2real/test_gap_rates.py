@@ -67,7 +67,7 @@ def test_the_true_model_is_off_by_about_what_it_may_be(alpha, plain, every, valu
     traces = traces_of(stored(plain, every, value, without), alpha)
     regimes = regimes_of(traces, alpha)
     replay = Replay(traces, alpha)
-    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt())
+    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt)
     squares = residuals.of(replay.run()) ** 2
     cells = list(residuals.bins.cells(np.ones(squares.size, dtype=bool)))
     assert len(cells) >= 3

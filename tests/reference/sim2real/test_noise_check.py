@@ -33,7 +33,7 @@ def left_and_cells(plant, every_s, metered_share):
     traces = traces_of(recording, truth.station)
     regimes, replay = regimes_of(traces, truth.station), Replay(traces, truth.station)
     prediction = replay.run()
-    residuals = StationResiduals(traces, truth.station, regimes, prediction, replay.doubt())
+    residuals = StationResiduals(traces, truth.station, regimes, prediction, replay.doubt)
     cells = cells_of(residuals.bins, np.zeros(residuals.bins.size, dtype=int), has_inflow=True, is_each_second=True)
     return cells.means(residuals.of(prediction)), cells
 

@@ -37,7 +37,7 @@ def recorded(alpha, inflow, seed):
 def learnt(recording, alpha) -> Jumps | None:
     traces = traces_of(recording, alpha)
     replay = Replay(traces, alpha)
-    residuals = StationResiduals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt())
+    residuals = StationResiduals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt)
     found = weighed_cells(replay, residuals, residuals.of(replay.run()))
     return next(block.jumps for block in found.blocks if block.signal == LEVEL and block.may_jump)
 

@@ -33,7 +33,7 @@ def fitter_of(alpha, truth):
     traces = traces_of(Simulation(station, Scenario(name="plain"), 5, 0).advance(14_400), alpha)
     regimes = regimes_of(traces, alpha)
     replay = Replay(traces, alpha)
-    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt())
+    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt)
     return Fitter(replay, residuals, np.ones(residuals.bins.signal.size, dtype=np.bool_))
 
 

@@ -39,7 +39,7 @@ class Searched(NamedTuple):
 def searched(traces, station, candidates) -> Searched:
     """What a search of some candidates begins with."""
     regimes, replay = regimes_of(traces, station), Replay(traces, station)
-    residuals = StationResiduals(traces, station, regimes, replay.run(), replay.doubt())
+    residuals = StationResiduals(traces, station, regimes, replay.run(), replay.doubt)
     fitter = Fitter(replay, residuals, halves(residuals.bins, traces.pumps)[0])
     guesses = {one: initial_guesses(one, replay, residuals, fitter.plain.residuals) for one in candidates}
     cells = weighed_cells(replay, residuals, residuals_of(fitter.plain.residuals))

@@ -136,7 +136,8 @@ def test_what_does_not_change_is_taken_for_inflow():
     assert np.max(np.abs(left_m[-100:])) < 1e-6
 
 
-def test_a_second_without_a_level_shows_nothing():
-    level_m = np.ones(10)
-    level_m[4] = np.nan
-    assert np.flatnonzero(constant_observer(level_m).left_m(np.ones(10), np.zeros(10)) == 0.0).tolist() == [4]
+def test_between_values_it_goes_wrong_as_the_balance_does():
+    level_m = np.where(np.arange(40) % 10 == 0, 1.0, np.nan)
+    left_m = constant_observer(level_m).left_m(np.full(40, 1e-3), np.zeros(40))
+    assert np.diff(left_m)[21:30] == pytest.approx(1e-3)
+    assert left_m[31] < left_m[30]

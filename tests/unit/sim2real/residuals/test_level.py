@@ -28,7 +28,9 @@ def unmetered(metered):
 
 def level_bins(traces, station):
     replay = Replay(traces, station)
-    return level_residuals(traces, station, regimes_of(traces, station), replay.run(), replay.doubt(), {}).bins
+    return level_residuals(
+        traces, station, regimes_of(traces, station), replay.run(), replay.doubt(is_level_held=False), {}
+    ).bins
 
 
 def test_what_an_error_of_the_balance_leaves_is_what_the_kernel_makes_of_it(unmetered, alpha):
