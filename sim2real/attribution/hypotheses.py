@@ -178,7 +178,7 @@ class Hypotheses:
         return any(self._is_within(one.evidence.residuals - residuals, 1.0) for one in self.possible)
 
     def settle(self) -> None:
-        """Take what may be the answer to where the recording is likeliest, as long as another answer is near.
+        """Take what may be the answer to where the recording is likeliest: the best, and others if they tell another.
 
         A fit is where another loss is least. What a step along the slopes gains is replayed, and weighed anew.
         """
@@ -186,8 +186,9 @@ class Hypotheses:
         while True:
             ranked = sorted([*self.weighed, *self._unnamed], key=lambda one: -one.evidence.log)
             near = [one for one in ranked[:FLEXED] if _at_most(one) >= ranked[0].evidence.log]
+            near = near if len({one.told for one in near}) > 1 else ranked[:1]
             leading = [one for one in near if id(one) not in settled]
-            if not leading or len({one.told for one in near}) == 1:
+            if not leading:
                 return
             after = {id(one): found for one, found in zip(leading, self._each(self._settled, leading), strict=True)}
             settled |= {id(one) for one in after.values()}
@@ -260,12 +261,14 @@ class Hypotheses:
         for _ in range(ROUNDS):
             if one.evidence.gained <= WORTH_A_STEP:
                 break
-            nearer = next(
-                (its for its in self._steps(one) if its.evidence.log > one.evidence.log + WORTH_A_STEP), None
-            )
-            if nearer is None:
-                break
-            one = nearer
+            tried = [one]
+            for its in self._steps(one):
+                if its.evidence.log > one.evidence.log + WORTH_A_STEP:
+                    one = its
+                    break
+                tried.append(its)
+            else:
+                return _as_replayed(tried)
         return one
 
     def _steps(self, one: Hypothesis) -> Iterator[Hypothesis]:
@@ -383,6 +386,12 @@ class Hypotheses:
         wrong = cells.allowed**2 + (LATE[2] * late) ** 2 + 2.0 * GOOD.form**2 * others
         own = unshifted(cells, signature, late)
         return bool(np.any(cells.group_squares(own) > cells.group_squares(np.sqrt(wrong))))
+
+
+def _as_replayed(tried: Sequence[Hypothesis]) -> Hypothesis:
+    """The likeliest of places by what was replayed there: no step along the slopes keeps what they promise."""
+    best = max(tried, key=lambda one: one.evidence.log - one.evidence.gained)
+    return replace(best, evidence=replace(best.evidence, log=best.evidence.log - best.evidence.gained, gained=0.0))
 
 
 def _at_most(one: Hypothesis) -> float:

@@ -13,8 +13,9 @@ from wetwell.simulator.effects import EFFECTS
 MOST_EFFECTS = 4
 """Effects of a set: three, and the inertia that the water of each main has."""
 
-MOST_EXTENDED = 4
-"""Sets beside which one more effect is tried where something unknown is the most probable, the best ones first."""
+MOST_EXTENDED = 2
+"""Sets of each size beside which one more effect is tried where something unknown is the most probable: a pair may be
+right that is less probable than many triples."""
 
 MOST_CHANGED = 4
 """Single effects that are tried so, those that explain most first."""
@@ -51,7 +52,9 @@ class Search:
     def beside_others(self) -> bool:
         """Try one more effect beside the sets next in line, and say whether a more probable one was found."""
         best = self._hypotheses.weighed[0]
-        self._extended([one.fit for one in self._hypotheses.possible[:MOST_EXTENDED]])
+        untried = [one.fit for one in self._hypotheses.possible if frozenset(one.effects) not in self._tried]
+        of_size = [[fit for fit in untried if len(fit.names) == size] for size in range(1, MOST_EFFECTS)]
+        self._extended([fit for fits in of_size for fit in fits[:MOST_EXTENDED]])
         if self._hypotheses.weighed[0] is best:
             return False
         self.around_the_best()

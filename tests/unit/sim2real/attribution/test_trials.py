@@ -1,5 +1,6 @@
 """Trials of a further effect beside others, and which sets are weighed."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -151,6 +152,20 @@ def test_near_sets_are_settled_where_the_recording_is_likeliest(alpha):
     settled = hypotheses.of(["friction_bias"])
     assert settled.fit.effects[0].factor == pytest.approx(1.2, abs=0.01)
     assert hypotheses.weighed[0] is settled
+
+
+def test_a_promise_that_no_replay_keeps_does_not_count(alpha, monkeypatch):
+    traces = recorded(alpha, [EFFECTS["friction_bias"](factor=1.2)])
+    friction, lift = (of_all(alpha, name) for name in ("friction_bias", "static_head_bias"))
+    _, _, hypotheses, trials = searched(traces, alpha, [friction, lift])
+    hypotheses.add(trials.singles())
+    best = hypotheses.weighed[0]
+    promised = replace(best, evidence=replace(best.evidence, log=best.evidence.log + 500.0, gained=500.0))
+    tried = replace(best, evidence=replace(best.evidence, log=best.evidence.log - 1.0, gained=0.0))
+    monkeypatch.setattr(hypotheses, "_steps", lambda _: iter([tried]))
+    monkeypatch.setitem(hypotheses._best, best.effects, promised)
+    hypotheses.settle()
+    assert hypotheses.of(best.effects).evidence.log == best.evidence.log
 
 
 def test_a_correction_that_says_what_a_set_says_is_that_set(alpha):
