@@ -9,7 +9,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.hypotheses import Hypotheses
+from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import are_sized, informed, intervals_of, sharpened
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
@@ -137,15 +137,17 @@ def attribute(
     def weighed(unnamed: Sequence[UnnamedWeight]) -> tuple[SetProbability, ...]:
         return posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
 
+    def ends_of(one: Hypothesis) -> Floats:
+        return sharpened(one.fit, intervals_of(fitter, one.fit, residuals.bins), one.evidence)
+
     unnamed = beside_corrections()
     if verdict_of(weighed(unnamed)) == "unknown" and search.beside_others():
         unnamed = beside_corrections()
     while verdict_of(posterior := weighed(unnamed)) == "effect":
         names = best_set(posterior)
-        likely = hypotheses.of(names)
-        its_ends = sharpened(likely.fit, intervals_of(fitter, likely.fit, residuals.bins), likely.evidence)
-        if are_sized(likely.fit, its_ends):
-            own, own_ends = in_order(fitter, likely.fit, its_ends)
+        likely, telling = hypotheses.of(names), hypotheses.telling(names)
+        if are_sized(telling.fit, ends_of(telling), names):
+            own, own_ends = in_order(fitter, likely.fit, ends_of(likely))
             ends, accepted = own_ends, informed(fitter, own, priors)
             break
         hypotheses.rule_out(names)

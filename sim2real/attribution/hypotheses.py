@@ -199,6 +199,10 @@ class Hypotheses:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
 
+    def telling(self, effects: Sequence[str]) -> Hypothesis:
+        """The likeliest hypothesis that tells some effects, perhaps beside a companion."""
+        return next(one for one in self.weighed if one.told == tuple(sorted(effects)))
+
     def alike(self, effects: Sequence[str], answers: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
         """Those of some answers whose readings differ from those of a set by no more than a good model is off."""
         own = self.of(effects).evidence.residuals

@@ -1,6 +1,6 @@
 """Intervals of fitted parameters, and the fit that other stations make likelier."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -116,8 +116,8 @@ def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
     return sharp
 
 
-def are_sized(fit: Fit, ends: Floats) -> bool:
-    """Whether the recording says how large each effect of a fit is, and that it is none that has another name.
+def are_sized(fit: Fit, ends: Floats, told: Collection[str]) -> bool:
+    """Whether the recording says how large some effects of a fit are, and that they are none of another name.
 
     The interval of an only strength must not hold neutral, as that of all its range does. Those of several may: one
     may act alone, and wear by head takes the place of wear by leak. No interval may hold an end of a range at which
@@ -128,11 +128,14 @@ def are_sized(fit: Fit, ends: Floats) -> bool:
     fit : Fit
     ends : (parameters, 2) array
         As `intervals_of` makes them.
+    told : names of effects
+        Those that are asked of: a companion is too small to be told, and need not have a size.
     """
     parts = list(zip(fit.candidates, fit.split(ends), strict=False))  # of no candidates it is one empty part
     return all(
         _may_be_neutral(candidate, its) != [True] and not any(_may_be_another(candidate, its))
         for candidate, its in parts
+        if candidate.name in told
     )
 
 

@@ -25,15 +25,23 @@ def test_an_only_strength_must_not_be_neutral(low, high, is_sized):
     """A leak of 0 is none. One of which only the least is known is there."""
     fit = fit_of("check_valve_leak")
     ends = np.array([[low, high] if free.neutral is not None else [0.0, 1.0] for free in fit.candidates[0].free])
-    assert are_sized(fit, ends) is is_sized
+    assert are_sized(fit, ends, fit.names) is is_sized
 
 
 def test_of_several_strengths_one_may_be_neutral_and_what_is_no_strength_may_be_anything():
     fit = fit_of("pump_wear", "check_valve_leak")
     wear = [[0.0, 1.0] for _ in fit.candidates[0].free]
     leak = [[0.2, 0.3] if free.neutral is not None else [0.0, 1.0] for free in fit.candidates[1].free]
-    assert are_sized(fit, np.array(wear + leak))
-    assert not are_sized(fit, np.array([*wear, [0.0, 0.3], *leak[1:]]))
+    assert are_sized(fit, np.array(wear + leak), fit.names)
+    assert not are_sized(fit, np.array([*wear, [0.0, 0.3], *leak[1:]]), fit.names)
+
+
+def test_a_companion_need_have_no_size():
+    fit = fit_of("check_valve_leak", "water_inertia")
+    leak = [[0.2, 0.3] for _ in fit.candidates[0].free]
+    ends = np.array(leak + [[0.0, 1.0] for _ in fit.candidates[1].free])
+    assert are_sized(fit, ends, ["check_valve_leak"])
+    assert not are_sized(fit, ends, fit.names)
 
 
 @pytest.mark.parametrize(("name", "parameter"), [("ragging", "growth_s"), ("air_pocket", "purge_s")])
@@ -42,9 +50,9 @@ def test_what_may_be_another_effect_by_its_form_is_not_told(name, parameter):
     fit = fit_of(name)
     (number,) = (k for k, free in enumerate(fit.candidates[0].free) if free.name == parameter)
     ends = np.array([[0.2, 0.3] for _ in fit.candidates[0].free])
-    assert are_sized(fit, ends)
+    assert are_sized(fit, ends, fit.names)
     ends[number] = [0.0, 1.0]
-    assert not are_sized(fit, ends)
+    assert not are_sized(fit, ends, fit.names)
 
 
 def likelihood(size, precision, step=0.0):
@@ -60,7 +68,7 @@ def test_an_end_at_neutral_is_as_near_as_the_likelihood_lets_it_be(precision, lo
     ends = np.array([[0.0, 0.9] if free.neutral is not None else [0.0, 1.0] for free in fit.candidates[0].free])
     sharp = sharpened(fit, ends, likelihood(len(ends), precision))
     assert sharp[0] == pytest.approx([low, 0.9])
-    assert are_sized(fit, sharp) is is_sized
+    assert are_sized(fit, sharp, fit.names) is is_sized
 
 
 def test_an_interval_holds_what_is_told_though_the_likelihood_has_it_larger():
@@ -77,7 +85,7 @@ def test_what_the_fit_knows_stays_as_it_is():
 
 
 def test_nothing_has_no_size_to_be_told():
-    assert are_sized(Fit(candidates=(), points=(), residuals=np.zeros(0)), np.zeros((0, 2)))
+    assert are_sized(Fit(candidates=(), points=(), residuals=np.zeros(0)), np.zeros((0, 2)), ())
 
 
 class Valley:

@@ -154,6 +154,20 @@ def test_near_sets_are_settled_where_the_recording_is_likeliest(alpha):
     assert hypotheses.weighed[0] is settled
 
 
+def test_an_answer_is_held_against_the_likeliest_set_that_tells_it(alpha, monkeypatch):
+    """Beside water that is slow by a second the friction is another one."""
+    friction, inertia = (of_all(alpha, name) for name in ("friction_bias", "water_inertia"))
+    traces = recorded(alpha, [EFFECTS["friction_bias"](factor=1.5)])
+    fitter, _, hypotheses, trials = searched(traces, alpha, [friction])
+    hypotheses.add(trials.singles())
+    alone = hypotheses.of(["friction_bias"])
+    both = fitter.at([*alone.fit.candidates, inertia], [*alone.fit.points, np.array([0.01, 0.0])])
+    beside = replace(alone, fit=both, evidence=replace(alone.evidence, log=alone.evidence.log + 1.0))
+    assert hypotheses.telling(["friction_bias"]) is alone
+    monkeypatch.setitem(hypotheses._best, beside.effects, beside)
+    assert hypotheses.telling(["friction_bias"]) is beside
+
+
 def test_a_promise_that_no_replay_keeps_does_not_count(alpha, monkeypatch):
     traces = recorded(alpha, [EFFECTS["friction_bias"](factor=1.2)])
     friction, lift = (of_all(alpha, name) for name in ("friction_bias", "static_head_bias"))
