@@ -3,6 +3,8 @@
 ROOT = "wetwell"
 SITE = "_site"
 """In place of a station: a service that is there for all of them."""
+PACE = f"{ROOT}/@pace"
+"""Nothing lives here: a router that is asked for it has taken all that was declared before."""
 
 
 def sample_key(station: str) -> str:

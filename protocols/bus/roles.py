@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from wetwell.protocols.bus.keys import ROOT, tail_key
+from wetwell.protocols.bus.keys import PACE, ROOT, tail_key
 from wetwell.protocols.errors import ConfigError, first_fault
 from wetwell.protocols.station.station_file import NAME_PATTERN, load_toml
 from wetwell.protocols.station.table import Table
@@ -86,17 +86,22 @@ class AccessTable(Table):
             )
             if keys
         ]
-        rules.append(_rule("delivery", ALL, "egress", (f"{ROOT}/**",)))
-        common = rules[-1]["id"]
+        common = [
+            _rule("delivery", ALL, "egress", (f"{ROOT}/**",)),
+            _rule("pace", ("liveliness_query",), "ingress", (PACE,)),
+        ]
         return {
             "enabled": True,
             "default_permission": "deny",
-            "rules": rules,
+            "rules": rules + common,
             "subjects": [{"id": role.name, known_by: list(role.who)} for role in self.role],
             "policies": [
                 {
                     "subjects": [role.name],
-                    "rules": [rule["id"] for rule in rules if rule["id"].rpartition("-")[0] == role.name] + [common],
+                    "rules": [
+                        *(rule["id"] for rule in rules if rule["id"].rpartition("-")[0] == role.name),
+                        *(rule["id"] for rule in common),
+                    ],
                 }
                 for role in self.role
             ],

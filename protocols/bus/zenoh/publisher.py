@@ -152,5 +152,5 @@ class ZenohPublisher:
         if self._tail is None:
             key = tail_key(self.key)
             self._tail = self.line.numbered(key)
-            self._token = self.line.session.liveliness().declare_token(key)  # else no router knows the key
+            self._token = self.line.token(key)  # else no router knows the key
         self._put(self._tail, b"", attachment=self.cache.next_header, congestion_control=DROP)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import zenoh
 
+from wetwell.protocols.bus.zenoh.pace import Pace
 from wetwell.protocols.bus.zenoh.session import at_once
 from wetwell.protocols.errors import LinkError
 
@@ -30,8 +31,9 @@ class Line:
         Declarations that it may still take.
     """
 
-    def __init__(self, session: zenoh.Session, most: int) -> None:
+    def __init__(self, session: zenoh.Session, most: int, pace: Pace) -> None:
         self.session = session
+        self._pace = pace
         self.has_come_back = threading.Event()
         self.room = most
         self._numbers = 0
@@ -47,6 +49,11 @@ class Line:
     def is_connected(self) -> bool:
         """Whether it has its router."""
         return bool(self.session.info.routers_zid())
+
+    def token(self, key: str) -> zenoh.LivelinessToken:
+        """A token that makes its router know a key, for as long as it is held."""
+        self._pace.count(self.session, 1)
+        return self.session.liveliness().declare_token(key)
 
     def numbered(self, key: str) -> zenoh.KeyExpr:
         """The key, declared as long as there are numbers: then the session knows where its messages go.
@@ -71,21 +78,27 @@ class Sessions:
 
     def __init__(self, first: zenoh.Session, further: Callable[[], zenoh.Session] | None = None) -> None:
         self._further = further
-        self.first = Line(first, ROOM_OF_FIRST)
+        self.pace = Pace()
+        self.first = Line(first, ROOM_OF_FIRST, self.pace)
         self.lines = [self.first]
         self._apart: list[zenoh.Session] = []
 
     def with_room(self, declarations: int) -> Line:
-        """A line for so many declarations more, which are counted; the last one if no other can be opened."""
+        """A line for so many declarations more, which are counted; the last one if no other can be opened.
+
+        It waits until the router has taken most of those before.
+        """
+        self.pace.wait()
         line = self.lines[-1]
         if line.room < declarations:
             further = self._opened()
             if further is None:
                 line.room += ROOM_OF_FURTHER
             else:
-                line = Line(further, ROOM_OF_FURTHER)
+                line = Line(further, ROOM_OF_FURTHER, self.pace)
                 self.lines.append(line)
         line.room -= declarations
+        self.pace.count(line.session, declarations)
         return line
 
     def apart(self) -> zenoh.Session:

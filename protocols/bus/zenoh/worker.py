@@ -139,7 +139,8 @@ class ZenohWorker(threading.Thread):
             if line.has_come_back.is_set():
                 line.has_come_back.clear()
                 self._stir(line, now_s)
-        self.ends.settle(now_s)
+        if not self._sessions.pace.is_behind:  # a first end is declared
+            self.ends.settle(now_s)
 
     def _stir(self, line: Line, now_s: float) -> None:
         for publisher in self._publishers:

@@ -17,6 +17,8 @@ from ports import free_port
 from wetwell.protocols.bus.keys import alarm_act_key, alive_key, sample_key, verdict_key
 from wetwell.protocols.bus.zenoh.access import ZenohAccess
 from wetwell.protocols.bus.zenoh.link import open_client, open_router
+from wetwell.protocols.bus.zenoh.pace import MOST_OPEN, Pace
+from wetwell.protocols.bus.zenoh.session import open_client_session
 from wetwell.protocols.errors import ConfigError, LinkError
 
 LIMIT_S = 20.0
@@ -194,6 +196,18 @@ def test_roles_of_users(by_password):
 
 def test_roles_of_certificates(by_certificate, folder):
     asyncio.run(check_roles(by_certificate, holder(folder, "gateway"), holder(folder, "dashboard")))
+
+
+@pytest.mark.parametrize("name", sorted(SECRETS))
+def test_everybody_may_ask_whether_the_router_has_taken_what_was_declared(by_password, name, monkeypatch):
+    monkeypatch.setattr("wetwell.protocols.bus.zenoh.pace.PATIENCE_S", 10.0 * LIMIT_S)
+    pace, deadline_s = Pace(), time.monotonic() + LIMIT_S
+    with open_client_session(by_password.endpoint, user(name), LIMIT_S) as session:
+        pace.count(session, MOST_OPEN)
+        while pace.is_behind:
+            assert time.monotonic() < deadline_s
+            time.sleep(0.01)
+    assert not by_password.has_said(f"'{name}' may not liveliness")
 
 
 def test_only_who_may_ask_reaches_who_may_answer(by_password):

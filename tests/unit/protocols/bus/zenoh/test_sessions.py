@@ -6,8 +6,14 @@ import pytest
 import zenoh
 
 from wetwell.protocols.bus.zenoh import sessions as module
+from wetwell.protocols.bus.zenoh.pace import Pace
 from wetwell.protocols.bus.zenoh.sessions import ROOM_OF_FIRST, ROOM_OF_FURTHER, Line, Sessions
 from wetwell.protocols.errors import LinkError
+
+
+class Taken:
+    def try_recv(self):
+        raise zenoh.ZError("disconnected")
 
 
 class Session:
@@ -22,6 +28,9 @@ class Session:
     def declare_keyexpr(self, key):
         self.declared.append(key)
         return zenoh.KeyExpr(key)
+
+    def liveliness(self):
+        return SimpleNamespace(get=lambda *_, **__: Taken())
 
     def __enter__(self):
         return self
@@ -80,7 +89,7 @@ def test_a_session_whose_end_nobody_hears_of_keeps_no_other_open():
 
 def test_no_more_keys_are_declared_than_zenoh_can_tell_apart(monkeypatch):
     monkeypatch.setattr(module, "MOST_NUMBERS", 2)
-    line = Line(Session(), ROOM_OF_FIRST)
+    line = Line(Session(), ROOM_OF_FIRST, Pace())
     keys = [f"wetwell/s{number}/sample" for number in range(3)]
     assert [str(line.numbered(key)) for key in keys] == keys
     assert line.session.declared == keys[:2]
