@@ -168,7 +168,7 @@ async def keep_in_turn(judges: Sequence[StationDetector], intake: Intake, period
     The oldest state comes first, and at once: where processes live shortly, one after another, each station has its
     turn. One that has yet to take what it has missed comes when it has, as its state is the one that is kept already.
     """
-    turns = sorted(judges, key=lambda judge: judge.detector.seen_until_ns)
+    turns = dict.fromkeys(sorted(judges, key=lambda judge: judge.detector.seen_until_ns))
     in_a_turn = max(1, int(len(turns) * KEPT_TURN_S / period_s))
     while turns:
         ready = list(itertools.islice((judge for judge in turns if not intake.is_behind(judge)), in_a_turn))
@@ -176,7 +176,7 @@ async def keep_in_turn(judges: Sequence[StationDetector], intake: Intake, period
             await asyncio.sleep(LOOK_AGAIN_S)
             continue
         for judge in ready:
-            turns.remove(judge)
-            turns.append(judge)
+            del turns[judge]
+            turns[judge] = None  # comes last now
             await judge.keep_aside()
         await asyncio.sleep(period_s * len(ready) / len(turns))

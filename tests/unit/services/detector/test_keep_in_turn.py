@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +13,12 @@ from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.detector.daemon import keep_in_turn
 
 PERIOD_S = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    detector: SimpleNamespace
+    keep_aside: Callable[[], Awaitable[None]]
 
 
 def oldest_s(stations, life_s, behind_s, lives):
@@ -28,7 +36,7 @@ def oldest_s(stations, life_s, behind_s, lives):
                 kept_s[number] = clock()
 
             seen = SimpleNamespace(seen_until_ns=round(kept_s[number] * NS_PER_S))
-            return SimpleNamespace(detector=seen, keep_aside=keep_aside)
+            return Judge(seen, keep_aside)
 
         intake = SimpleNamespace(is_behind=lambda _: clock() < begun_s + behind_s)
         with contextlib.suppress(TimeoutError):
@@ -58,12 +66,12 @@ def test_a_station_that_stays_behind_keeps_no_other_from_its_turn():
         async def keep_aside():
             kept.append(number)
 
-        return SimpleNamespace(detector=SimpleNamespace(seen_until_ns=number), keep_aside=keep_aside, number=number)
+        return Judge(SimpleNamespace(seen_until_ns=number), keep_aside)
 
     async def run():
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(2.0 * PERIOD_S - 1.0):
-                intake = SimpleNamespace(is_behind=lambda one: one.number == 0)
+                intake = SimpleNamespace(is_behind=lambda one: one.detector.seen_until_ns == 0)
                 await keep_in_turn([judge(number) for number in range(3)], intake, PERIOD_S)
 
     run_virtual(run())
