@@ -178,7 +178,7 @@ class Hypotheses:
         return any(self._is_within(one.evidence.residuals - residuals, 1.0) for one in self.possible)
 
     def settle(self) -> None:
-        """Take what may be the answer to where the recording is likeliest: the best, and others if they tell another.
+        """Take what may be the answer to where the recording is likeliest, as long as another answer is near.
 
         A fit is where another loss is least. What a step along the slopes gains is replayed, and weighed anew.
         """
@@ -186,9 +186,8 @@ class Hypotheses:
         while True:
             ranked = sorted([*self.weighed, *self._unnamed], key=lambda one: -one.evidence.log)
             near = [one for one in ranked[:FLEXED] if _at_most(one) >= ranked[0].evidence.log]
-            near = near if len({one.told for one in near}) > 1 else ranked[:1]
             leading = [one for one in near if id(one) not in settled]
-            if not leading:
+            if not leading or len({one.told for one in near}) == 1:
                 return
             after = {id(one): found for one, found in zip(leading, self._each(self._settled, leading), strict=True)}
             settled |= {id(one) for one in after.values()}

@@ -173,13 +173,18 @@ def test_a_promise_that_no_replay_keeps_does_not_count(alpha, monkeypatch):
     friction, lift = (of_all(alpha, name) for name in ("friction_bias", "static_head_bias"))
     _, _, hypotheses, trials = searched(traces, alpha, [friction, lift])
     hypotheses.add(trials.singles())
-    best = hypotheses.weighed[0]
-    promised = replace(best, evidence=replace(best.evidence, log=best.evidence.log + 500.0, gained=500.0))
-    tried = replace(best, evidence=replace(best.evidence, log=best.evidence.log - 1.0, gained=0.0))
-    monkeypatch.setattr(hypotheses, "_steps", lambda _: iter([tried]))
-    monkeypatch.setitem(hypotheses._best, best.effects, promised)
+    log = hypotheses.of(["friction_bias"]).evidence.log
+
+    def at(one, log, gained):
+        return replace(one, evidence=replace(one.evidence, log=log, gained=gained))
+
+    for name, promised in (("friction_bias", 5.0), ("static_head_bias", 600.0)):
+        one = hypotheses.of([name])
+        monkeypatch.setitem(hypotheses._best, one.effects, at(one, log + 10.0, promised))
+    monkeypatch.setattr(hypotheses, "_steps", lambda one: iter([at(one, log - 1000.0, 0.0)]))
     hypotheses.settle()
-    assert hypotheses.of(best.effects).evidence.log == best.evidence.log
+    assert hypotheses.of(["friction_bias"]).evidence.log == pytest.approx(log + 5.0)
+    assert hypotheses.of(["static_head_bias"]).evidence.log == pytest.approx(log - 590.0)
 
 
 def test_a_correction_that_says_what_a_set_says_is_that_set(alpha):
