@@ -146,8 +146,8 @@ def attribute(
     while verdict_of(posterior := weighed(unnamed)) == "effect":
         names = best_set(posterior)
         likely, telling = hypotheses.of(names), hypotheses.telling(names)
-        if are_sized(telling.fit, ends_of(telling), names):
-            own, own_ends = in_order(fitter, likely.fit, ends_of(likely))
+        if are_sized(telling.fit, its_ends := ends_of(telling), names):
+            own, own_ends = in_order(fitter, likely.fit, its_ends if telling is likely else ends_of(likely))
             ends, accepted = own_ends, informed(fitter, own, priors)
             break
         hypotheses.rule_out(names)
