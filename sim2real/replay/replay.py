@@ -241,7 +241,7 @@ class Replay:
         is_held = observer.level_m is not traces.level_m
         observer = self._of_lagging_level(observer, plant.sensors[LEVEL])
         observer = observer.of_late_level(int(plant.sensors[LEVEL].delay_s))
-        told_m = later(traces.level_m, -int(plant.sensors[LEVEL].delay_s))
+        told_m = traces.level_m[int(plant.sensors[LEVEL].delay_s) :]
         first = told_m[np.isfinite(told_m)][:FIRST]  # a single value may be wrong
         first_level_m = float(np.median(first)) if first.size else self.station.middle_level_m
         level_m = np.empty(traces.seconds)

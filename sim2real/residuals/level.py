@@ -9,7 +9,7 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, START_RAMP, STOP_RAMP, Regimes, first_runs
-from wetwell.sim2real.recording.seconds import is_change, repeated
+from wetwell.sim2real.recording.seconds import repeated
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer, level_noise_m
 from wetwell.sim2real.replay.replay import Doubt, Prediction
@@ -56,9 +56,7 @@ def level_residuals(
     counted = np.isfinite(traces.level_m)
     counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
     counted &= ~_has_no_past(traces, regimes)
-    pattern = patterns.get("level_m")
-    if pattern is not None and pattern.deadband > 0.0:  # nobody knows when the first value was sent
-        counted &= np.cumsum(is_change(traces.level_m)) > 0
+    counted &= np.cumsum(np.isfinite(doubt.observer.level_m)) > 0  # of a level that is held, its first change
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
@@ -89,7 +87,7 @@ def level_residuals(
         seconds=seconds,
         recorded=traces.level_m[seconds.second],
         is_repeated=repeated(traces.level_m)[seconds.second],
-        pattern=pattern,
+        pattern=patterns.get("level_m"),
     )
 
 
