@@ -14,14 +14,18 @@ FROM_S = 7_200
 """The observer knows the inflow from then on."""
 
 
-def replayed(alpha, deadband_m, *, has_inflow=False, begin_s=0):
+def replayed(alpha, deadband_m, *, has_inflow=False, begin_s=0, every=1):
     sent = EffectTable(name="report_by_exception", channel="level_m", deadband=deadband_m)
     simulation = Simulation(alpha.model_copy(update={"effect": (sent,)}), Scenario(name="plain"), 7, 0)
     recording = simulation.advance(21_600, truth=True)
     columns = {
-        name: values[begin_s:] for name, values in recording.columns.items() if has_inflow or name != "inflow_m3h"
+        name: values[begin_s::every]
+        for name, values in recording.columns.items()
+        if has_inflow or name != "inflow_m3h"
     }
-    replay = Replay(traces_of(type(recording)(time_ns=recording.time_ns[begin_s:], columns=columns), alpha), alpha)
+    replay = Replay(
+        traces_of(type(recording)(time_ns=recording.time_ns[begin_s::every], columns=columns), alpha), alpha
+    )
     return replay, recording.truth["truth_level_m"][begin_s:]
 
 
@@ -46,3 +50,10 @@ def test_it_knows_the_level_from_the_first_value_that_was_sent_since_the_recordi
     first_s = np.flatnonzero(np.diff(replay.traces.level_m))[0] + 1
     assert np.max(np.abs(error_m[:first_s])) < 0.08
     assert np.max(np.abs(error_m[first_s + 1 : first_s + 600])) < 0.02
+
+
+@pytest.mark.parametrize("every", [1, 10])
+def test_a_level_that_comes_late_begins_with_its_first_value(alpha, every):
+    replay, true_m = replayed(alpha, 0.0, has_inflow=True, every=every)
+    delayed = replay.run([EFFECTS["channel_delay"](channel="level_m", delay_s=20.0)])
+    assert delayed.level_m[20] == pytest.approx(true_m[20], abs=0.08)
