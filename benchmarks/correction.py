@@ -111,7 +111,7 @@ def measured(seed: int, number: int, hours: float, kinds: tuple[CaseKind, ...]) 
     traces = traces_of(recording, station)
     replay = Replay(traces, station)
     regimes = regimes_of(traces, station)
-    residuals = StationResiduals(traces, station, regimes, replay.run(), replay.doubt())
+    residuals = StationResiduals(traces, station, regimes, replay.run(), replay.doubt)
     begin = time.perf_counter()
     taken, why = weighed(learn(replay, residuals), residuals.bins, replay.run().plant, np.random.default_rng(0))
     row: dict[str, Any] = {"case": number, "kind": case.kind, "plant": case.plant, "names": list(case.names)}

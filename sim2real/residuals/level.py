@@ -56,7 +56,11 @@ def level_residuals(
     counted = np.isfinite(traces.level_m)
     counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
     counted &= ~_has_no_past(traces, regimes)
-    counted &= np.cumsum(np.isfinite(doubt.observer.level_m)) > 0  # of a level that is held, its first change
+    told, recorded_m = np.isfinite(doubt.observer.level_m), traces.level_m
+    counted &= np.cumsum(told) > 0  # of a level that is held, its first change
+    if "level_m" in patterns and patterns["level_m"].told == "by steps":
+        counted &= told
+        recorded_m = doubt.observer.level_m
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
@@ -85,7 +89,7 @@ def level_residuals(
         name="level_m",
         pump=NO_PUMP,
         seconds=seconds,
-        recorded=traces.level_m[seconds.second],
+        recorded=recorded_m[seconds.second],
         is_repeated=repeated(traces.level_m)[seconds.second],
         pattern=patterns.get("level_m"),
     )

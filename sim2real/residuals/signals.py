@@ -24,6 +24,7 @@ from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, NO_PUMP, POWER, Bins, Seconds, binned
 from wetwell.sim2real.residuals.drained import is_drained
+from wetwell.sim2real.residuals.driven import does_work
 from wetwell.sim2real.residuals.noise import BLOCK_S, Noise, configured_noise, noise_of
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import PlantParameters
@@ -78,7 +79,7 @@ class SignalResiduals:
                 nearest = np.clip(self.recorded, low[self.seconds.second], high[self.seconds.second])
                 error = np.where(self.is_repeated, self.recorded - nearest, error)
             held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
-            allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum)
+            allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum) * (self.pattern.told != "by steps")
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
         if sensor.cutoff > 0.0:
             error -= _cut(self.recorded, values[self.seconds.second], sensor.cutoff)
@@ -136,8 +137,10 @@ def pump_residuals(
     block = max(round(BLOCK_S / traces.rate_s), 1)
     has_water = ~is_drained(traces, station, plain)
     has_past = ~first_runs(traces, regimes)
+    has_head = does_work(traces, regimes, plain) if traces.span_s == 1 else np.ones(is_ramp.shape, dtype=np.bool_)
     found = []
     for name, recorded in traces.signals.items():
+        counts = is_shown & has_water & has_past & (has_head | (name != "head_m"))
         expected = plain.signals[name]
         noise = noise_of(_steady_ratios(recorded, expected, regimes, has_lost), configured[name], TOLERANCE, block)
         for pump in range(traces.pumps):
@@ -146,7 +149,7 @@ def pump_residuals(
                 open_ = np.hypot(open_, doubt.signals[name][pump])
             if traces.span_s > 1:
                 open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
-            known = np.where(is_shown[pump] & has_water & has_past[pump], recorded[pump], np.nan)
+            known = np.where(counts[pump], recorded[pump], np.nan)
             one = _one_pump(
                 name, pump, known, expected[pump], open_, regimes, noise, station.materiality, patterns.get(name)
             )

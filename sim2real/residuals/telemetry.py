@@ -9,7 +9,7 @@ from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.replay.replay import Prediction, Told
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
 from wetwell.sim2real.residuals.noise import configured_noise
 from wetwell.simulator.telemetry.channels import channels_of
@@ -72,6 +72,13 @@ class Pattern:
     def is_usual(self) -> bool:
         """Whether values are just stored in steps that are usual: that is no gap of the model."""
         return self.deadband == 0.0 and self.quantum <= USUAL_STEP_M
+
+    @property
+    def told(self) -> Told:
+        """How its values tell what is measured."""
+        if self.is_usual:
+            return "by each value"
+        return "by changes" if self.deadband > 0.0 else "by steps"
 
     def rounding(self, acting: float) -> float:
         """Step of the values that is excused: a usual one in any case, else as much of it as acts."""
