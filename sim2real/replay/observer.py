@@ -7,10 +7,10 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.seconds import noise_by_bends
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.inflow_process import InflowProcess
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW, MOST_FOLLOWED, Uncertain, level_filter
+from wetwell.sim2real.replay.level_noise import told_noise_m
 from wetwell.sim2real.replay.metered_inflow import MeteredInflow
 from wetwell.simulator.parameters import SensorParameters, plant_parameters
 
@@ -20,8 +20,6 @@ LOST_S = 300
 """After that long without a level, and more than two rows, the observer begins anew."""
 FIRST_SHARE = 0.5
 """Standard deviation of an inflow before anything is known of it, as a share of what a pump carries."""
-MIN_NOISE_M = 1e-4
-"""Standard deviation of a level sensor at the least: a reading without any noise is rounded. [m]"""
 RANGE = (0.05, 0.95)
 """Quantiles of the level between which the wet well is emptied and filled."""
 
@@ -43,6 +41,8 @@ class Observer:
         constant, as with a measured inflow of each second; infinite where the level is not predicted at all. [m]
     process : InflowProcess or None
         From which the gains of a lag come; None where they are constant, or those of a lag.
+    is_of_steps : bool
+        Whether the level is rounded, and known when it passes from one step to the next: no other value counts.
     inflow_kept : float
         Share of what was given to the inflow that is left after a second: errors of its readings go over. [1]
     """
@@ -53,6 +53,7 @@ class Observer:
     sensor_gain: Floats
     deviation_m: Floats | None
     process: InflowProcess | None = None
+    is_of_steps: bool = False
     inflow_kept: float = 1.0
 
     def of_late_level(self, late_s: int) -> "Observer":
@@ -189,7 +190,7 @@ def uncertain_of(traces: Traces, station: Station, metered: MeteredInflow | None
     uncertain = Uncertain(
         is_known=np.isfinite(level_m),
         open_m2=_since_last_row(open_m2, traces.is_row),
-        noise_m2=level_noise_m(traces, station) ** 2,
+        noise_m2=told_noise_m(traces, station, level_m) ** 2,
         drift_m2_s3=0.0,
         waves_m2_s=0.0,
         first_m2_s2=(FIRST_SHARE * float(speed_m_s.max())) ** 2,
@@ -275,22 +276,3 @@ def _leave(
         if is_known[k]:
             level -= level_gain[k] * left_m[k]
             inflow -= inflow_gain[k] * left_m[k]
-
-
-def level_noise_m(traces: Traces, station: Station) -> float:
-    """Standard deviation of the level sensor's noise, from rows between which nothing is switched. [m]."""
-    level_m = traces.level_m
-    if not traces.is_each_second:
-        moved = np.any(np.diff(traces.frequency_hz, axis=1, prepend=traces.frequency_hz[:, :1]) != 0.0, axis=0)
-        moves = np.cumsum(moved)[traces.is_row]
-        level_m = level_m[traces.is_row]
-    bends = np.diff(level_m, n=2)
-    if not traces.is_each_second:
-        bends = bends[moves[2:] == moves[:-2]]
-    seen_m = noise_by_bends(bends[np.isfinite(bends)])
-    return max(seen_m, least_noise_m(station))
-
-
-def least_noise_m(station: Station) -> float:
-    """What a level sensor has at the least, whatever its rows show: half of what the station file says. [m]."""
-    return max(0.5 * station.sensors.level_noise_m, MIN_NOISE_M)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -20,13 +19,13 @@ from wetwell.sim2real.replay.changing import Acting, Changing, in_period
 from wetwell.sim2real.replay.inflow_process import MOST_SQUARE, InflowProcess, learnt_process
 from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW
+from wetwell.sim2real.replay.level_noise import least_noise_m, told_by_steps_m
 from wetwell.sim2real.replay.metered_inflow import metered_inflow
 from wetwell.sim2real.replay.observer import (
     Observer,
     constant_observer,
     forced_observer,
     hides_cycles,
-    least_noise_m,
     row_observer,
     uncertain_of,
 )
@@ -36,10 +35,6 @@ from wetwell.simulator.forcing import Forcing, healthy_forcing
 from wetwell.simulator.parameters import PlantParameters, PlantRecords, SensorParameters, plant_parameters
 from wetwell.simulator.state import first_state, still_truth
 from wetwell.simulator.telemetry.channels import channels_of
-
-Told = Literal["by each value", "by changes", "by steps"]
-"""How a recording tells the level: each value is one; only one that changes is, as of a channel that is held within a
-deadband; or one that changes is midway between the two, as of one that is rounded."""
 
 FIRST = 5
 """Values of the level from which the observer begins."""
@@ -117,7 +112,11 @@ class Replay:
         self._columns(self._plant(self.own).columns)  # a station file that cannot be replayed is told at once
         self._kept: tuple[_Run, ...] = ()
         self._lagging: _Lagging | None = None
-        self.observer = self._observer_of(traces.level_m)
+        told_m = told_by_steps_m(traces)
+        if told_m is None:
+            self.observer = self._observer_of(traces.level_m)
+        else:
+            self.observer = replace(self._begun_anew(told_m), is_of_steps=True)
 
     def run(self, effects: Sequence[Acting] = ()) -> Prediction:
         """Predict under effects; of those that change from period to period, the plant is that of the last.
@@ -159,14 +158,14 @@ class Replay:
         read = self._run(acting, plant).reading
         return np.array([later(one, _delay_s(plant, name)) for name, one in zip(PUMP_METERS, read, strict=True)])
 
-    def doubt(self, told: Told) -> Doubt:
+    def doubt(self, is_level_held: bool) -> Doubt:
         r"""What the moments that the rows do not show, or how the level is told, leave open in what is predicted.
 
         $$\sigma^2 = \frac{(y_\text{early} - y_\text{late})^2 + (y_\text{long} - y_\text{short})^2}{24}$$
 
         for starts and stops that lie anywhere in what is possible, one as likely as another, each by itself.
         """
-        observer = self._observer_where(told)
+        observer = self._observer_of_changes if is_level_held else self.observer
         placements = self.traces.drives.placements
         if not placements:
             return Doubt(level_m=observer.deviation_m, signals={}, observer=observer)
@@ -207,7 +206,7 @@ class Replay:
 
     def _run(self, acting: Sequence[Effect], plant: PlantParameters) -> _Run:
         """Run of the kernel; one that is kept, where the plant differs from its plant in nothing that it reads."""
-        told = _told(plant.sensors[LEVEL])
+        is_held = plant.sensors[LEVEL].deadband > 0.0
         frequency_delay_s = _delay_s(plant, "frequency_hz")
         forces = tuple(effect for effect in acting if type(effect).force is not Effect.force)
         records = _records(plant)
@@ -221,11 +220,11 @@ class Replay:
         delays_s = (frequency_delay_s, plant.sensors[LEVEL].delay_s, plant.sensors[INFLOW].delay_s)
         station, profile = np.asarray(records.station).tolist(), np.asarray(records.profile).tolist()
         corrections = (plant.corrections, plant.columns)
-        key = (station, plant.mains, plant.pumps, profile, read, told, delays_s, corrections, forces)
+        key = (station, plant.mains, plant.pumps, profile, read, is_held, delays_s, corrections, forces)
         for run in self._kept:
             if run.key == key:
                 return run
-        observer = self._observer_where(told)
+        observer = self._observer_of_changes if is_held else self.observer
         level_m, reading = self._computed(acting, plant, records, self.traces.frequency_hz, observer)
         run = _Run(key=key, level_m=level_m, reading=reading)
         self._kept = (*self._kept[1 - KEPT_RUNS :], run)
@@ -277,19 +276,10 @@ class Replay:
             last = self._lagging = _Lagging(of=observer, lag=lag, observer=observer.of_lagging_level(sensor))
         return last.observer
 
-    def _observer_where(self, told: Told) -> Observer:
-        if told == "by each value":
-            return self.observer
-        return self._observer_of_changes if told == "by changes" else self._observer_of_steps
-
     @cached_property
     def _observer_of_changes(self) -> Observer:
         level_m = self.traces.level_m
         return self._begun_anew(np.where(is_change(level_m), level_m, np.nan))
-
-    @cached_property
-    def _observer_of_steps(self) -> Observer:
-        return self._begun_anew(steps_m(self.traces.level_m))
 
     def _begun_anew(self, level_m: Floats) -> Observer:
         """Observer of some values of the level, that begins with the first of them."""
@@ -361,32 +351,6 @@ class Replay:
             if column not in self._courses:
                 self._courses[column] = course_of(self.traces, column)
         return np.array([self._courses[column] for column in columns]).reshape(len(columns), self.traces.seconds)
-
-
-def _told(sensor: SensorParameters) -> Told:
-    if sensor.deadband > 0.0:
-        return "by changes"
-    return "by steps" if sensor.quantum > 0.0 else "by each value"
-
-
-def steps_m(level_m: Floats) -> Floats:
-    """(n,) levels where a rounded value is another one than before, NaN elsewhere.
-
-    Half a second before, in the mean, it was midway between the two: it goes on from there as it does between that
-    moment and the like of the nearer neighbour.
-
-    Examples
-    --------
-    >>> steps_m(np.array([1.0, 1.0, np.nan, 1.2, 1.2, 1.4]))
-    array([ nan,  nan,  nan, 1.15,  nan, 1.35])
-    """
-    known, second = np.flatnonzero(np.isfinite(level_m)), np.flatnonzero(is_change(level_m))
-    told_m = np.full(level_m.size, np.nan)
-    midway_m = 0.5 * (level_m[second] + level_m[known[np.searchsorted(known, second) - 1]])
-    rates_m_s = np.diff(midway_m) / np.diff(second)
-    before_m_s, after_m_s = np.r_[0.0, rates_m_s], np.r_[rates_m_s, 0.0]
-    told_m[second] = midway_m + 0.5 * np.where(np.abs(before_m_s) > np.abs(after_m_s), before_m_s, after_m_s)
-    return told_m
 
 
 def _settled(regime: Integers) -> Flags:

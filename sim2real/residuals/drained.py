@@ -5,7 +5,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.observer import level_noise_m
+from wetwell.sim2real.replay.level_noise import level_noise_m
 from wetwell.sim2real.replay.replay import Prediction
 
 DRAINED_S = 2.0

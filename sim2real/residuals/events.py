@@ -11,7 +11,7 @@ from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
 from wetwell.sim2real.recording.traces import BETWEEN, Traces
-from wetwell.sim2real.replay.observer import level_noise_m
+from wetwell.sim2real.replay.level_noise import level_noise_m
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.sim2real.residuals.signals import QUANTUM_SHARE

@@ -11,7 +11,8 @@ from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, START_RAMP, STOP_RAMP, Regimes, first_runs
 from wetwell.sim2real.recording.seconds import repeated
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer, level_noise_m
+from wetwell.sim2real.replay.level_noise import told_noise_m
+from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer
 from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import LEVEL, NO_PUMP, Seconds, binned
 from wetwell.sim2real.residuals.signals import UNRESOLVED, SignalResiduals, steps
@@ -56,15 +57,13 @@ def level_residuals(
     counted = np.isfinite(traces.level_m)
     counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
     counted &= ~_has_no_past(traces, regimes)
-    told, recorded_m = np.isfinite(doubt.observer.level_m), traces.level_m
-    counted &= np.cumsum(told) > 0  # of a level that is held, its first change
-    if "level_m" in patterns and patterns["level_m"].told == "by steps":
-        counted &= told
-        recorded_m = doubt.observer.level_m
+    is_told, is_of_steps = np.isfinite(doubt.observer.level_m), doubt.observer.is_of_steps
+    counted &= is_told if is_of_steps else np.cumsum(is_told) > 0  # of a level that is held, its first change
+    recorded_m = doubt.observer.level_m if is_of_steps else traces.level_m
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
-    noise_m2 = level_noise_m(traces, station) ** 2 / seconds.counts
+    noise_m2 = told_noise_m(traces, station, doubt.observer.level_m) ** 2 / seconds.counts
     if doubt.level_m is not None:
         noise_m2 = seconds.means_of(doubt.level_m[seconds.second] ** 2) / seconds.counts
     if traces.inflow_m3h is None:
@@ -91,7 +90,7 @@ def level_residuals(
         seconds=seconds,
         recorded=recorded_m[seconds.second],
         is_repeated=repeated(traces.level_m)[seconds.second],
-        pattern=patterns.get("level_m"),
+        pattern=None if is_of_steps else patterns.get("level_m"),
     )
 
 

@@ -79,7 +79,7 @@ class SignalResiduals:
                 nearest = np.clip(self.recorded, low[self.seconds.second], high[self.seconds.second])
                 error = np.where(self.is_repeated, self.recorded - nearest, error)
             held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
-            allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum) * (self.pattern.told != "by steps")
+            allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum)
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
         if sensor.cutoff > 0.0:
             error -= _cut(self.recorded, values[self.seconds.second], sensor.cutoff)

@@ -9,7 +9,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import Regimes
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.replay import Doubt, Prediction, Told
+from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import Bins, joined
 from wetwell.sim2real.residuals.events import event_residuals
 from wetwell.sim2real.residuals.level import level_residuals
@@ -37,7 +37,7 @@ class StationResiduals:
     plain : Prediction
         Of the station as it is.
     doubt_where : callable
-        What a right model may be off, by how the recording tells the level.
+        What a right model may be off, by whether the level is held.
     """
 
     def __init__(
@@ -46,11 +46,11 @@ class StationResiduals:
         station: Station,
         regimes: Regimes,
         plain: Prediction,
-        doubt_where: Callable[[Told], Doubt],
+        doubt_where: Callable[[bool], Doubt],
     ) -> None:
         self.telemetry = telemetry_residuals(traces, station, regimes)
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
-        doubt = doubt_where(patterns["level_m"].told if "level_m" in patterns else "by each value")
+        doubt = doubt_where("level_m" in patterns and patterns["level_m"].deadband > 0.0)
         self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, doubt, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
             level = level_residuals(traces, station, regimes, plain, doubt, patterns)

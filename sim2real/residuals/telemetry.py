@@ -9,7 +9,8 @@ from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Sensors, Station
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP, Regimes
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.replay import Prediction, Told
+from wetwell.sim2real.replay.lattice import lattice
+from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
 from wetwell.sim2real.residuals.noise import configured_noise
 from wetwell.simulator.telemetry.channels import channels_of
@@ -38,16 +39,7 @@ IN_RAMPS = (0.1, 1.4)
 """Shares between which a deadband may be that was seen in the steps of ramps, whose smallest may be far over it."""
 BY_TIME = (0.6, np.inf)
 """Shares of the largest move of a value whose time was up between which its deadband may be."""
-LATTICE_SHARE = 0.98
 MIN_QUANTUM_M = 0.0015
-STORED_STEPS = (0.01, 0.005, 0.001)
-"""Steps in which a historian stores what came in coarser ones. [m]"""
-COARSE = 1.25
-"""Steps of storage that the sensor's step has at least: of a finer one nearly each level is stored. [1]"""
-BY_CHANCE = 1e-3
-"""Probability with which levels that lie anywhere may seem to be in steps. [1]"""
-FINENESS = 0.05
-"""Of the steps that are tried: how far they shift the last level, over the step of storage."""
 USUAL_STEP_M = 0.0101
 """Historians store a level to the millimetre or the centimetre: nobody's fault. [m]"""
 STRENGTH = 12.0
@@ -72,13 +64,6 @@ class Pattern:
     def is_usual(self) -> bool:
         """Whether values are just stored in steps that are usual: that is no gap of the model."""
         return self.deadband == 0.0 and self.quantum <= USUAL_STEP_M
-
-    @property
-    def told(self) -> Told:
-        """How its values tell what is measured."""
-        if self.is_usual:
-            return "by each value"
-        return "by changes" if self.deadband > 0.0 else "by steps"
 
     def rounding(self, acting: float) -> float:
         """Step of the values that is excused: a usual one in any case, else as much of it as acts."""
@@ -154,7 +139,7 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
         moves = _moves(parts, is_ramp)
         if moves.all.size < FEWEST:
             continue
-        quantum = _lattice(np.concatenate(parts))
+        quantum = lattice(np.concatenate(parts))
         if quantity == "level_m" and quantum >= MIN_QUANTUM_M and moves.all.size >= MIN_MOVES:
             found.append(Pattern(quantity=quantity, quantum=quantum))
         if moves.held_share > HELD_SHARE:
@@ -165,7 +150,7 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
 
 def _patterns_of_rows(traces: Traces) -> list[Pattern]:
     """Lattice of the level; rows tell of no deadband, since what is held for less than one is not repeated."""
-    quantum = _lattice(traces.level_m[traces.is_row]) if np.isfinite(traces.level_m).any() else 0.0
+    quantum = lattice(traces.level_m[traces.is_row]) if np.isfinite(traces.level_m).any() else 0.0
     is_rounded = quantum >= MIN_QUANTUM_M and traces.span_s == 1
     return [Pattern(quantity="level_m", quantum=quantum)] if is_rounded else []
 
@@ -246,56 +231,3 @@ def _has_edge(jumps: Floats) -> bool:
         return False
     few, smallest, more, middle = (float(q) for q in np.quantile(jumps, [0.05, SMALL, 0.2, 0.5]))
     return smallest > DEAD_ZONE * middle or smallest < EDGE * few or more < EDGE * smallest
-
-
-def _lattice(values: Floats) -> float:
-    """Step of the lattice that values lie on, 0 without one; a coarse one may have been stored in finer steps."""
-    levels = np.unique(np.round(values[np.isfinite(values)], 9))
-    steps = np.diff(levels)
-    levels, steps = levels[np.r_[True, steps > 1e-7]], steps[steps > 1e-7]
-    if steps.size == 0 or levels.size > 0.2 * np.isfinite(values).sum():
-        return 0.0
-    step = float(np.median(steps[steps < 1.5 * steps.min()]))
-    off = np.abs(steps / step - np.round(steps / step))
-    if float(np.mean(off < 0.02)) > LATTICE_SHARE:
-        is_stored = step < COARSE * _stored_step(levels)
-        return (_coarse_step(levels, step) if is_stored else 0.0) or step
-    return _coarse_step(levels, float(steps.min()))
-
-
-def _coarse_step(levels: Floats, least: float) -> float:
-    """Largest step that all levels lie on within half of the step in which they were stored, 0 without one.
-
-    Each level has a place of its own. The finer the sensor's step is than two steps of storage, the more levels
-    follow each other that are one apart. If levels were anywhere, hardly ever would all lie so near to those of one
-    of the steps that are tried.
-    """
-    stored = _stored_step(levels)
-    if stored == 0.0:
-        return 0.0
-    reach, run = float(levels[-1] - levels[0]), _longest_run(np.diff(levels) < COARSE * stored)
-    longest = min(least + stored, (1.0 + 1.0 / run) * stored) if run else least + stored
-    finest, near = FINENESS * stored * least / reach, (0.5 + FINENESS) * stored
-    for step in np.arange(longest, max(least - stored, COARSE * stored), -finest):
-        if reach / stored * (2.0 * near / step) ** levels.size > BY_CHANCE:
-            break
-        turns = np.exp(2j * np.pi * levels / step)
-        off = np.angle(turns / np.mean(turns)) / (2.0 * np.pi) * step
-        place = np.round((levels - off - levels[0] + off[0]) / step)
-        if 0.5 * float(np.ptp(off)) < near and np.diff(place).min() > 0.0:
-            return float(np.polyfit(place, levels, 1)[0])
-    return 0.0
-
-
-def _longest_run(flags: Flags) -> int:
-    """Most flags in a row."""
-    ends = np.flatnonzero(np.diff(np.r_[False, flags, False]))
-    return int(np.max(ends[1::2] - ends[::2], initial=0))
-
-
-def _stored_step(levels: Floats) -> float:
-    """Largest power of ten, or half of one, of which all levels are multiples; 0 if there is none."""
-    for step in STORED_STEPS:
-        if float(np.max(np.abs(levels / step - np.round(levels / step)))) < 1e-3:
-            return step
-    return 0.0

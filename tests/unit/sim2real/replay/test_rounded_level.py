@@ -1,4 +1,4 @@
-"""A level that is rounded is known when it changes: it is midway then."""
+"""A level that is rounded is known when it passes from one step to the next: it is midway then."""
 
 from dataclasses import replace
 
@@ -7,47 +7,89 @@ import pytest
 
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
-from wetwell.sim2real.replay.replay import Replay, steps_m
+from wetwell.sim2real.replay.level_noise import told_by_steps_m
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.replay.steps import steps_m
 from wetwell.sim2real.residuals.bins import LEVEL
 from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.sim2real.truth.storage import Storage, stored
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
 FROM_S = 3_600
 """The observer knows the inflow from then on."""
+SECONDS = 43_200
+
+
+@pytest.fixture(scope="module")
+def recording(alpha):
+    return Simulation(alpha, Scenario(name="plain"), 7, 0).advance(SECONDS)
+
+
+def rounded(recording, station, quantum_m, *, is_metered=True):
+    traces = traces_of(recording, station)
+    level_m = np.round(traces.level_m / quantum_m) * quantum_m
+    return replace(traces, level_m=level_m, inflow_m3h=traces.inflow_m3h if is_metered else None)
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.001, 0.004, 0.008])
+@pytest.mark.parametrize("rate_m_s", [0.00031, -0.0021, 0.0147])
+def test_a_level_that_moves_evenly_is_told_without_a_bias(noise_m, rate_m_s):
+    true_m = 2.0 + rate_m_s * np.arange(round(1.0 / abs(rate_m_s)))
+    reading_m = true_m + noise_m * np.random.default_rng(3).standard_normal(true_m.size)
+    told_m = steps_m(np.round(reading_m / 0.02) * 0.02)
+    error_m = (told_m - true_m)[np.isfinite(told_m)]
+    assert np.abs(error_m.mean()) < 3.0 * error_m.std() / np.sqrt(error_m.size) + 1e-4
+    assert error_m.std() < 1.4 * max(noise_m, 0.5 * abs(rate_m_s))
+
+
+def test_a_level_that_turns_within_a_step_passes_it_twice():
+    reading_m = np.r_[np.full(30, 1.0), 1.1, 1.0, np.full(20, 1.1), 1.0, np.full(30, 1.0)]
+    told_m = steps_m(reading_m)
+    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(told_m)), [31, 52])
+    np.testing.assert_allclose(told_m[[31, 52]], 1.05)
+
+
+def test_a_level_without_a_change_tells_nothing():
+    assert np.isnan(steps_m(np.array([1.0, np.nan, 1.0]))).all()
 
 
 @pytest.mark.parametrize(
-    ("is_metered", "quantum_m", "most"),
-    [(True, 0.015, 1.2), (True, 0.06, 1.0), (False, 0.015, 0.8), (False, 0.06, 0.5)],
+    ("is_metered", "quantum_m", "most_m"),
+    [(True, 0.015, 0.0005), (True, 0.06, 0.001), (False, 0.015, 0.004), (False, 0.06, 0.008)],
 )
-def test_by_its_steps_a_rounded_level_is_followed_closer_than_by_its_values(alpha, is_metered, quantum_m, most):
-    """With an inflow meter either does: steps of all seconds average out."""
-    rounding = EFFECTS["level_quantisation"](quantum_m=quantum_m)
-    station = alpha.model_copy(update={"effect": (rounding,)})
-    recording = Simulation(station, Scenario(name="plain"), 7, 0).advance(43_200)
-    traces = traces_of(recording, alpha)
-    replay = Replay(traces if is_metered else replace(traces, inflow_m3h=None), alpha)
-    true_m = recording.truth["truth_level_m"][FROM_S:]
-    by_steps_m, by_values_m = (
-        np.sqrt(np.mean((replay.run(effects).level_m[FROM_S:] - true_m) ** 2)) for effects in ((rounding,), ())
-    )
-    assert by_steps_m < most * by_values_m
+def test_a_rounded_level_is_followed_closer_than_its_steps(recording, alpha, is_metered, quantum_m, most_m):
+    replay = Replay(rounded(recording, alpha, quantum_m, is_metered=is_metered), alpha)
+    assert replay.observer.is_of_steps
+    error_m = (replay.run().level_m - recording.truth["truth_level_m"])[FROM_S:]
+    assert np.sqrt(np.mean(error_m**2)) < most_m
 
 
-def test_a_level_in_steps_counts_where_it_changes_and_midway(alpha):
-    rounding = EFFECTS["level_quantisation"](quantum_m=0.02)
-    station = alpha.model_copy(update={"effect": (rounding,)})
-    traces = replace(
-        traces_of(Simulation(station, Scenario(name="plain"), 7, 0).advance(21_600, truth=False), alpha),
-        inflow_m3h=None,
-    )
+@pytest.mark.parametrize(
+    ("quantum_m", "is_told_by_steps"), [(0.001, False), (0.003, False), (0.01, True), (0.03, True)]
+)
+def test_steps_count_where_noise_does_not_hide_them(recording, alpha, quantum_m, is_told_by_steps):
+    """The noise of the level is 2 mm."""
+    told_m = told_by_steps_m(rounded(recording, alpha, quantum_m))
+    assert (told_m is not None) == is_told_by_steps
+
+
+def test_a_level_that_is_held_or_comes_in_slow_rows_is_not_told_by_steps(recording, alpha):
+    holding = EFFECTS["report_by_exception"](channel="level_m", deadband=0.05)
+    station = alpha.model_copy(update={"effect": (holding,)})
+    held = Simulation(station, Scenario(name="plain"), 7, 0).advance(SECONDS, truth=False)
+    assert told_by_steps_m(rounded(held, alpha, 0.01)) is None
+    slow = traces_of(stored(recording, Storage(every_s=20, step={"level_m": 0.01})), alpha)
+    assert told_by_steps_m(slow) is None
+
+
+@pytest.mark.parametrize("quantum_m", [0.01, 0.03])
+def test_what_is_left_of_a_rounded_level_is_its_noise(recording, alpha, quantum_m):
+    traces = rounded(recording, alpha, quantum_m, is_metered=False)
     replay, regimes = Replay(traces, alpha), regimes_of(traces, alpha)
     residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt)
-    bins = residuals.bins
-    its = bins.signal == LEVEL
-    is_step = np.isfinite(steps_m(traces.level_m))
-    assert is_step[bins.second[its]].all()
-    left = residuals.of(replay.run([rounding]))[its]
-    assert 0.3 < np.sqrt(np.mean(left**2)) < 1.2
+    its = residuals.bins.signal == LEVEL
+    left = residuals.of(replay.run())[its]
+    assert np.isfinite(steps_m(traces.level_m))[residuals.bins.second[its]].all()
+    assert 0.4 < np.sqrt(np.mean(left**2)) < 1.2

@@ -45,7 +45,7 @@ def test_a_head_counts_only_while_its_pump_works_and_a_flow_always(long_main, al
     replay, regimes = Replay(traces, alpha), regimes_of(traces, alpha)
     plain = replay.run()
     works = does_work(traces, regimes, plain)
-    found = pump_residuals(traces, alpha, regimes, plain, replay.doubt("by each value"), {})
+    found = pump_residuals(traces, alpha, regimes, plain, replay.doubt(is_level_held=False), {})
     for one in found:
         compared = works[one.pump, one.seconds.second]
         assert compared.all() == (one.name == "head_m")

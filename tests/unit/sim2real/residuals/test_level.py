@@ -29,7 +29,7 @@ def unmetered(metered):
 def level_bins(traces, station):
     replay = Replay(traces, station)
     return level_residuals(
-        traces, station, regimes_of(traces, station), replay.run(), replay.doubt("by each value"), {}
+        traces, station, regimes_of(traces, station), replay.run(), replay.doubt(is_level_held=False), {}
     ).bins
 
 

@@ -55,7 +55,9 @@ def test_what_pumps_take_from_a_drained_wet_well_is_not_compared(alpha):
     is_low = (traces.level_m < 0.02) & np.any(traces.frequency_hz > 0.0, axis=0)
     assert is_low.sum() > 60
     replay = Replay(traces, alpha)
-    found = pump_residuals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt("by each value"), {})
+    found = pump_residuals(
+        traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt(is_level_held=False), {}
+    )
     compared = np.unique(np.concatenate([one.seconds.second for one in found]))
     assert not is_low[compared].any()
     is_running = np.any(traces.frequency_hz > 0.0, axis=0)

@@ -1,0 +1,49 @@
+"""When a rounded level passes from one step to the next."""
+
+import numpy as np
+
+from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.sim2real.recording.seconds import is_change
+
+
+def steps_m(level_m: Floats) -> Floats:
+    """(n,) levels in the seconds in which a rounded value passes from one step to the next, NaN elsewhere.
+
+    Then the level is midway between the two. Noise lets the value go to and fro while it passes: the mean of these
+    seconds is the one. Half a second before a change, in the mean, it was midway; it goes on from there as fast as it
+    moves between the passages before and after.
+
+    Examples
+    --------
+    >>> steps_m(np.array([1.0, 1.0, np.nan, 1.2, 1.2, 1.4]))
+    array([ nan,  nan,  nan, 1.15,  nan, 1.35])
+    >>> steps_m(np.array([1.0, 1.0, 1.2, 1.0, 1.2, 1.2]))
+    array([nan, nan, nan, 1.1, nan, nan])
+    """
+    known, second = np.flatnonzero(np.isfinite(level_m)), np.flatnonzero(is_change(level_m))
+    midway_m = 0.5 * (level_m[second] + level_m[known[np.searchsorted(known, second) - 1]])
+    begins = _begins(second, midway_m)
+    passage, midway_m = np.cumsum(begins) - 1, midway_m[begins]
+    mean_s = np.bincount(passage, second) / np.bincount(passage)
+    told_m, told_s = np.full(level_m.size, np.nan), np.rint(mean_s)
+    moves_m = np.diff(midway_m)
+    pauses_s = np.diff(mean_s) * (moves_m != 0.0)  # where it turns, it moves on one side only
+    moved_m, in_s = (np.r_[0.0, each] + np.r_[each, 0.0] for each in (moves_m, pauses_s))
+    told_m[told_s.astype(np.int64)] = midway_m + (0.5 + told_s - mean_s) * moved_m / np.maximum(in_s, 1.0)
+    return told_m
+
+
+def _begins(second: Integers, midway_m: Floats) -> Flags:
+    """(k,) whether a change is the first of a passage.
+
+    An even number of changes about one level is two passages, one up and one down, with the longest pause between.
+    """
+    begins = np.r_[True, np.diff(midway_m) != 0.0][: second.size]
+    first = np.flatnonzero(begins)
+    row, count = np.cumsum(begins) - 1, np.diff(first, append=second.size)
+    pause_s = np.diff(second, prepend=second[:1])
+    may_part = np.flatnonzero((count[row] % 2 == 0) & ((np.arange(second.size) - first[row]) % 2 == 1))
+    by_pause = may_part[np.lexsort((pause_s[may_part], row[may_part]))]
+    is_longest = np.r_[np.diff(row[by_pause]) != 0, True][: by_pause.size]
+    begins[by_pause[is_longest]] = True
+    return np.asarray(begins, dtype=np.bool_)
