@@ -184,8 +184,9 @@ class Hypotheses:
         """
         settled: set[int] = set()
         while True:
-            ranked = sorted([*self.weighed, *self._unnamed], key=lambda one: -one.evidence.log)
-            near = [one for one in ranked[:FLEXED] if _at_most(one) >= ranked[0].evidence.log]
+            likely = [*self.weighed[:FLEXED], *self._likeliest_unnamed()]
+            least = max(one.evidence.log for one in likely)
+            near = [one for one in likely if _at_most(one) >= least]
             leading = [one for one in near if id(one) not in settled]
             if not leading or len({one.told for one in near}) == 1:
                 return
@@ -232,7 +233,7 @@ class Hypotheses:
 
     def unnamed_weights(self) -> list[UnnamedWeight]:
         """Corrections that may be what is unknown, the likeliest."""
-        likely = sorted(self._unnamed, key=lambda one: -one.evidence.log)[:FLEXED]
+        likely = self._likeliest_unnamed()
         return [
             UnnamedWeight(
                 acting=tuple(sorted(fit.names[:-1])),
@@ -244,6 +245,9 @@ class Hypotheses:
             for one, factor in zip(likely, self._each(self._flexible, likely), strict=True)
             for fit, correction in ((one.fit, one.fit.candidates[-1]),)
         ]
+
+    def _likeliest_unnamed(self) -> list[Hypothesis]:
+        return sorted(self._unnamed, key=lambda one: -one.evidence.log)[:FLEXED]
 
     def beside(self, fits: Sequence[Fit]) -> list[Beside]:
         """Fits as what further effects come beside."""

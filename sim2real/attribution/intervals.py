@@ -87,10 +87,12 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
 
 
 def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
-    """Ends that the likelihood brings away from neutral, for an only strength whose interval holds it.
+    """Ends that the likelihood brings away from values at which an effect is none, or another one.
 
     The fit counts all bins alike: what a right level may be off in all steady seconds may be as much as a lag does
     there, though its ramps need the lag. The likelihood weighs them so, and it decided that the effect is there.
+    Where two strengths may stand for each other, as of rags that slow a pump and rags that throttle it, the fit knows
+    nothing of how they grow either.
 
     Parameters
     ----------
@@ -105,14 +107,16 @@ def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
     likely = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
     sharp, first = ends.copy(), 0
     for candidate in fit.candidates:
-        place = slice(first, first + len(candidate.free))
-        if _may_be_neutral(candidate, ends[place]) == [True]:
-            (k,) = np.flatnonzero([free.neutral is not None for free in candidate.free])
-            neutral = candidate.free[k].neutral or 0.0
-            side = int(fit.position[first + k] < candidate.free[k].normalised(neutral))
-            nearest = min if side == 0 else max  # what the fit tells is in its own interval
-            sharp[first + k, side] = nearest(likely[first + k, side], fit.position[first + k])
-        first = place.stop
+        its = ends[first : first + len(candidate.free)]
+        values = _values_elsewhere(candidate)
+        if _may_be_neutral(candidate, its) == [True]:
+            values |= {free.name: free.neutral for free in candidate.free if free.neutral is not None}
+        for k, free in enumerate(candidate.free, start=first):
+            if free.name in values and ends[k, 0] <= (elsewhere := free.normalised(values[free.name])) <= ends[k, 1]:
+                side = int(fit.position[k] < elsewhere)
+                nearest = min if side == 0 else max  # what the fit tells is in its own interval
+                sharp[k, side] = nearest(likely[k, side], fit.position[k])
+        first += len(candidate.free)
     return sharp
 
 
@@ -146,9 +150,13 @@ def _may_be_neutral(candidate: Candidate, ends: Floats) -> list[bool]:
 
 def _may_be_another(candidate: Candidate, ends: Floats) -> list[bool]:
     """Of each parameter with an end of its range at which it is another effect."""
+    return _hold(candidate, ends, _values_elsewhere(candidate))
+
+
+def _values_elsewhere(candidate: Candidate) -> dict[str, float]:
+    """Ends of ranges at which an effect is another one, by the names of the parameters."""
     of_name = {free.name: {"low": free.low, "high": free.high} for free in candidate.free}
-    another_at = EFFECTS[candidate.name].another_at
-    return _hold(candidate, ends, {name: of_name[name][end] for name, end in another_at.items()})
+    return {name: of_name[name][end] for name, end in EFFECTS[candidate.name].another_at.items() if name in of_name}
 
 
 def _hold(candidate: Candidate, ends: Floats, values: Mapping[str, float | None]) -> list[bool]:
