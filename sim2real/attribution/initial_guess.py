@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from scipy.signal import correlate
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
@@ -15,6 +16,8 @@ from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.parameters import plant_parameters
 from wetwell.simulator.power import loaded_power_kw
 
+LONGEST_DELAY_S = 100
+"""The longest delay that the library knows. [s]"""
 DAY_S = 86_400.0
 LONGEST_S = 14_400.0
 SHORTEST_S = 45.0
@@ -42,14 +45,16 @@ def initial_guesses(
 
     There is none for a deadband or a quantum where the values have no such pattern.
     """
-    names = {free.name for free in candidate.free}
-    guess = _seen(names, dict(candidate.fixed).get("channel"), residuals.telemetry.patterns)
+    names, channel = {free.name for free in candidate.free}, dict(candidate.fixed).get("channel")
+    guess = _seen(names, channel, residuals.telemetry.patterns)
     if candidate.is_pattern and not guess:
         return []
     control, middle_m = replay.station.control, replay.station.middle_level_m
     guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
         guess["rated_factor"] = _rated_factor(replay)
+    if "delay_s" in names and channel is not None and replay.traces.is_each_second:
+        guess |= _late(channel, replay)
     if "fast_period_s" in names:
         guess |= _swing(residuals.bins, replay.traces.time_s, plain)
     if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
@@ -81,6 +86,28 @@ def _seen(names: Collection[str], channel: object, patterns: Sequence[Pattern]) 
         if "quantum_m" in names and pattern.quantum > 0.0:
             guess["quantum_m"] = pattern.quantum
     return guess
+
+
+def _late(channel: str, replay: Replay) -> dict[str, float]:
+    """Delay of a signal of the pumps against what is expected; all come early where their frequency is late."""
+    recorded, expected = replay.traces.signals, replay.run().signals
+    if channel in recorded:
+        delay_s = _delay_s(recorded[channel], expected[channel])
+    elif channel == "frequency_hz" and recorded:
+        first = next(iter(recorded))
+        delay_s = _delay_s(expected[first], recorded[first])
+    else:
+        delay_s = 0.0
+    return {"delay_s": delay_s} if delay_s > 0.0 else {}
+
+
+def _delay_s(recorded: Floats, expected: Floats) -> float:
+    """Whole seconds after which (pumps, n) values move most as they are expected to. [s]."""
+    alike = np.zeros(LONGEST_DELAY_S + 1)
+    for values, its in zip(recorded, expected, strict=True):
+        moved, expected_to = (np.nan_to_num(np.diff(each)) for each in (values, its))
+        alike += correlate(moved, expected_to, method="fft")[its.size - 2 :][: alike.size]
+    return float(np.argmax(alike))
 
 
 def _rated_factor(replay: Replay) -> float:
