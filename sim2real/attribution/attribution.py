@@ -34,7 +34,7 @@ from wetwell.sim2real.likelihood.priors import EVEN, Priors
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
-from wetwell.sim2real.residuals.bins import Bins
+from wetwell.sim2real.residuals.bins import TELEMETRY, Bins
 from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 
@@ -121,7 +121,8 @@ def attribute(
     cells = weighed_cells(replay, residuals, residuals_of(plain))
     trials = Trials(fitter, cells, guesses, progress, each)
     singles = trials.singles()
-    hypotheses = Hypotheses(fitter, cells, each)
+    is_named = residuals.telemetry.effects <= {candidate.name for candidate in tested}
+    hypotheses = Hypotheses(fitter, cells, each, (TELEMETRY,) if is_named else ())
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search = Search(fitter, trials, hypotheses)

@@ -1,6 +1,6 @@
 """Fits as hypotheses: what their cells say of them, and whether each of their effects is there at all."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,10 +101,12 @@ class Hypotheses:
         Of the residuals that it fits.
     each : callable
         Weighs fits, perhaps side by side.
+    named : collection of int
+        Signals in which nothing unknown can be.
     """
 
-    def __init__(self, fitter: Fitter, cells: Cells, each: Each) -> None:
-        self._fitter, self._cells, self._each = fitter, cells, each
+    def __init__(self, fitter: Fitter, cells: Cells, each: Each, named: Collection[int] = ()) -> None:
+        self._fitter, self._cells, self._each, self._named = fitter, cells, each, named
         self._plain = self._means(fitter.plain)
         none = evidence_of_none(cells, self._plain)
         self._none = Hypothesis(
@@ -287,7 +289,7 @@ class Hypotheses:
                 yield self._weighed(moved)
 
     def _flexible(self, one: Hypothesis) -> float:
-        return flexible_factor(one.evidence, one.form)
+        return flexible_factor(one.evidence, one.form, self._named)
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))

@@ -1,5 +1,7 @@
 """What no effect of the library does: discrepancies of any size, in any signal and regime."""
 
+from collections.abc import Collection
+
 import numpy as np
 from scipy.special import logsumexp
 
@@ -28,7 +30,7 @@ UNKNOWN_WAYS = (
 """What something unknown may be: alike for all pumps or in each, changing, or both; each as likely."""
 
 
-def flexible_factor(found: Evidence, form: Form) -> float:
+def flexible_factor(found: Evidence, form: Form, named: Collection[int] = ()) -> float:
     r"""Logarithm of how much more probable the residuals are if something unknown may be in them.
 
     $$F = \int_0^1 \prod_b \frac{(1 - s)\,p(r_b) + s \sum_k p_k\, p(r_b \mid \lambda_k, \mu_k)}{p(r_b)}\,
@@ -43,9 +45,13 @@ def flexible_factor(found: Evidence, form: Form) -> float:
     found : Evidence
     form : Form
         Of the effects beside which it acts.
+    named : collection of int
+        Signals in which nothing unknown can be: only effects that are known make values lie on a lattice.
     """
     total = np.zeros(ACTING.size)
     for one in found.stirred:
+        if one.block.signal in named:
+            continue
         nothing = (SILENT * one.block.allowed) ** 2
         says = np.maximum(found.residuals[one.block.rows] ** 2, one.block.variance) > nothing
         if not says.any():

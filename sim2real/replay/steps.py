@@ -5,6 +5,9 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.seconds import is_change
 
+FEWEST = 4
+"""Passages around a turn: two on either side."""
+
 
 def steps_m(level_m: Floats) -> Floats:
     """(n,) levels in the seconds in which a rounded value passes from one step to the next, NaN elsewhere.
@@ -31,6 +34,32 @@ def steps_m(level_m: Floats) -> Floats:
     moved_m, in_s = (np.r_[0.0, each] + np.r_[each, 0.0] for each in (moves_m, pauses_s))
     told_m[told_s.astype(np.int64)] = midway_m + (0.5 + told_s - mean_s) * moved_m / np.maximum(in_s, 1.0)
     return told_m
+
+
+def between_steps_m(told_m: Floats) -> Floats:
+    """(n,) levels in all seconds, from those in which a rounded one passes from step to step.
+
+    Between two passages the level moves evenly. Where it turns between them, it goes on as before the first until it
+    is where it comes from as after the second. NaN with fewer than four passages.
+
+    Examples
+    --------
+    >>> between_steps_m(np.array([1.0, np.nan, 3.0, np.nan, np.nan, np.nan, 3.0, np.nan, 1.0]))
+    array([1., 2., 3., 4., 5., 4., 3., 2., 1.])
+    """
+    at = np.flatnonzero(np.isfinite(told_m))
+    if at.size < FEWEST:
+        return np.full(told_m.size, np.nan)
+    known_m = told_m[at]
+    rate_m_s = np.diff(known_m) / np.diff(at)
+    second = np.arange(told_m.size)
+    row = np.clip(np.searchsorted(at, second, side="right") - 1, 0, at.size - 2)
+    before_m_s, after_m_s = rate_m_s[np.maximum(row - 1, 0)], rate_m_s[np.minimum(row + 1, rate_m_s.size - 1)]
+    even_m = known_m[row] + rate_m_s[row] * (second - at[row])
+    first_m = known_m[row] + before_m_s * (second - at[row])
+    then_m = known_m[row + 1] + after_m_s * (second - at[row + 1])
+    turned_m = np.where(before_m_s > 0.0, np.minimum(first_m, then_m), np.maximum(first_m, then_m))
+    return np.where(before_m_s * after_m_s < 0.0, turned_m, even_m)
 
 
 def _begins(second: Integers, midway_m: Floats) -> Flags:

@@ -11,8 +11,10 @@ from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
 from wetwell.sim2real.recording.traces import BETWEEN, Traces
-from wetwell.sim2real.replay.level_noise import level_noise_m
+from wetwell.sim2real.replay.level_noise import level_noise_m, told_noise_m
+from wetwell.sim2real.replay.observer import Observer
 from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.replay.steps import between_steps_m
 from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.sim2real.residuals.signals import QUANTUM_SHARE
 from wetwell.sim2real.residuals.telemetry import Pattern
@@ -84,7 +86,8 @@ class Stretches:
 class EventResiduals:
     """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0.
 
-    `since_s` is the time since the event before.
+    `since_s` is the time since the event before. Where the level is known when it passes from step to step, it may be
+    off by `half_step_m`: nobody says whether it is rounded or cut off.
     """
 
     bins: Bins
@@ -93,6 +96,7 @@ class EventResiduals:
     stretches: Stretches
     noise_m: float
     pattern: Pattern | None
+    half_step_m: float = 0.0
 
     def of(self, prediction: Prediction) -> Floats:
         """(events,) level that the controller saw, minus its threshold, over the standard deviation.
@@ -117,12 +121,19 @@ class EventResiduals:
             held_m = min(plant.sensors[LEVEL].deadband, self.pattern.deadband)
             rounded_m = QUANTUM_SHARE * self.pattern.rounding(plant.sensors[LEVEL].quantum)
             error_m = np.sign(error_m) * np.maximum(np.abs(error_m) - held_m - rounded_m, 0.0)
+        may_be = [error_m + shift_m for shift_m in (0.0, self.half_step_m, -self.half_step_m)]
+        error_m = min(may_be, key=lambda one: float(np.abs(one).sum()))
         return np.asarray(error_m / self.bins.deviation, dtype=np.float64)
 
 
-def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern: Pattern | None) -> EventResiduals:
-    """Of every start and stop that follows a straight stretch of the level."""
-    noise_m = level_noise_m(traces, station)
+def event_residuals(
+    traces: Traces, station: Station, regimes: Regimes, observer: Observer, pattern: Pattern | None
+) -> EventResiduals:
+    """Of every start and stop that follows a straight stretch of the level that an observer follows."""
+    noise_m, level_m, half_step_m = level_noise_m(traces, station), traces.level_m, 0.0
+    if observer.is_of_steps:
+        noise_m, level_m = told_noise_m(traces, station, observer.level_m), between_steps_m(observer.level_m)
+        half_step_m, pattern = (0.0 if pattern is None else 0.5 * pattern.quantum), None
     events: list[Event] = []
     waited_s: list[int] = []
     calm: list[Flags] = []
@@ -143,11 +154,11 @@ def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern:
             calm.append(is_calm)
     second = np.array([event.second for event in events], dtype=np.int64)
     counted, is_counted = second[:, None] + ahead, np.array(calm, dtype=np.bool_).reshape(-1, WINDOW_S)
-    stretches = Stretches(second=second, counted=counted, is_counted=is_counted, level_m=traces.level_m)
+    stretches = Stretches(second=second, counted=counted, is_counted=is_counted, level_m=level_m)
     sign = np.array([1.0 if event.is_start else -1.0 for event in events])
     kept = stretches.lines()[1] * sign > 0.0
     second, sign = second[kept], sign[kept]
-    stretches = Stretches(second=second, counted=counted[kept], is_counted=is_counted[kept], level_m=traces.level_m)
+    stretches = Stretches(second=second, counted=counted[kept], is_counted=is_counted[kept], level_m=level_m)
     slope_m_s = stretches.lines()[1]
     early_m = noise_m * _earliness(np.abs(slope_m_s) / noise_m)
     deviation = np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2)
@@ -168,6 +179,7 @@ def event_residuals(traces: Traces, station: Station, regimes: Regimes, pattern:
         stretches=stretches,
         noise_m=noise_m,
         pattern=pattern,
+        half_step_m=half_step_m,
     )
 
 

@@ -55,7 +55,7 @@ class StationResiduals:
         if np.isfinite(traces.level_m).any():
             level = level_residuals(traces, station, regimes, plain, doubt, patterns)
             self._parts += [level] if level.bins.size else []
-            self._parts.append(event_residuals(traces, station, regimes, patterns.get("level_m")))
+            self._parts.append(event_residuals(traces, station, regimes, doubt.observer, patterns.get("level_m")))
         self.bins = joined([part.bins for part in self._parts])
 
     def of(self, prediction: Prediction) -> Floats:

@@ -61,6 +61,11 @@ class Pattern:
     within: tuple[float, float] = (1.0, 1.0)
 
     @property
+    def effect(self) -> str:
+        """Name of the effect that alone makes values like these."""
+        return "report_by_exception" if self.deadband > 0.0 else "level_quantisation"
+
+    @property
     def is_usual(self) -> bool:
         """Whether values are just stored in steps that are usual: that is no gap of the model."""
         return self.deadband == 0.0 and self.quantum <= USUAL_STEP_M
@@ -82,6 +87,11 @@ class TelemetryResiduals:
     bins: Bins
     patterns: tuple[Pattern, ...]
     cycles: int
+
+    @property
+    def effects(self) -> set[str]:
+        """Names of the effects of the patterns that count."""
+        return {pattern.effect for pattern in _told(self.patterns)}
 
     def of(self, prediction: Prediction) -> Floats:
         """(patterns that count * cycles,) nothing where the plant holds or rounds so, else `STRENGTH`."""

@@ -9,8 +9,8 @@ from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.level_noise import told_by_steps_m
 from wetwell.sim2real.replay.replay import Replay
-from wetwell.sim2real.replay.steps import steps_m
-from wetwell.sim2real.residuals.bins import LEVEL
+from wetwell.sim2real.replay.steps import between_steps_m, steps_m
+from wetwell.sim2real.residuals.bins import LEVEL, START_LEVEL, STOP_LEVEL
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.sim2real.truth.storage import Storage, stored
 from wetwell.simulator.effects import EFFECTS
@@ -93,3 +93,31 @@ def test_what_is_left_of_a_rounded_level_is_its_noise(recording, alpha, quantum_
     left = residuals.of(replay.run())[its]
     assert np.isfinite(steps_m(traces.level_m))[residuals.bins.second[its]].all()
     assert 0.4 < np.sqrt(np.mean(left**2)) < 1.2
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
+def test_between_its_steps_a_level_turns_where_it_turned(phase):
+    time_s = np.arange(2_000.0)
+    true_m = 1.0 + phase * 0.02 + np.abs(np.remainder(time_s / 400.0, 2.0) - 1.0)  # up and down by 1 m in 400 s
+    between_m = between_steps_m(steps_m(np.round(true_m / 0.02) * 0.02))
+    np.testing.assert_allclose(between_m[100:1_900], true_m[100:1_900], atol=0.004)
+
+
+def test_too_few_passages_have_nothing_between_them():
+    assert np.isnan(between_steps_m(np.array([np.nan, 1.0, 1.1, 1.2, np.nan]))).all()
+
+
+@pytest.mark.parametrize("cut", [np.round, np.floor, np.ceil])
+def test_the_level_of_an_event_is_known_within_its_steps_however_they_are_cut(recording, alpha, cut):
+    """Thresholds of alpha are told to some millimetres, in steps of 3 cm."""
+    traces = traces_of(recording, alpha)
+    traces = replace(traces, level_m=cut(traces.level_m / 0.03) * 0.03)
+    replay, regimes = Replay(traces, alpha), regimes_of(traces, alpha)
+    residuals = StationResiduals(traces, alpha, regimes, replay.run(), replay.doubt)
+    is_event = np.isin(residuals.bins.signal, (START_LEVEL, STOP_LEVEL))
+    off_m = (residuals.of(replay.run()) * residuals.bins.deviation)[is_event]
+    assert is_event.sum() > 100
+    assert np.abs(np.median(off_m)) < 0.003
+    shifted = EFFECTS["threshold_shift"](start_m=0.05, stop_m=-0.05)
+    shift_m = (residuals.of(replay.run([shifted])) * residuals.bins.deviation)[is_event]
+    assert np.mean(np.abs(shift_m)) == pytest.approx(0.05, abs=0.004)
