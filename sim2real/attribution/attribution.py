@@ -121,8 +121,8 @@ def attribute(
     cells = weighed_cells(replay, residuals, residuals_of(plain))
     trials = Trials(fitter, cells, guesses, progress, each)
     singles = trials.singles()
-    is_named = residuals.telemetry.effects <= {candidate.name for candidate in tested}
-    hypotheses = Hypotheses(fitter, cells, each, (TELEMETRY,) if is_named else ())
+    names = {candidate.name for candidate in tested}
+    hypotheses = Hypotheses(fitter, cells, each, (TELEMETRY,) if residuals.telemetry.effects <= names else ())
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     search = Search(fitter, trials, hypotheses)
@@ -131,7 +131,7 @@ def attribute(
 
     def beside_corrections() -> list[UnnamedWeight]:
         hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
-        hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, each))
+        hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, names, each))
         hypotheses.settle()
         return hypotheses.unnamed_weights()
 
@@ -145,13 +145,13 @@ def attribute(
     if verdict_of(weighed(unnamed)) == "unknown" and search.beside_others():
         unnamed = beside_corrections()
     while verdict_of(posterior := weighed(unnamed)) == "effect":
-        names = best_set(posterior)
-        likely, telling = hypotheses.of(names), hypotheses.telling(names)
-        if are_sized(telling.fit, its_ends := ends_of(telling), names):
+        told = best_set(posterior)
+        likely, telling = hypotheses.of(told), hypotheses.telling(told)
+        if are_sized(telling.fit, its_ends := ends_of(telling), told):
             own, own_ends = in_order(fitter, likely.fit, its_ends if telling is likely else ends_of(likely))
             ends, accepted = own_ends, informed(fitter, own, priors)
             break
-        hypotheses.rule_out(names)
+        hypotheses.rule_out(told)
     else:
         accepted, own, own_ends, ends = None, None, np.zeros((0, 2)), np.zeros((0, 2))
     posterior = shared(posterior, hypotheses.alike)

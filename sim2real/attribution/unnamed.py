@@ -1,5 +1,6 @@
 """Something unknown that acts through the plant: a term of the model goes with what no effect has a name for."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -61,8 +62,12 @@ def unnamed(proposal: Proposal) -> tuple[Unnamed, Floats]:
     return Unnamed(name="learnt_correction", fixed=(), free=free, proposal=proposal), np.clip(point, 0.0, 1.0)
 
 
-def unnamed_beside(replay: Replay, residuals: StationResiduals, fitter: Fitter, best: Fit, each: Each) -> list[Fit]:
+def unnamed_beside(
+    replay: Replay, residuals: StationResiduals, fitter: Fitter, best: Fit, names: Collection[str], each: Each
+) -> list[Fit]:
     """The best correction of each of the likeliest terms, alone and beside a set without each of its effects.
+
+    A constant one that an effect has a name for is nothing unknown.
 
     Parameters
     ----------
@@ -71,6 +76,8 @@ def unnamed_beside(replay: Replay, residuals: StationResiduals, fitter: Fitter, 
     fitter : Fitter
     best : Fit
         The set.
+    names : collection of str
+        Of the effects that were tried.
     each : callable
         Replays, perhaps side by side.
     """
@@ -82,8 +89,13 @@ def unnamed_beside(replay: Replay, residuals: StationResiduals, fitter: Fitter, 
 
     def proposed(base: Fit) -> list[tuple[Fit, Unnamed, Floats]]:
         found = of_each_target(shop.proposals(addends, covariates, residuals_of(base.residuals)))
-        return [(base, *unnamed(first)) for first, *_ in found if first.log > 0.0]
+        likely = [next((one for one in its if not _is_named(one, names)), None) for its in found]
+        return [(base, *unnamed(one)) for one in likely if one is not None and one.log > 0.0]
 
     tried = chain.from_iterable(each(proposed, bases.values()))
     found = each(lambda one: fitter.at((*one[0].candidates, one[1]), (*one[0].points, one[2])), tried)
     return [fit for fit in found if fit is not None]
+
+
+def _is_named(proposal: Proposal, names: Collection[str]) -> bool:
+    return not proposal.atoms and proposal.target.effect_of_a_constant in names

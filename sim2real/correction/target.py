@@ -5,7 +5,19 @@ from typing import NamedTuple
 import numpy as np
 
 from wetwell.simulator.corrections.parts import LEVEL_BALANCE, STATIC_HEAD, TERMS, Term
+from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.parameters import PlantParameters
+
+EFFECT_OF_A_CONSTANT: dict[Term, str] = {
+    "head_loss": "friction_bias",
+    "static_head": "static_head_bias",
+    "pump_head": "pump_wear",
+    "speed": "motor_slip",
+    "flow_reading": "flow_meter_gain",
+    "head_reading": "head_sensor_offset",
+    "level_balance": "unmetered_inflow",
+}
+"""Effect of the library that a constant correction of a term is."""
 
 
 class Target(NamedTuple):
@@ -20,6 +32,13 @@ class Target(NamedTuple):
     def is_of_all(self) -> bool:
         """Whether all pumps and mains have it."""
         return self.pump == self.main == 0
+
+    @property
+    def effect_of_a_constant(self) -> str | None:
+        """Effect of the library that a constant correction is; None where there is none, of this pump or main."""
+        name = EFFECT_OF_A_CONSTANT.get(self.term)
+        has_one_of_several = name is not None and {"pump", "main"} & EFFECTS[name].model_fields.keys()
+        return name if self.is_of_all or has_one_of_several else None
 
 
 def targets_of(plant: PlantParameters) -> list[Target]:

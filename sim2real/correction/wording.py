@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
+from wetwell.sim2real.correction.target import EFFECT_OF_A_CONSTANT
 from wetwell.simulator.corrections.acting import DAY_S
 from wetwell.simulator.corrections.parts import SHAPES, Covariate, Term, shape_at
 from wetwell.simulator.effects.station.correction_part import PartTable
@@ -41,16 +42,6 @@ COVARIATES_IN_WORDS: dict[Covariate, tuple[str, str, str]] = {
     "column": ("the column", "", "how it gets there"),
 }
 """Covariates, their units, and what to look for where a term goes with them."""
-EFFECT_OF_A_CONSTANT: dict[Term, str] = {
-    "head_loss": "friction_bias",
-    "static_head": "static_head_bias",
-    "pump_head": "pump_wear",
-    "speed": "motor_slip",
-    "flow_reading": "flow_meter_gain",
-    "head_reading": "head_sensor_offset",
-    "level_balance": "unmetered_inflow",
-}
-"""Effect of the library that a constant correction of a term is."""
 READINGS: tuple[Term, ...] = ("flow_reading", "head_reading", "power", "level_reading")
 HINT_OF_A_LATE_READING = "a meter that is late, or takes time to follow"
 HINT_OF_A_CHANGE = "what was done or broke then; the times before and after it may be diagnosed apart"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.sim2real.attribution.unnamed import unnamed
+from wetwell.sim2real.attribution.unnamed import _is_named, unnamed
 from wetwell.sim2real.correction.bin_covariates import Place
 from wetwell.sim2real.correction.dictionary import dictionary
 from wetwell.sim2real.correction.selection import Proposal
@@ -30,6 +30,27 @@ def test_it_is_the_proposal_at_its_point(proposal):
 
 def test_it_is_as_probable_as_its_term_and_addends(proposal):
     assert unnamed(proposal)[0].log_prior == LOSS.log_prior + proposal.atoms[0].log_prior
+
+
+@pytest.mark.parametrize(
+    ("term", "pump", "named"),
+    [
+        ("speed", 0, "motor_slip"),
+        ("speed", 2, None),
+        ("pump_head", 2, "pump_wear"),
+        ("head_reading", 0, "head_sensor_offset"),
+        ("level_reading", 0, None),
+    ],
+)
+def test_a_constant_has_the_name_of_an_effect_of_as_many_pumps(term, pump, named):
+    assert Target(term=term, pump=pump, main=0, log_prior=0.0).effect_of_a_constant == named
+
+
+def test_only_a_constant_is_named(proposal):
+    constant = Proposal(target=LOSS, atoms=(), sizes=proposal.sizes[:1], log=30.0)
+    assert _is_named(constant, {"friction_bias"})
+    assert not _is_named(constant, {"pump_wear"})  # it was left out of the library
+    assert not _is_named(proposal, {"friction_bias"})
 
 
 def test_sizes_stay_in_their_ranges(proposal):
