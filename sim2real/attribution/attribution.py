@@ -22,7 +22,6 @@ from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import (
     SetProbability,
     UnknownShare,
-    UnnamedWeight,
     best_set,
     equivalents,
     posterior_of,
@@ -125,26 +124,20 @@ def attribute(
     hypotheses = Hypotheses(fitter, cells, each, (TELEMETRY,) if residuals.telemetry.effects <= names else ())
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
-    search = Search(fitter, trials, hypotheses)
-    search.around_the_best()
+    Search(fitter, trials, hypotheses).run()
+    hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
+    hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, names, each))
+    hypotheses.settle()
+    unnamed = hypotheses.unnamed_weights()
     log_share = partial(priors.log_share, tested=[fit.names[0] for fit in singles])
 
-    def beside_corrections() -> list[UnnamedWeight]:
-        hypotheses.add(changed(fitter, [hypotheses.possible[0].fit], each))
-        hypotheses.add_unnamed(unnamed_beside(replay, residuals, fitter, hypotheses.weighed[0].fit, names, each))
-        hypotheses.settle()
-        return hypotheses.unnamed_weights()
-
-    def weighed(unnamed: Sequence[UnnamedWeight]) -> tuple[SetProbability, ...]:
+    def weighed() -> tuple[SetProbability, ...]:
         return posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
 
     def ends_of(one: Hypothesis) -> Floats:
         return sharpened(one.fit, intervals_of(fitter, one.fit, residuals.bins), one.evidence)
 
-    unnamed = beside_corrections()
-    if verdict_of(weighed(unnamed)) == "unknown" and search.beside_others():
-        unnamed = beside_corrections()
-    while verdict_of(posterior := weighed(unnamed)) == "effect":
+    while verdict_of(posterior := weighed()) == "effect":
         told = best_set(posterior)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
         if are_sized(telling.fit, its_ends := ends_of(telling), told):

@@ -257,13 +257,13 @@ class Hypotheses:
 
     def _beside(self, fit: Fit) -> Beside:
         shown = self._shown(fit)
+        found = evidence(self._cells, shown.residuals, shown.slopes, shown.form, fit.position)
         return Beside(
-            weights=cell_weights(
-                evidence(self._cells, shown.residuals, shown.slopes, shown.form, fit.position), shown.form
-            ),
+            weights=cell_weights(found, shown.form),
             residuals=shown.residuals,
             slopes=shown.slopes,
             position=fit.position,
+            lacks=self.weighed[0].evidence.log - found.log,
         )
 
     def _settled(self, one: Hypothesis) -> Hypothesis:

@@ -54,12 +54,15 @@ class Beside:
         Change of the residuals with each parameter of the others, over its range; no columns where the others stay.
     position : (parameters,) array
         Of the others.
+    lacks : float
+        By how much the likeliest set is likelier, in the logarithm.
     """
 
     weights: Weights
     residuals: Floats
     slopes: Floats
     position: Floats
+    lacks: float = 0.0
 
     @property
     def still(self) -> "Beside":

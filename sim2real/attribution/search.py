@@ -14,15 +14,15 @@ MOST_EFFECTS = 4
 """Effects of a set: three, and the inertia that the water of each main has."""
 
 MOST_EXTENDED = 2
-"""Sets of each size beside which one more effect is tried where something unknown is the most probable: a pair may be
-right that is less probable than many triples."""
+"""Sets of each size beside which one more effect is tried: a pair may be right that is less probable than many
+triples."""
 
 MOST_CHANGED = 4
 """Single effects that are tried so, those that explain most first."""
 
 
 class Search:
-    """Weighs sets of effects until no neighbour of the most probable one is left to try.
+    """Weighs sets of effects until no neighbour of the most probable ones is left to try.
 
     Parameters
     ----------
@@ -36,7 +36,16 @@ class Search:
         self._fitter, self._trials, self._hypotheses = fitter, trials, hypotheses
         self._tried: set[frozenset[str]] = {frozenset()}
 
-    def around_the_best(self) -> None:
+    def run(self) -> None:
+        """Try one more effect beside the most probable set, and beside the likeliest sets of each size."""
+        while True:
+            self._around_the_best()
+            fits = [one.fit for one in self._hypotheses.possible]
+            of_size = [[fit for fit in fits if len(fit.names) == size] for size in range(1, MOST_EFFECTS)]
+            if not self._extended([fit for its in of_size for fit in its[:MOST_EXTENDED]]):
+                return
+
+    def _around_the_best(self) -> None:
         """Try one more effect beside the most probable set, and beside it without each of its effects.
 
         Greedy choices are taken back: each effect of a set makes room for every other, the rest kept. A set may have
@@ -48,17 +57,6 @@ class Search:
             fewer = [self._fitter.without(best, member) for member in members]
             if not self._extended([best, *(base for base in fewer if base is not None)]):
                 return
-
-    def beside_others(self) -> bool:
-        """Try one more effect beside the sets next in line, and say whether a more probable one was found."""
-        best = self._hypotheses.weighed[0]
-        untried = [one.fit for one in self._hypotheses.possible if frozenset(one.effects) not in self._tried]
-        of_size = [[fit for fit in untried if len(fit.names) == size] for size in range(1, MOST_EFFECTS)]
-        self._extended([fit for fits in of_size for fit in fits[:MOST_EXTENDED]])
-        if self._hypotheses.weighed[0] is best:
-            return False
-        self.around_the_best()
-        return True
 
     def _extended(self, fits: Sequence[Fit]) -> bool:
         """Weigh some fits with one more effect, and say whether there was one of which that was not known."""

@@ -24,6 +24,8 @@ MOST_STARTS = 3
 MOST_REFINED = 4
 LEAST_PROMISED = 10.0
 """Drop of the weighed squares under which a further effect is not tried: it could not pay for its place."""
+MOST_KEPT = 4.0
+"""Times what it promises that an effect may be worth: with less than a set lacks, it is not tried beside that."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -151,7 +153,7 @@ class Trials:
         free = [alone for candidate, alone in alones.items() if candidate.name not in base.names]
         of_name: dict[str, list[Promise]] = {}
         for one in chain.from_iterable(beside.promises(free)):
-            if one.gain > LEAST_PROMISED or one.candidate.is_pattern:
+            if one.gain > max(LEAST_PROMISED, 2.0 * beside.lacks / MOST_KEPT) or one.candidate.is_pattern:
                 of_name.setdefault(one.candidate.name, []).append(one)
         starts = [sorted(its, key=lambda one: -one.gain)[:MOST_STARTS] for its in of_name.values()]
         starts.sort(key=lambda its: (not its[0].candidate.is_pattern, -its[0].gain))
