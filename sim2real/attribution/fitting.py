@@ -68,6 +68,8 @@ class Fitter:
         Without any effect.
     periods : int
         Recordings that were left alone.
+    half_step_m : float
+        As of the residuals. [m]
     """
 
     def __init__(self, replay: Replay, residuals: StationResiduals, rows: Flags) -> None:
@@ -75,6 +77,7 @@ class Fitter:
         self._residuals = residuals
         self.rows = rows
         self.bins = residuals.bins
+        self.half_step_m = residuals.half_step_m
         self.station = replay.station
         self.periods = int(replay.period[-1]) + 1
         prediction = replay.run()

@@ -83,6 +83,9 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
         least = max(form * abs(value - (free.neutral or 0.0)), HALF_SCAN_S if free.unit == "s" else 0.0)
         low, high = (min(max(value + side * least, free.low), free.high) for side in (-1.0, 1.0))
         ends[k] = min(ends[k, 0], free.normalised(low)), max(ends[k, 1], free.normalised(high))
+        if candidate.component == "controller" and free.unit == "m":  # its levels may all be off alike
+            ends[k] += np.array([-1.0, 1.0]) * fitter.half_step_m / (free.high - free.low)
+            ends[k] = np.clip(ends[k], 0.0, 1.0)
     return np.asarray(ends, dtype=np.float64)
 
 

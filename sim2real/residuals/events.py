@@ -133,7 +133,8 @@ def event_residuals(
     noise_m, level_m, half_step_m = level_noise_m(traces, station), traces.level_m, 0.0
     if observer.is_of_steps:
         noise_m, level_m = told_noise_m(traces, station, observer.level_m), between_steps_m(observer.level_m)
-        half_step_m, pattern = (0.0 if pattern is None else 0.5 * pattern.quantum), None
+        half_step_m = 0.0 if pattern is None or pattern.is_usual else 0.5 * pattern.quantum
+        pattern = None
     events: list[Event] = []
     waited_s: list[int] = []
     calm: list[Flags] = []

@@ -38,6 +38,11 @@ class StationResiduals:
         Of the station as it is.
     doubt_where : callable
         What a right model may be off, by whether the level is held.
+
+    Attributes
+    ----------
+    half_step_m : float
+        By which all levels at which pumps are switched may be off alike: nobody says whether they are cut off. [m]
     """
 
     def __init__(
@@ -49,13 +54,16 @@ class StationResiduals:
         doubt_where: Callable[[bool], Doubt],
     ) -> None:
         self.telemetry = telemetry_residuals(traces, station, regimes)
+        self.half_step_m = 0.0
         patterns = {pattern.quantity: pattern for pattern in self.telemetry.patterns}
         doubt = doubt_where("level_m" in patterns and patterns["level_m"].deadband > 0.0)
         self._parts: list[_Part] = [*pump_residuals(traces, station, regimes, plain, doubt, patterns), self.telemetry]
         if np.isfinite(traces.level_m).any():
             level = level_residuals(traces, station, regimes, plain, doubt, patterns)
             self._parts += [level] if level.bins.size else []
-            self._parts.append(event_residuals(traces, station, regimes, doubt.observer, patterns.get("level_m")))
+            events = event_residuals(traces, station, regimes, doubt.observer, patterns.get("level_m"))
+            self._parts.append(events)
+            self.half_step_m = events.half_step_m
         self.bins = joined([part.bins for part in self._parts])
 
     def of(self, prediction: Prediction) -> Floats:

@@ -8,8 +8,15 @@ import pytest
 from scipy.optimize import least_squares
 
 from wetwell.sim2real.attribution.candidates import candidates_of
-from wetwell.sim2real.attribution.fitting import Fit
+from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.intervals import are_sized, intervals_of, sharpened
+from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.scenario import Scenario
+from wetwell.simulator.simulation import Simulation
 
 
 def fit_of(*names):
@@ -138,3 +145,19 @@ def test_beside_a_parameter_that_may_have_any_value_the_others_have_what_they_wo
     assert ends[1] == pytest.approx([0.0, 1.0])
     assert ends[0, 0] == pytest.approx(0.2, abs=0.01)
     assert ends[0, 1] == pytest.approx(0.2 + 0.5 * 0.81, abs=0.01)
+
+
+@pytest.mark.parametrize("cut", [np.round, np.floor])
+def test_a_shift_of_thresholds_is_known_within_half_a_step_of_the_level(alpha, cut):
+    (shift,) = candidates_of(len(alpha.pump), 1, only=["threshold_shift"])
+    shifted = alpha.model_copy(update={"effect": (EFFECTS["threshold_shift"](start_m=0.06),)})
+    traces = traces_of(Simulation(shifted, Scenario(name="plain"), 7, 0).advance(21_600, truth=False), alpha)
+    traces = replace(traces, level_m=cut(traces.level_m / 0.04) * 0.04)
+    replay = Replay(traces, alpha)
+    residuals = StationResiduals(traces, alpha, regimes_of(traces, alpha), replay.run(), replay.doubt)
+    fitter = Fitter(replay, residuals, np.ones(residuals.bins.second.size, dtype=bool))
+    start = np.array([free.normalised(0.03 if free.name == "start_m" else 0.0) for free in shift.free])
+    fit = fitter.refine(fitter.at((shift,), (start,)))
+    for free, (low, high) in zip(shift.free, intervals_of(fitter, fit, residuals.bins), strict=True):
+        assert free.value(low) <= (0.06 if free.name == "start_m" else 0.0) <= free.value(high)
+        assert 0.04 <= free.value(high) - free.value(low) < 0.07
