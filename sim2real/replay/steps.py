@@ -5,7 +5,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.recording.seconds import is_change
 
-FEWEST = 4
+FEWEST_PASSAGES = 4
 """Passages around a turn: two on either side."""
 
 
@@ -48,7 +48,7 @@ def between_steps_m(told_m: Floats) -> Floats:
     array([1., 2., 3., 4., 5., 4., 3., 2., 1.])
     """
     at = np.flatnonzero(np.isfinite(told_m))
-    if at.size < FEWEST:
+    if at.size < FEWEST_PASSAGES:
         return np.full(told_m.size, np.nan)
     known_m = told_m[at]
     rate_m_s = np.diff(known_m) / np.diff(at)
