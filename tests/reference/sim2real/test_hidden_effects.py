@@ -1,4 +1,4 @@
-"""Single effects on plants that are not ours, which an error of the model of the data has hidden once."""
+"""Effects on plants that are not ours, which an error of the model of the data has hidden once."""
 
 import pytest
 
@@ -27,3 +27,20 @@ def test_a_single_effect_is_told(seed, effect, metered_share):
     accepted = diagnose(recording, truth.station).attribution.accepted
     assert accepted is not None
     assert accepted.names == (effect,)
+
+
+@pytest.mark.parametrize(
+    ("seed", "plant", "names"),
+    [
+        pytest.param(8204, "fine", ("air_pocket", "level_sensor_lag"), id="a lag behind steps of a centimetre"),
+        pytest.param(8207, "elastic", ("level_dependent_static_head", "level_quantisation"), id="steps of 16 mm"),
+        pytest.param(8206, "elastic", ("ragging", "static_head_bias"), id="rags of two kinds beside a lift"),
+    ],
+)
+def test_both_effects_of_a_pair_are_told(seed, plant, names):
+    storage = StoragePlan(rates_s=(1,), metered_share=0.5)
+    case = trial_case(seed, 0, kinds=("pair",), plants=(plant,), seconds=SECONDS, storage=storage)
+    _, truth, recording = material_case(case)
+    accepted = diagnose(recording, truth.station).attribution.accepted
+    assert accepted is not None
+    assert tuple(sorted(accepted.names)) == names
