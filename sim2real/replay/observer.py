@@ -115,19 +115,36 @@ class Observer:
         return left
 
 
-def constant_observer(level_m: Floats) -> Observer:
+def lost_after_s(told_m: Floats, level_m: Floats) -> int:
+    """Time without a value after which a level is lost: `LOST_S`, or the longest in which it just did not change.
+
+    Parameters
+    ----------
+    told_m : (n,) array
+        Level, or what of it counts where only changes do: NaN is "no value".
+    level_m : (n,) array
+        As recorded: what is missing here is missing indeed.
+    """
+    at = np.flatnonzero(np.isfinite(told_m))
+    missing_s = np.diff(np.cumsum(~np.isfinite(level_m))[at])
+    return int(np.max(np.diff(at)[missing_s <= LOST_S], initial=LOST_S))
+
+
+def constant_observer(level_m: Floats, lost_after_s: int = LOST_S) -> Observer:
     """Observer of a level of each second under a measured inflow, which follows it with `LEVEL_TIME_S`.
 
     Parameters
     ----------
     level_m : (n,) array
         NaN is "no value".
+    lost_after_s : int
+        Time without a value after which it begins anew. [s]
     """
     place = np.arange(level_m.size)
     last = np.maximum.accumulate(np.where(np.isfinite(level_m), place, -1))
     lost_s = place - np.r_[-1, last[:-1]] - 1
     gain = np.minimum(1.0 / LEVEL_TIME_S * (lost_s + 1), MOST_FOLLOWED)
-    gain = np.where(lost_s > LOST_S, BEGUN_ANEW, gain)
+    gain = np.where(lost_s > lost_after_s, BEGUN_ANEW, gain)
     return Observer(
         level_m=level_m,
         level_gain=gain,
@@ -195,7 +212,7 @@ def uncertain_of(traces: Traces, station: Station, metered: MeteredInflow | None
         waves_m2_s=0.0,
         first_m2_s2=(FIRST_SHARE * float(speed_m_s.max())) ** 2,
         metered_m2_s2=0.0,
-        lost_s=max(LOST_S, 2.5 * traces.rate_s),
+        lost_s=max(lost_after_s(level_m, traces.level_m), 2.5 * traces.rate_s),
         least_gain=0.0,
     )
     if metered is None:

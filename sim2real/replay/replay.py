@@ -26,6 +26,7 @@ from wetwell.sim2real.replay.observer import (
     constant_observer,
     forced_observer,
     hides_cycles,
+    lost_after_s,
     row_observer,
     uncertain_of,
 )
@@ -296,7 +297,7 @@ class Replay:
             forced = forced_observer(traces)
             return forced if level_m is traces.level_m else replace(forced, level_m=level_m)
         if traces.inflow_m3h is not None and traces.is_each_second:
-            return constant_observer(level_m)
+            return constant_observer(level_m, lost_after_s(level_m, traces.level_m))
         plant = self._plant(self.own)
         uncertain, sensor = uncertain_of(traces, station, self._metered, level_m), plant.sensors[LEVEL]
         if traces.inflow_m3h is not None:

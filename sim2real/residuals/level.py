@@ -69,7 +69,7 @@ def level_residuals(
     if traces.inflow_m3h is None:
         off_m, material_m = _followed(traces, station, seconds, plain, doubt.observer)
     else:
-        off_m, material_m = _balanced(traces, station, seconds, plain)
+        off_m, material_m = _balanced(traces, station, seconds, plain, is_told)
     if doubt.level_m is not None:
         off_m = np.hypot(off_m, seconds.means_of(AREA_TOLERANCE * moved_m(traces, regime)[seconds.second]))
 
@@ -102,10 +102,13 @@ def _has_no_past(traces: Traces, regimes: Regimes) -> Flags:
     return np.asarray(is_before | np.any(is_first & (regimes.of_pumps != IDLE), axis=0), dtype=np.bool_)
 
 
-def _balanced(traces: Traces, station: Station, seconds: Seconds, plain: Prediction) -> Sizes:
-    """Where the inflow is measured: what the balance misses adds up for `LEVEL_TIME_S`."""
+def _balanced(traces: Traces, station: Station, seconds: Seconds, plain: Prediction, is_told: Flags) -> Sizes:
+    """Where the inflow is measured: what the balance misses adds up for `LEVEL_TIME_S`, or from value to value."""
     materiality, area_m2 = station.materiality, station.sump.mean_area_m2
-    carried_m = float(np.max(plain.plant.rated_flow_m3h)) / 3600.0 / area_m2 * LEVEL_TIME_S
+    place = np.arange(traces.seconds)
+    last = np.maximum.accumulate(np.where(is_told, place, 0))
+    open_s = seconds.means(np.maximum(LEVEL_TIME_S, place - np.r_[0, last[:-1]]))
+    carried_m = float(np.max(plain.plant.rated_flow_m3h)) / 3600.0 / area_m2 * open_s
     jumps_m3h = np.abs(np.diff(_pumped_m3h(traces, plain), prepend=0.0)) * steps(traces, plain)
     forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * LEVEL_TIME_S) / LEVEL_TIME_S)
     open_m = np.convolve(jumps_m3h, forgotten)[: traces.seconds] / 3600.0 / area_m2

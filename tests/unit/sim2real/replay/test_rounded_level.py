@@ -121,3 +121,19 @@ def test_the_level_of_an_event_is_known_within_its_steps_however_they_are_cut(re
     shifted = EFFECTS["threshold_shift"](start_m=0.05, stop_m=-0.05)
     shift_m = (residuals.of(replay.run([shifted])) * residuals.bins.deviation)[is_event]
     assert np.mean(np.abs(shift_m)) == pytest.approx(0.05, abs=0.004)
+
+
+@pytest.mark.parametrize(("is_metered", "most_m"), [(True, 0.004), (False, 0.015)])
+def test_a_large_wet_well_is_not_lost_between_its_steps(alpha, is_metered, most_m):
+    """Its level takes many minutes from one step to the next; an outage of an hour is one."""
+    station = alpha.model_copy(update={"sump": alpha.sump.model_copy(update={"area_m2": 200.0})})
+    traces = traces_of(Simulation(station, Scenario(name="plain"), 7, 0).advance(6 * SECONDS, truth=False), station)
+    level_m = np.round(traces.level_m / 0.05) * 0.05
+    level_m[60_000:63_600] = np.nan
+    replay = Replay(replace(traces, level_m=level_m, inflow_m3h=traces.inflow_m3h if is_metered else None), station)
+    told_s = np.flatnonzero(np.isfinite(replay.observer.level_m))
+    pauses_s, begins = np.diff(told_s), replay.observer.level_gain[told_s[1:]] == 1.0
+    assert np.sum(pauses_s > 300) > 30
+    assert (begins == (pauses_s >= 3_600)).all()
+    off_m = (replay.observer.level_m - replay.run().level_m)[told_s[1:]]
+    assert np.sqrt(np.mean(off_m[~begins] ** 2)) < most_m
