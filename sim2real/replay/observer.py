@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats
+from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.jit import compiled
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.traces import Traces
@@ -130,21 +130,32 @@ def lost_after_s(told_m: Floats, level_m: Floats) -> int:
     return int(np.max(np.diff(at)[missing_s <= LOST_S], initial=LOST_S))
 
 
-def constant_observer(level_m: Floats, lost_after_s: int = LOST_S) -> Observer:
+def without_s(is_known: Flags) -> Integers:
+    """(n,) seconds without a value before each.
+
+    Examples
+    --------
+    >>> without_s(np.array([True, False, False, True, True]))
+    array([0, 0, 1, 2, 0])
+    """
+    place = np.arange(is_known.size)
+    last = np.maximum.accumulate(np.where(is_known, place, -1))
+    return np.asarray(place - np.r_[-1, last[:-1]] - 1, dtype=np.int64)
+
+
+def constant_observer(level_m: Floats, most_without_s: int = LOST_S) -> Observer:
     """Observer of a level of each second under a measured inflow, which follows it with `LEVEL_TIME_S`.
 
     Parameters
     ----------
     level_m : (n,) array
         NaN is "no value".
-    lost_after_s : int
+    most_without_s : int
         Time without a value after which it begins anew. [s]
     """
-    place = np.arange(level_m.size)
-    last = np.maximum.accumulate(np.where(np.isfinite(level_m), place, -1))
-    lost_s = place - np.r_[-1, last[:-1]] - 1
+    lost_s = without_s(np.isfinite(level_m))
     gain = np.minimum(1.0 / LEVEL_TIME_S * (lost_s + 1), MOST_FOLLOWED)
-    gain = np.where(lost_s > lost_after_s, BEGUN_ANEW, gain)
+    gain = np.where(lost_s > most_without_s, BEGUN_ANEW, gain)
     return Observer(
         level_m=level_m,
         level_gain=gain,

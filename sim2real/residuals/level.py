@@ -12,7 +12,7 @@ from wetwell.sim2real.recording.regimes import IDLE, START_RAMP, STOP_RAMP, Regi
 from wetwell.sim2real.recording.seconds import repeated
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.level_noise import told_noise_m
-from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer
+from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer, without_s
 from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import LEVEL, NO_PUMP, Seconds, binned
 from wetwell.sim2real.residuals.signals import UNRESOLVED, SignalResiduals, steps
@@ -105,9 +105,7 @@ def _has_no_past(traces: Traces, regimes: Regimes) -> Flags:
 def _balanced(traces: Traces, station: Station, seconds: Seconds, plain: Prediction, is_told: Flags) -> Sizes:
     """Where the inflow is measured: what the balance misses adds up for `LEVEL_TIME_S`, or from value to value."""
     materiality, area_m2 = station.materiality, station.sump.mean_area_m2
-    place = np.arange(traces.seconds)
-    last = np.maximum.accumulate(np.where(is_told, place, 0))
-    open_s = seconds.means(np.maximum(LEVEL_TIME_S, place - np.r_[0, last[:-1]]))
+    open_s = seconds.means(np.maximum(LEVEL_TIME_S, without_s(is_told) + 1))
     carried_m = float(np.max(plain.plant.rated_flow_m3h)) / 3600.0 / area_m2 * open_s
     jumps_m3h = np.abs(np.diff(_pumped_m3h(traces, plain), prepend=0.0)) * steps(traces, plain)
     forgotten = UNRESOLVED[0] * np.exp(-np.arange(3.0 * LEVEL_TIME_S) / LEVEL_TIME_S)
