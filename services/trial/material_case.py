@@ -1,6 +1,7 @@
 """A case whose deviations all matter: drawn anew where one of them moves nothing by more than is material.
 
-So is one whose pumps run the wet well dry: what they take then no two models say alike.
+So is one whose pumps run the wet well dry: what they take then no two models say alike. And so is one whose plant
+loses the solution of its own equations.
 """
 
 from dataclasses import replace
@@ -8,6 +9,7 @@ from dataclasses import replace
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.recordings.recording import Recording
 from wetwell.services.trial.plants import Passes, passage_of
+from wetwell.services.trial.swmm_plant import SolutionLostError
 from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.trial.families import PlantName
 from wetwell.sim2real.trial.materiality import moved
@@ -22,9 +24,10 @@ ATTEMPTS = 8
 
 
 def material_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
-    """The case in its first attempt in which every deviation matters and there is water, with truth and recording.
+    """The case in its first attempt that stands for reality, with its truth and its recording.
 
-    A twin without the deviation tells that, second by second and without the noise of the sensors; what the historian
+    There every deviation matters, the wet well holds water, and the plant its own equations. A twin without a
+    deviation tells whether it matters, second by second and without the noise of the sensors; what the historian
     keeps of the seconds does not count, but for signals that it does not keep at all.
 
     Raises
@@ -36,18 +39,27 @@ def material_case(case: TrialCase) -> tuple[TrialCase, TruthCase, Recording]:
     for attempt in range(ATTEMPTS):
         case = replace(case, attempt=attempt)
         truth = case.truth()
-        passage = _passage_of(truth, case.plant)
-        if passage.lowest_level_m < DRY_M:
-            why = f"the pumps of plant '{case.plant}' run the wet well dry in the last of {ATTEMPTS} draws"
-            continue
-        small = immaterial_name(truth, case.plant, passage)
-        if not small:
+        try:
+            passage = _passage_of(truth, case.plant)
+            why = _why_unfit(truth, case.plant, passage)
+        except SolutionLostError as error:
+            why = str(error)
+        if not why:
             return case, truth, stored(passage.recording(truth=False), truth.storage)
-        why = (
-            f"'{small}' moves nothing that plant '{case.plant}' records by more than is material in any of "
-            f"{ATTEMPTS} draws: a longer recording may show it"
+    raise WetwellError(f"{case.name}: none of {ATTEMPTS} draws stands for reality; in the last one {why}")
+
+
+def _why_unfit(truth: TruthCase, plant: PlantName, passage: Passes) -> str:
+    """Why a case is drawn anew; empty if it is not."""
+    if passage.lowest_level_m < DRY_M:
+        return f"the pumps of plant '{plant}' run the wet well dry"
+    small = immaterial_name(truth, plant, passage)
+    if small:
+        return (
+            f"'{small}' moves nothing that plant '{plant}' records by more than is material: "
+            "a longer recording may show it"
         )
-    raise WetwellError(f"{case.name}: {why}")
+    return ""
 
 
 def immaterial_name(truth: TruthCase, plant: PlantName, passage: Passes | None = None) -> str:
