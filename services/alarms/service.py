@@ -43,6 +43,8 @@ SOURCES = frozenset({"gateway", "simulator"})
 MAX_STATIONS = 10_000
 """Further names on the bus are refused: somebody makes them up."""
 
+ALARM_HISTORY = 100
+"""Changes of an alarm that are kept for who missed some: as many as of verdicts."""
 SAVING_SHARE = 0.1
 """Of the time for which the state is being written at the most, but for acts: it is written whole."""
 
@@ -300,7 +302,7 @@ class AlarmService:
     def _publish(self, alarm: Alarm) -> None:
         name = (alarm.station, alarm.id)
         if name not in self._publishers:
-            self._publishers[name] = self._bus.publisher(alarm_key(*name))
+            self._publishers[name] = self._bus.publisher(alarm_key(*name), history=ALARM_HISTORY)
         self._publishers[name].put(alarm.encode())
 
     def _unshelve(self, record: AlarmRecord, status: AlarmStatus, now: Now) -> None:

@@ -27,7 +27,7 @@ from wetwell.services.runtime.settings import Settings
 log = logging.getLogger(__name__)
 
 VERDICT_HISTORY = 100
-ALARM_HISTORY = 1
+ALARM_HISTORY = 100
 MAINTENANCE_HISTORY = 100
 CAPACITY = 200_000
 """Most messages of one kind that wait to be taken; what publishers hold comes when there is room."""

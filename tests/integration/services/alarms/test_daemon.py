@@ -9,8 +9,8 @@ from alarm_site import START_NS, Site
 from memory_bus import MemoryBus
 
 from wetwell.protocols.bus.interface import Presence
-from wetwell.protocols.bus.keys import alarm_act_key, alive_key, sample_block_key
-from wetwell.protocols.messages.alarm import AlarmAnswer
+from wetwell.protocols.bus.keys import alarm_act_key, alarm_key, alive_key, sample_block_key
+from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.status import Status
@@ -59,6 +59,19 @@ def test_a_verdict_raises_with_its_advice_unknown_changes_nothing_and_normal_cle
         ("pump2.pump_fault", "returned"),
     ]
     assert site.verdict("normal", 50) == [("main.system_fault", "returned")]
+
+
+def test_each_change_of_an_alarm_is_kept_for_who_comes_late():
+    site = Site()
+    site.verdict("pump_fault", 10)
+    site.verdict("normal", 20)
+    site.verdict("pump_fault", 30)
+    late = site.bus.subscribe(alarm_key("*"), history=100)
+    assert [Alarm.decode(payload).state for payload in asyncio.run(late.receive())] == [
+        "unacknowledged",
+        "returned",
+        "unacknowledged",
+    ]
 
 
 def test_a_verdict_that_comes_again_or_late_changes_nothing_but_a_clock_set_back_is_followed():
