@@ -205,8 +205,10 @@ def _off_the_main(spec: Spec, level_m: Floats, pump_record: Floats) -> Floats:
     still = np.concatenate([[False], np.all(np.diff(command) == 0.0, axis=0)])
     is_steady = np.convolve(still, np.ones(STEADY_S), "full")[: still.size] >= STEADY_S
     lift_m = np.maximum(spec.lift_m - spec.lift_slope * (level_m - spec.lift_reference_m), 0.0)
-    asked_m = lift_m + spec.own_loss * flow**2 + spec.shared_loss * flow.sum(axis=0) ** 2
-    off = np.abs(head_m - asked_m) / spec.shutoff_m[:, None]
+    at_header_m = head_m - spec.own_loss * flow**2
+    back = np.sum(command <= 0.0, axis=0) * spec.flap_leak * np.sqrt(np.maximum(at_header_m, 0.0))
+    asked_m = lift_m + spec.shared_loss * (flow.sum(axis=0) - back) ** 2
+    off = np.abs(at_header_m - asked_m) / spec.shutoff_m[:, None]
     return np.asarray(np.max(off, axis=0, where=is_steady & (command > 0.0), initial=0.0), dtype=np.float64)
 
 
