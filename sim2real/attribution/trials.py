@@ -26,6 +26,8 @@ LEAST_PROMISED = 10.0
 """Drop of the weighed squares under which a further effect is not tried: it could not pay for its place."""
 MOST_KEPT = 4.0
 """Times what it promises that an effect may be worth: with less than a set lacks, it is not tried beside that."""
+PART_OF_MOST = 0.5
+"""Part of what the most promising effect promises with which another one is tried, where that is."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -151,9 +153,13 @@ class Trials:
         What steps do to a level that is wrong says nothing of what they do to one that is right.
         """
         free = [alone for candidate, alone in alones.items() if candidate.name not in base.names]
+        promised = list(chain.from_iterable(beside.promises(free)))
+        most = max((one.gain for one in promised), default=0.0)
+        wanted = 2.0 * beside.lacks / MOST_KEPT
+        least = max(LEAST_PROMISED, min(wanted, PART_OF_MOST * most) if most > wanted else wanted)
         of_name: dict[str, list[Promise]] = {}
-        for one in chain.from_iterable(beside.promises(free)):
-            if one.gain > max(LEAST_PROMISED, 2.0 * beside.lacks / MOST_KEPT) or one.candidate.is_pattern:
+        for one in promised:
+            if one.gain > least or one.candidate.is_pattern:
                 of_name.setdefault(one.candidate.name, []).append(one)
         starts = [sorted(its, key=lambda one: -one.gain)[:MOST_STARTS] for its in of_name.values()]
         starts.sort(key=lambda its: (not its[0].candidate.is_pattern, -its[0].gain))

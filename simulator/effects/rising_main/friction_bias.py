@@ -33,6 +33,7 @@ class FrictionBias(Effect):
 
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"factor": 1.0, "loss_exponent": 2.0}
+    has_one_form: ClassVar[bool] = True
     may_change: ClassVar[bool] = True
 
     name: Literal["friction_bias"] = "friction_bias"
