@@ -19,9 +19,6 @@ LENGTH_S = 43_200
 RATES = [(1, "instant"), (5, "instant"), (10, "instant"), (60, "instant"), (10, "mean"), (60, "mean"), (900, "mean")]
 
 
-LIKELIER_LIFT = pytest.mark.xfail(strict=True, reason="a lift is likelier by 4: docs/likelihood-record.md")
-
-
 def record(station, effects=(), seed=23, length_s=LENGTH_S):
     tables = tuple(EffectTable.model_validate(effect) for effect in effects)
     true = station.model_copy(update={"effect": tables})
@@ -113,7 +110,7 @@ def test_a_lag_that_is_not_there_gains_nothing_by_a_filter_that_corrects_too_muc
     [
         pytest.param(1, "instant", ("inflow",), marks=pytest.mark.long),
         pytest.param(10, "instant", ("inflow",), marks=pytest.mark.long),
-        pytest.param(60, "instant", (), marks=[pytest.mark.long, LIKELIER_LIFT]),
+        pytest.param(60, "instant", (), marks=pytest.mark.long),
         pytest.param(60, "mean", ("inflow",), marks=pytest.mark.long),
         (900, "mean", ()),
         pytest.param(10, "held", (), marks=pytest.mark.long),
