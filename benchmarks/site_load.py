@@ -142,6 +142,7 @@ def play(endpoint: str, played: list[Played], accelerate: float, out: Path, gath
                     count += 1
                 await asyncio.sleep(TICK_S)
             np.savez(out, sent_s=sent_s, late_s=late_s)
-            await asyncio.sleep(SETTLE_S)
+            pause_s = gather / accelerate
+            await asyncio.sleep(SETTLE_S + 2.0 * pause_s)  # then who speaks in a rhythm has told which was its last
 
     asyncio.run(run())
