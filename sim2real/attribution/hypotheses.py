@@ -7,6 +7,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.attribution.fitting import ROUNDS, Fit, Fitter
+from wetwell.sim2real.attribution.intervals import left_open
 from wetwell.sim2real.attribution.presence import (
     are_needed,
     is_only_late,
@@ -50,6 +51,8 @@ class Hypothesis:
     fit : Fit
     evidence : Evidence
     form : Form
+    slopes : (cells, parameters) array
+        Change of the residuals with each parameter, over its range.
     is_there : bool
         Whether none of its effects may be neutral, and none that is told could do another's work.
     told : tuple of str
@@ -61,6 +64,7 @@ class Hypothesis:
     fit: Fit
     evidence: Evidence
     form: Form
+    slopes: Floats
     is_there: bool
     told: tuple[str, ...]
     needed: tuple[str, ...]
@@ -110,7 +114,13 @@ class Hypotheses:
         self._plain = self._means(fitter.plain)
         none = evidence_of_none(cells, self._plain)
         self._none = Hypothesis(
-            fit=fitter.plain, evidence=none, form=no_form(cells), is_there=True, told=(), needed=()
+            fit=fitter.plain,
+            evidence=none,
+            form=no_form(cells),
+            slopes=np.zeros((self._plain.size, 0)),
+            is_there=True,
+            told=(),
+            needed=(),
         )
         self._surprise = cell_weights(none, self._none.form)
         self._best: dict[tuple[str, ...], Hypothesis] = {(): self._none}
@@ -176,8 +186,17 @@ class Hypotheses:
         self._unnamed += [one for one in found if one.is_there and one.fit.names[-1] in one.told]
 
     def _is_known(self, residuals: Floats) -> bool:
-        """Whether no material difference parts (cells,) residuals from those of a set that may be the answer."""
-        return any(self._is_within(one.evidence.residuals - residuals, 1.0) for one in self.possible)
+        """Whether no material difference parts (cells,) residuals from those of a set that may be the answer.
+
+        Its parameters may be any that the recording leaves open: a little more of a lag parts nothing.
+        """
+        return any(self._is_within(self._apart(one, residuals), 1.0) for one in self.possible)
+
+    def _apart(self, one: Hypothesis, residuals: Floats) -> Floats:
+        """(cells,) by how much a hypothesis differs from some residuals, its parameters where they differ least."""
+        position, spread = one.fit.position, left_open(one.evidence)
+        room = np.maximum(-position, -spread), np.minimum(1.0 - position, spread)
+        return own_signature(one.evidence.residuals - residuals, one.slopes, self._cells.allowed, room)
 
     def settle(self) -> None:
         """Take what may be the answer to where the recording is likeliest, as long as another answer is near.
@@ -332,6 +351,7 @@ class Hypotheses:
             fit=fit,
             evidence=found,
             form=shown.form,
+            slopes=shown.slopes,
             is_there=shown.may_each_lack
             and bool(is_needed.all())
             and self._are_apart(fit.position, of_member, told, shown.signatures, shown.slopes),
@@ -371,7 +391,8 @@ class Hypotheses:
         """Whether each effect that is told does more than is allowed that the others that are told cannot do."""
         for member in told:
             is_other = np.isin(of_member, told) & (of_member != member)
-            own = own_signature(signatures[member], slopes[:, is_other], self._cells.allowed, position[is_other])
+            room = -position[is_other], 1.0 - position[is_other]
+            own = own_signature(signatures[member], slopes[:, is_other], self._cells.allowed, room)
             if self._is_within(own, 1.0):
                 return False
         return True

@@ -89,6 +89,12 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
     return np.asarray(ends, dtype=np.float64)
 
 
+def left_open(found: Evidence) -> Floats:
+    """(parameters,) half widths of 95 % intervals by the likelihood alone, as parts of the ranges."""
+    precision = found.precision + np.eye(len(found.precision))
+    return np.asarray(TWO_SIDED * np.sqrt(np.diag(np.linalg.inv(precision))), dtype=np.float64)
+
+
 def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
     """Ends that the likelihood brings away from values at which an effect is none, or another one.
 
@@ -105,8 +111,7 @@ def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
     found : Evidence
         Of the same fit, its candidates in the same order.
     """
-    x = fit.position + found.step
-    spread = TWO_SIDED * np.sqrt(np.diag(np.linalg.inv(found.precision + np.eye(x.size))))
+    x, spread = fit.position + found.step, left_open(found)
     likely = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
     sharp, first = ends.copy(), 0
     for candidate in fit.candidates:

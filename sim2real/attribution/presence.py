@@ -53,11 +53,11 @@ def strengths_of(fit: Fit) -> list[dict[int, float]]:
     return found
 
 
-def own_signature(signature: Floats, others: Floats, allowed: Floats, positions: Floats) -> Floats:
+def own_signature(signature: Floats, others: Floats, allowed: Floats, room: tuple[Floats, Floats]) -> Floats:
     r"""What of an effect's signature is left once the others of its set are fitted in its place.
 
     $$f + J \hat x, \qquad \hat x = \arg\min_x \sum_i \left(\frac{f_i + (J x)_i}{a_i}\right)^2,
-    \qquad 0 \le x_0 + x \le 1$$
+    \qquad l \le x \le u$$
 
     A friction that is too high beside a lift that is too low may do next to nothing, though each does much. No other
     goes beyond its range: a leak that would have to flow backwards does nobody's work.
@@ -70,13 +70,13 @@ def own_signature(signature: Floats, others: Floats, allowed: Floats, positions:
         J, change of the residuals with each parameter of the others.
     allowed : (cells,) array
         a, size under which a difference is none.
-    positions : (parameters,) array
-        x₀, where the others stand in their ranges.
+    room : (parameters,) array, (parameters,) array
+        l and u, how far the others may go down and up: to the ends of their ranges.
     """
-    if positions.size == 0:
+    if others.shape[1] == 0:
         return signature
     directions, inner = np.linalg.qr(others / allowed[:, None])
-    change = lsq_linear(inner, -directions.T @ (signature / allowed), (-positions, 1.0 - positions)).x
+    change = lsq_linear(inner, -directions.T @ (signature / allowed), room).x
     return np.asarray(signature + others @ change, dtype=np.float64)
 
 

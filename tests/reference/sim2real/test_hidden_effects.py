@@ -30,16 +30,27 @@ def test_a_single_effect_is_told(seed, effect, metered_share):
 
 
 @pytest.mark.parametrize(
-    ("seed", "plant", "names"),
+    ("kind", "seed", "plant", "names"),
     [
-        pytest.param(8204, "fine", ("air_pocket", "level_sensor_lag"), id="a lag behind steps of a centimetre"),
-        pytest.param(8207, "elastic", ("level_dependent_static_head", "level_quantisation"), id="steps of 16 mm"),
-        pytest.param(8206, "elastic", ("ragging", "static_head_bias"), id="rags of two kinds beside a lift"),
+        pytest.param(
+            "pair", 8204, "fine", ("air_pocket", "level_sensor_lag"), id="a lag behind steps of a centimetre"
+        ),
+        pytest.param(
+            "pair", 8207, "elastic", ("level_dependent_static_head", "level_quantisation"), id="steps of 16 mm"
+        ),
+        pytest.param("pair", 8206, "elastic", ("ragging", "static_head_bias"), id="rags of two kinds beside a lift"),
+        pytest.param(
+            "triple",
+            8648,
+            "elastic",
+            ("flow_meter_gain", "level_sensor_lag", "supply_voltage_variation"),
+            id="a supply whose swing is no sine",
+        ),
     ],
 )
-def test_both_effects_of_a_pair_are_told(seed, plant, names):
+def test_all_effects_are_told(kind, seed, plant, names):
     storage = StoragePlan(rates_s=(1,), metered_share=0.5)
-    case = trial_case(seed, 0, kinds=("pair",), plants=(plant,), seconds=SECONDS, storage=storage)
+    case = trial_case(seed, 0, kinds=(kind,), plants=(plant,), seconds=SECONDS, storage=storage)
     _, truth, recording = material_case(case)
     accepted = diagnose(recording, truth.station).attribution.accepted
     assert accepted is not None

@@ -37,17 +37,17 @@ def test_of_two_effects_that_undo_each_other_neither_has_anything_of_its_own():
     rng = np.random.default_rng(6)
     form, allowed = rng.normal(size=50), rng.uniform(0.5, 2.0, 50)
     small = 0.01 * rng.normal(size=50)
-    middle = np.array([0.5])
+    middle = np.array([-0.5]), np.array([0.5])
     left = own_signature(40.0 * form + small, -100.0 * form[:, None], allowed, middle)
     assert np.linalg.norm(left) <= 1.01 * np.linalg.norm(small) * allowed.max() / allowed.min()
     apart = rng.normal(size=50)
     assert np.linalg.norm(own_signature(apart, -100.0 * form[:, None], allowed, middle)) > 0.8 * np.linalg.norm(apart)
-    assert np.array_equal(own_signature(apart, np.zeros((50, 0)), allowed, np.zeros(0)), apart)
+    assert np.array_equal(own_signature(apart, np.zeros((50, 0)), allowed, (np.zeros(0), np.zeros(0))), apart)
 
 
 def test_no_effect_does_anothers_work_beyond_its_range():
     form, allowed = np.random.default_rng(6).normal(size=50), np.ones(50)
-    at_its_end = np.zeros(1)
+    at_its_end = np.zeros(1), np.ones(1)
     assert own_signature(0.4 * form, form[:, None], allowed, at_its_end) == pytest.approx(0.4 * form)
     assert own_signature(0.4 * form, -form[:, None], allowed, at_its_end) == pytest.approx(np.zeros(50))
     assert own_signature(1.4 * form, -form[:, None], allowed, at_its_end) == pytest.approx(0.4 * form)
