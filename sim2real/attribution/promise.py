@@ -32,6 +32,27 @@ class Alone:
     points: tuple[Floats, ...]
     changes: Floats
 
+    @property
+    def most_scaled(self) -> Floats:
+        """(points,) times what it did that it may do beside others.
+
+        Alone a grid is left where it leads away, at a hundredth of the range: a friction under a meter that reads
+        low. Beside others it may lead far, so the strongest start in each direction goes to the end of its range.
+        """
+        points = np.array(self.points)
+        neutral = np.array([self.candidate.neutral(point) for point in self.points])
+        away = points - neutral
+        room = np.where(away > 0.0, 1.0 - neutral, -neutral)
+        ends = np.divide(room, away, out=np.full_like(away, np.inf), where=away != 0.0).min(axis=1, initial=np.inf)
+        strongest: dict[bytes, int] = {}
+        for k in np.argsort(np.sum(away**2, axis=1)).tolist():
+            strongest[np.where(away[k] == 0.0, points[k], np.sign(away[k]) + 2.0).tobytes()] = k
+        most = np.full(len(points), MOST_SCALED)
+        if not self.candidate.is_limit:
+            far = [k for k in strongest.values() if np.isfinite(ends[k])]
+            most[far] = np.maximum(MOST_SCALED, ends[far])
+        return most
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Promise:
@@ -109,7 +130,7 @@ class Beside:
         along, squares = apart @ left, np.maximum(np.sum(apart**2, axis=1), np.finfo(float).tiny)
         is_strength = np.array([free.neutral is not None for free in alone.candidate.free], dtype=bool)
         is_scaled = is_strength.any() and not alone.candidate.is_pattern
-        scale = np.clip(-along / squares, 0.0, MOST_SCALED) if is_scaled else np.ones(along.size)
+        scale = np.clip(-along / squares, 0.0, alone.most_scaled) if is_scaled else np.ones(along.size)
         best: dict[bytes, int] = {}
         for place in np.argsort(scale * (2.0 * along + scale * squares)).tolist():
             best.setdefault(alone.points[place][~is_strength].tobytes(), place)

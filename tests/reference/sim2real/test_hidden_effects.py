@@ -46,6 +46,13 @@ def test_a_single_effect_is_told(seed, effect, metered_share):
             ("flow_meter_gain", "level_sensor_lag", "supply_voltage_variation"),
             id="a supply whose swing is no sine",
         ),
+        pytest.param(
+            "triple",
+            8661,
+            "fine",
+            ("flow_meter_gain", "friction_bias", "threshold_shift"),
+            id="a friction that a meter hides, whose start leads away alone",
+        ),
     ],
 )
 def test_all_effects_are_told(kind, seed, plant, names):

@@ -8,7 +8,7 @@ import pytest
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fitter
-from wetwell.sim2real.attribution.promise import MOST_COLUMNS, Alone, Beside
+from wetwell.sim2real.attribution.promise import MOST_COLUMNS, MOST_SCALED, Alone, Beside
 from wetwell.sim2real.recording.regimes import STEADY, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -149,7 +149,24 @@ def test_a_pattern_promises_what_it_does_as_strong_as_the_values_show_it():
         promise = best(beside.promises([its]))
         gains[name] = one.free[0].value(float(promise.point[0])), promise.gain
     assert gains["level_quantisation"] == pytest.approx((0.02, 9.0 * (9.0 - 4.0)))
-    assert gains["static_head_bias"] == pytest.approx((0.04, 9.0 * (9.0 - 1.0)))
+    assert gains["static_head_bias"] == pytest.approx((0.06, 9.0 * 9.0))
+
+
+def test_the_strongest_start_of_each_direction_goes_to_the_end_of_its_range():
+    """Not so a limit: what it does has no slope."""
+    (lift,), (cutoff,) = (candidates_of(1, 1, only=[name]) for name in ("static_head_bias", "flow_low_cutoff"))
+    starts = {lift: (0.02, 0.1, -0.02), cutoff: (1.0, 2.0)}
+    most = {
+        one.name: Alone(
+            candidate=one,
+            points=tuple(np.array([one.free[0].normalised(value)]) for value in values),
+            changes=np.zeros((len(values), 9)),
+        ).most_scaled
+        for one, values in starts.items()
+    }
+    high, low = lift.free[0].high, lift.free[0].low
+    assert most["static_head_bias"] == pytest.approx([MOST_SCALED, high / 0.1, low / -0.02])
+    assert most["flow_low_cutoff"] == pytest.approx([MOST_SCALED, MOST_SCALED])
 
 
 def test_others_that_do_nearly_the_same_stay_within_their_ranges_together(alpha):
