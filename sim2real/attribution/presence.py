@@ -71,7 +71,7 @@ def own_signature(signature: Floats, others: Floats, allowed: Floats, room: tupl
     allowed : (cells,) array
         a, size under which a difference is none.
     room : (parameters,) array, (parameters,) array
-        l and u, how far the others may go down and up: to the ends of their ranges.
+        l and u, how far the others may go down and up.
     """
     if others.shape[1] == 0:
         return signature
