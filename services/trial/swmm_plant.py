@@ -16,6 +16,7 @@ from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.errors import WetwellError
 from wetwell.protocols.orders import first_place, go_on, orders_of
 from wetwell.protocols.recordings.recording import Recording
+from wetwell.sim2real.recording.seconds import since_changes
 from wetwell.sim2real.truth import kernel
 from wetwell.sim2real.truth.case import TruthCase
 from wetwell.sim2real.truth.parts import Truth
@@ -202,8 +203,7 @@ def _off_the_main(spec: Spec, level_m: Floats, pump_record: Floats) -> Floats:
     0 but in steady running.
     """
     command, flow, head_m = pump_record[:3]
-    still = np.concatenate([[False], np.all(np.diff(command) == 0.0, axis=0)])
-    is_steady = np.convolve(still, np.ones(STEADY_S), "full")[: still.size] >= STEADY_S
+    is_steady = np.min([since_changes(one) for one in command], axis=0) >= STEADY_S
     lift_m = np.maximum(spec.lift_m - spec.lift_slope * (level_m - spec.lift_reference_m), 0.0)
     at_header_m = head_m - spec.own_loss * flow**2
     back = np.sum(command <= 0.0, axis=0) * spec.flap_leak * np.sqrt(np.maximum(at_header_m, 0.0))

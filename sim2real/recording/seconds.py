@@ -35,7 +35,7 @@ def filled(values: Floats, longest: int, otherwise: float) -> Floats:
     return np.asarray(held, dtype=np.float64)
 
 
-def since_changes(key: Integers) -> Integers:
+def since_changes(key: Integers | Floats) -> Integers:
     """(n,) places since a key changed last.
 
     Examples
