@@ -45,6 +45,7 @@ MAX_STATIONS = 10_000
 
 ALARM_HISTORY = 100
 """Changes of an alarm that are kept for who missed some: as many as of verdicts."""
+
 SAVING_SHARE = 0.1
 """Of the time for which the state is being written at the most, but for acts: it is written whole."""
 
