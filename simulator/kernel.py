@@ -153,6 +153,8 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
             station.ramp_power,
             station.speed_lag_s,
             station.ramp_bow,
+            station.ramp_ahead,
+            station.ramp_knee,
         )
         if now.shaft_ratio <= 0.0:
             state.speed_ratio[i] = 0.0

@@ -157,6 +157,8 @@ class PlantParameters:
     dwell_s: float
     ramp_power: float = 1.0
     ramp_bow: float = 0.0
+    ramp_ahead: float = 0.0
+    ramp_knee: float = 0.25
     speed_lag_s: float = 0.0
 
     start_levels_m: Floats

@@ -30,6 +30,10 @@ CUTOFFS = (1.04, 0.98, 0.85, 0.7, 0.5, 0.35)
 and a ramp may pass what is between within a second."""
 WAVES_S = (0.0, 1.0, 3.0, 8.0)
 """Ways of a wave there and back: rigid water, and mains of some hundred metres to some kilometres."""
+KNEES = (0.1, 0.3, 0.6)
+"""Shares of a ramp at which the first of two slopes may end."""
+AHEAD = 0.5
+"""Share of what is left there that it does as well: a power law or an S is a poor start for two slopes."""
 BENCH = 8.0
 """Exponent of a sump's area with a bench."""
 EDGES = (0.25, 0.5, 0.75)
@@ -63,6 +67,9 @@ def initial_guesses(
         return [guess | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [guess]
     if "wave_s" in names:
         return [guess | {"wave_s": wave_s} for wave_s in WAVES_S]
+    if "knee" in names:
+        straight = {free.name: free.neutral for free in candidate.free if free.neutral is not None}
+        return [guess, *(straight | {"ahead": AHEAD, "knee": knee} for knee in KNEES)]
     if "reference_level_m" in names:
         return [guess | {"reference_level_m": far * middle_m} for far in REFERENCES]
     if "exponent" in names:

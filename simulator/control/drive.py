@@ -42,11 +42,20 @@ def next_frequency_hz(
 
 @compiled
 def turned_ratio(
-    commanded_ratio: float, before_ratio: float, ramp_power: float, lag_s: float, ramp_bow: float = 0.0
+    commanded_ratio: float,
+    before_ratio: float,
+    ramp_power: float,
+    lag_s: float,
+    ramp_bow: float = 0.0,
+    ramp_ahead: float = 0.0,
+    ramp_knee: float = 0.25,
 ) -> float:
     r"""Speed ratio of the shaft for a commanded one: another shape of the ramp, and a first-order lag.
 
-    $$N = \left((1 - b) N_c + \frac{b}{2} (1 - \cos \pi N_c)\right)^p, \qquad
+    $$N_1 = \begin{cases} N_c\, n / x & N_c < x \\ 1 - (1 - N_c) (1 - n) / (1 - x) & N_c \ge x \end{cases}, \qquad
+    n = x + a (1 - x)$$
+
+    $$N = \left((1 - b) N_1 + \frac{b}{2} (1 - \cos \pi N_1)\right)^p, \qquad
     N \leftarrow N_\text{before} + (N - N_\text{before}) (1 - e^{-1 / \tau})$$
 
     At rest and at nominal speed the shape makes no difference.
@@ -61,13 +70,20 @@ def turned_ratio(
         τ; 0 follows at once. [s]
     ramp_bow : float
         b; share of an S, a half cosine. [1]
+    ramp_ahead, ramp_knee : float
+        a, share of what is left at a knee that the first of two slopes does as well, and x, the knee. [1]
 
     Examples
     --------
     >>> turned_ratio(0.5, 0.4, 1.0, 0.0), turned_ratio(0.5, 0.4, 2.0, 0.0)
     (0.5, 0.25)
+    >>> turned_ratio(0.25, 0.0, 1.0, 0.0, 0.0, 0.5, 0.5), turned_ratio(0.75, 0.0, 1.0, 0.0, 0.0, 0.5, 0.5)
+    (0.375, 0.875)
     """
     ratio = commanded_ratio
+    if ramp_ahead != 0.0 and ratio < 1.0:
+        left = (1.0 - ramp_ahead) * (1.0 - ramp_knee)
+        ratio = ratio * (1.0 - left) / ramp_knee if ratio < ramp_knee else 1.0 - (1.0 - ratio) * (1.0 - ramp_ahead)
     if ramp_bow != 0.0 and ratio < 1.0:
         ratio = (1.0 - ramp_bow) * ratio + 0.5 * ramp_bow * (1.0 - math.cos(math.pi * ratio))
     if ramp_power != 1.0:

@@ -407,6 +407,16 @@ def test_ramp_shape_of_a_power(quiet_alpha):
     np.testing.assert_allclose(speeds_of(rows), commanded**2, atol=1e-9)
 
 
+def test_ramp_shape_of_two_slopes(quiet_alpha):
+    """A drive that is at half speed after a tenth of its ramp."""
+    knee, at_knee = 0.1, 0.5
+    ahead = (at_knee - knee) / (1.0 - knee)
+    rows = run(quiet_alpha, {"name": "ramp_shape", "ahead": ahead, "knee": knee}, seconds=400)
+    commanded = rows["pump1_frequency_hz"] / NOMINAL_HZ
+    assert np.sum((commanded > 0) & (commanded < 1)) >= 15
+    np.testing.assert_allclose(speeds_of(rows), np.interp(commanded, [0, knee, 1], [0, at_knee, 1]), atol=1e-9)
+
+
 def test_ramp_shape_of_a_lag(quiet_alpha):
     """The command holds for a second, so that the exponential step is exact."""
     lag_s = 4.0
