@@ -222,7 +222,8 @@ def _one_pump(
     rated = float(np.median(np.abs(recorded[running if running.any() else counted])))
     if rated == 0.0:
         return None
-    slope = np.gradient(expected)
+    slope = np.abs(np.gradient(expected))
+    slope[is_ramp] = np.maximum(slope[is_ramp], np.abs(_usual(np.gradient(recorded), regime, is_ramp)))
     size = _usual_size(np.where(counted, recorded, 0.0), expected, regime, is_ramp)
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
     late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
@@ -264,9 +265,16 @@ def _usual_size(recorded: Floats, expected: Floats, regime: Integers, is_ramp: F
         rows = (regime == steady) & (expected > 0.0) & (size > 0.0)
         if rows.any():
             size[rows] = np.median(size[rows] / expected[rows]) * expected[rows]
-    keys, group = np.unique((since_changes(regime) * len(REGIMES) + regime)[is_ramp], return_inverse=True)
-    size[is_ramp] = (np.bincount(group, size[is_ramp], keys.size) / np.bincount(group, minlength=keys.size))[group]
+    size[is_ramp] = _usual(size, regime, is_ramp)
     return size
+
+
+def _usual(values: Floats, regime: Integers, is_ramp: Flags) -> Floats:
+    """Of those of (n,) values that are in ramps the mean of all that are known at that second of a ramp."""
+    keys, group = np.unique((since_changes(regime) * len(REGIMES) + regime)[is_ramp], return_inverse=True)
+    is_known = np.isfinite(values[is_ramp])
+    sums = np.bincount(group, np.where(is_known, values[is_ramp], 0.0), keys.size)
+    return np.asarray((sums / np.maximum(np.bincount(group, is_known, keys.size), 1.0))[group], dtype=np.float64)
 
 
 def _share(materiality: Materiality, name: AnalogueQuantity) -> float:

@@ -77,7 +77,7 @@ def test_what_explains_less_of_the_loss_than_a_limit_is_weighed_where_it_surpris
     """A limit takes seconds of starts away, in which a right model is often wrong."""
     area, limit = of_all(alpha, "sump_area_profile"), of_all(alpha, "flow_low_cutoff")
     truth = [
-        EFFECTS["water_inertia"](inertia_s2_m2=400.0),
+        EFFECTS["water_inertia"](inertia_s2_m2=1500.0),
         EFFECTS["sump_area_profile"](bottom_factor=0.92, height_m=1.2),
     ]
     fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, [area, limit])

@@ -62,3 +62,19 @@ def test_what_pumps_take_from_a_drained_wet_well_is_not_compared(alpha):
     assert not is_low[compared].any()
     is_running = np.any(traces.frequency_hz > 0.0, axis=0)
     assert is_running[compared].sum() > 0.8 * (is_running & (traces.level_m > 0.1)).sum()
+
+
+def test_a_reading_that_moves_late_may_be_as_early_or_late_as_one_that_was_expected_to(alpha):
+    """A flow that falls six seconds after it is expected to: where it falls, nothing was expected to move."""
+    late = alpha.model_copy(update={"effect": (EFFECTS["channel_delay"](channel="flow_m3h", delay_s=6.0),)})
+    traces = traces_of(Simulation(late, Scenario(name="plain"), 7, 0).advance(14_400, truth=False), alpha)
+    replay = Replay(traces, alpha)
+    plain = replay.run()
+    found = pump_residuals(traces, alpha, regimes_of(traces, alpha), plain, replay.doubt(is_level_held=False), {})
+    for one in (one for one in found if one.name == "flow_m3h"):
+        falls_m3h_s = np.abs(one.seconds.means(np.gradient(traces.signals["flow_m3h"][one.pump])))
+        expected_m3h = one.seconds.means(plain.signals["flow_m3h"][one.pump])
+        moves_late = (expected_m3h == 0.0) & (falls_m3h_s > 20.0)
+        assert moves_late.sum() > 20
+        allowed_m3h = (one.bins.material * one.bins.deviation)[moves_late]
+        assert np.all(allowed_m3h > 0.8 * alpha.materiality.time_s * falls_m3h_s[moves_late])
