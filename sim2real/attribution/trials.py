@@ -78,8 +78,11 @@ class Trials:
         return self._fitter.along(candidate, self._start_grids(candidate), beside)
 
     def _alones(self, base: Fit) -> Mapping[Candidate, Alone]:
-        """What each candidate does alone; where the base has another layout of the station, what it does in that."""
-        layout = tuple(one for one in base.candidates if one.is_layout)
+        """What each candidate does alone; where the base has another layout of the station, what it does in that.
+
+        So where telemetry holds or rounds a channel: what moves within that shows nothing there.
+        """
+        layout = tuple(sorted((one for one in base.candidates if one.is_layout or one.is_pattern), key=str))
         if not layout:
             return {one: alone for one, (alone, _) in self._alone.items()}
         if layout not in self._in_layout:

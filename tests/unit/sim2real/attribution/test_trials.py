@@ -115,6 +115,20 @@ def test_what_an_effect_does_beside_a_header_is_tried_in_that_layout(alpha):
     assert found.leak_m3h == pytest.approx(6.0, rel=0.1)
 
 
+def test_what_an_effect_does_beside_a_held_channel_is_tried_there(alpha):
+    """A head that is sent when it has moved by two metres shows hardly any of a lift, which would else be too much."""
+    held = next(one for one in candidates_of(3, 1, only=["report_by_exception"]) if ("channel", "head_m") in one.fixed)
+    lift = of_all(alpha, "static_head_bias")
+    truth = [EFFECTS["report_by_exception"](channel="head_m", deadband=2.0), EFFECTS["static_head_bias"](offset_m=1.5)]
+    fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, [held, lift])
+    (alone,) = (fit for fit in trials.singles() if fit.names == ("report_by_exception",))
+    (beside,) = hypotheses.beside([alone])
+    ((promise,),) = beside.promises([trials._alones(alone)[lift]])
+    replayed = fitter.at([held, lift], [*alone.points, promise.point])
+    ((kept,),) = beside.promises([trials._doing(alone, [replayed])])
+    assert promise.gain == pytest.approx(kept.gain, rel=0.1)
+
+
 @pytest.mark.check
 def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start():
     """Four pumps share a main, so that each moves little, and its meter reads 0 under 30 m³/h.
