@@ -53,7 +53,7 @@ def initial_guesses(
     guess = _seen(names, channel, residuals.telemetry.patterns)
     if candidate.is_pattern and not guess:
         return []
-    control, middle_m = replay.station.control, replay.station.middle_level_m
+    middle_m = replay.station.middle_level_m
     guess |= {name: middle_m for name in ("reference_level_m", "height_m") if name in names}
     if "rated_factor" in names and "power_kw" in replay.traces.signals:
         guess["rated_factor"] = _rated_factor(replay)
@@ -61,6 +61,13 @@ def initial_guesses(
         guess |= _late(channel, replay)
     if "fast_period_s" in names:
         guess |= _swing(residuals.bins, replay.traces.time_s, plain)
+    return _forms(candidate, guess, replay)
+
+
+def _forms(candidate: Candidate, guess: dict[str, float], replay: Replay) -> list[dict[str, float]]:
+    """A guess in each of the forms that no slope leads to from another one."""
+    names = {free.name for free in candidate.free}
+    control, middle_m = replay.station.control, replay.station.middle_level_m
     if "cutoff_m3h" in names and "flow_m3h" in replay.traces.signals:
         flow_m3h = replay.traces.signals["flow_m3h"]
         least_m3h = float(np.min(flow_m3h[flow_m3h > ZERO_SHARE * np.nanmax(flow_m3h)], initial=np.inf))

@@ -32,7 +32,7 @@ class RampShape(Effect):
     References
     ----------
     .. [1] After B. K. Bose, Modern Power Electronics and AC Drives: ramps and slip of drives in open loop.
-    .. [2] Phase Technologies, SD Series manual, 6.6: to 30 Hz in a second and on to full speed in ten, for submersibles.
+    .. [2] Phase Technologies, SD Series manual, 6.6: submersible pumps, to 30 Hz in a second, to full speed in ten.
     """
 
     component: ClassVar[Component] = "drive"

@@ -116,10 +116,14 @@ def test_what_an_effect_does_beside_a_header_is_tried_in_that_layout(alpha):
 
 
 def test_what_an_effect_does_beside_a_held_channel_is_tried_there(alpha):
-    """A head that is sent when it has moved by two metres shows hardly any of a lift, which would else be too much."""
-    held = next(one for one in candidates_of(3, 1, only=["report_by_exception"]) if ("channel", "head_m") in one.fixed)
+    """A head that is sent when it has moved by two metres shows hardly any of a lift."""
+    reports = candidates_of(3, 1, only=["report_by_exception"])
+    held = next(one for one in reports if ("channel", "head_m") in one.fixed)
     lift = of_all(alpha, "static_head_bias")
-    truth = [EFFECTS["report_by_exception"](channel="head_m", deadband=2.0), EFFECTS["static_head_bias"](offset_m=1.5)]
+    truth = [
+        EFFECTS["report_by_exception"](channel="head_m", deadband=2.0),
+        EFFECTS["static_head_bias"](offset_m=1.5),
+    ]
     fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, [held, lift])
     (alone,) = (fit for fit in trials.singles() if fit.names == ("report_by_exception",))
     (beside,) = hypotheses.beside([alone])
