@@ -222,8 +222,9 @@ def _one_pump(
     rated = float(np.median(np.abs(recorded[running if running.any() else counted])))
     if rated == 0.0:
         return None
-    slope = np.abs(np.gradient(expected))
-    slope[is_ramp] = np.maximum(slope[is_ramp], np.abs(_usual(np.gradient(recorded), regime, is_ramp)))
+    slope = np.gradient(expected)
+    usual = _usual(np.gradient(recorded), regime, is_ramp)
+    slope[is_ramp] = np.where(np.abs(usual) > np.abs(slope[is_ramp]), usual, slope[is_ramp])
     size = _usual_size(np.where(counted, recorded, 0.0), expected, regime, is_ramp)
     noise_alone = noise.of_mean(seconds.counts) * seconds.means(size)
     late = np.hypot(TIMING_S * seconds.means(slope), seconds.means(unresolved))
