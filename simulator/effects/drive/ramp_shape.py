@@ -14,7 +14,7 @@ class RampShape(Effect):
     N_1 = \begin{cases} N_c\, n / x & N_c < x \\ 1 - (1 - N_c) (1 - n) / (1 - x) & N_c \ge x \end{cases}$$
 
     with the command $N_c = f / f_n$, which is what is recorded, and $n = x + a (1 - x)$. At nominal speed the shape
-    makes no difference. Drives for pumps have two slopes: a steep first one spares the bearings low speed.
+    makes no difference. Drives for pumps may have two slopes: a steep first one spares the bearings low speed.
 
     Parameters
     ----------
