@@ -275,14 +275,14 @@ class Hypotheses:
         return list(self._each(self._beside, fits))
 
     def _beside(self, fit: Fit) -> Beside:
-        shown = self._shown(fit)
-        found = evidence(self._cells, shown.residuals, shown.slopes, shown.form, fit.position)
+        known = self._best.get(tuple(sorted(fit.names)))
+        one = known if known is not None and known.fit is fit else self._weighed(fit)
         return Beside(
-            weights=cell_weights(found, shown.form),
-            residuals=shown.residuals,
-            slopes=shown.slopes,
+            weights=cell_weights(one.evidence, one.form),
+            residuals=self._means(fit),
+            slopes=one.slopes,
             position=fit.position,
-            lacks=self.weighed[0].evidence.log - found.log,
+            lacks=self.weighed[0].evidence.log - one.evidence.log,
         )
 
     def _settled(self, one: Hypothesis) -> Hypothesis:

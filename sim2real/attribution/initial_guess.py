@@ -3,7 +3,6 @@
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from scipy.signal import correlate
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.attribution.candidates import Candidate
@@ -120,7 +119,7 @@ def _delay_s(recorded: Floats, expected: Floats) -> float:
     alike = np.zeros(LONGEST_DELAY_S + 1)
     for values, its in zip(recorded, expected, strict=True):
         moved, expected_to = (np.nan_to_num(np.diff(each)) for each in (values, its))
-        alike += correlate(moved, expected_to, method="fft")[its.size - 2 :][: alike.size]
+        alike += [float(moved[delay:] @ expected_to[: moved.size - delay]) for delay in range(alike.size)]
     return float(np.argmax(alike))
 
 
