@@ -13,6 +13,7 @@ from wetwell.sim2real.replay.lattice import lattice
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
 from wetwell.sim2real.residuals.noise import configured_noise
+from wetwell.sim2real.residuals.phases import PHASES_S
 from wetwell.simulator.telemetry.channels import channels_of
 
 MIN_MOVES, FEWEST = 30, 10
@@ -82,7 +83,11 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TelemetryResiduals:
-    """One residual a cycle for each pattern that is no usual rounding; `patterns` holds those too."""
+    """One residual a cycle for each pattern that is no usual rounding; `patterns` holds those too.
+
+    Each pattern has a span of its own in the cycles, and so is in a group of its own: the deadband of one channel
+    explains no other pattern.
+    """
 
     bins: Bins
     patterns: tuple[Pattern, ...]
@@ -107,16 +112,19 @@ class TelemetryResiduals:
 
 def telemetry_residuals(traces: Traces, station: Station, regimes: Regimes) -> TelemetryResiduals:
     """Patterns of all channels that carry noise; a recording without noise shows none."""
-    cycle, first = np.unique(regimes.cycle, return_index=True)
     patterns = tuple(_patterns(traces, station.sensors, regimes))
-    count = len(_told(patterns))
+    since_s = np.r_[0, PHASES_S + 1][: len(_told(patterns))]
+    count = since_s.size
+    cycle, first = np.unique(regimes.cycle, return_index=True)
+    is_long = np.diff(first, append=regimes.cycle.size) > since_s.max(initial=0)
+    cycle, first = cycle[is_long], first[is_long]
     return TelemetryResiduals(
         bins=Bins(
             signal=np.full(cycle.size * count, TELEMETRY),
             regime=np.full(cycle.size * count, STEADY),
             cycle=np.tile(cycle, count),
             pump=np.full(cycle.size * count, NO_PUMP),
-            second=np.tile(first, count),
+            second=(since_s[:, None] + first).ravel(),
             deviation=np.ones(cycle.size * count),
             floor=np.zeros(cycle.size * count),
             tolerance=np.zeros(cycle.size * count),

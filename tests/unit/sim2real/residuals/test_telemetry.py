@@ -6,6 +6,7 @@ import pytest
 from wetwell.services.stations import find_scenario
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.residuals.phases import phase
 from wetwell.sim2real.residuals.telemetry import telemetry_residuals
 from wetwell.simulator.simulation import Simulation
 
@@ -86,6 +87,18 @@ def test_a_level_that_is_stored_to_a_centimetre_is_no_gap(recorded, step_m, is_t
     assert pattern.quantum == pytest.approx(step_m, rel=0.05)
     assert pattern.rounding(0.0) == (0.0 if is_told else pattern.quantum), "a usual step is excused in any case"
     assert bool(telemetry.bins.size) == is_told
+
+
+def test_each_pattern_is_in_a_group_of_its_own(recorded):
+    """In one group the deadband of a head explained the steps of a level, and these were never told."""
+    station, recording = recorded
+    columns = recording.columns | {"level_m": np.round(recording.columns["level_m"] / 0.02) * 0.02}
+    columns |= {name: held(recording.columns[name], 0.5, 10**6, 0) for name in NAMES}
+    traces = traces_of(type(recording)(time_ns=recording.time_ns, columns=columns), station)
+    telemetry = telemetry_residuals(traces, station, regimes_of(traces, station))
+    assert [pattern.effect for pattern in telemetry.patterns] == ["level_quantisation", "report_by_exception"]
+    spans = phase(telemetry.bins).reshape(2, -1)
+    assert [np.unique(span).tolist() for span in spans] == [[0], [1]]
 
 
 @pytest.mark.parametrize(
