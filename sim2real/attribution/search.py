@@ -37,12 +37,17 @@ class Search:
         self._tried: set[frozenset[str]] = {frozenset()}
 
     def run(self) -> None:
-        """Try one more effect beside the most probable set, and beside the likeliest sets of each size."""
+        """Try one more effect beside the most probable set, and of each size beside the likeliest and the closest.
+
+        What is far off is poor under each set, however far: the likeliest part of a set may be none of the right one.
+        The loss still says which part comes closest.
+        """
         while True:
             self._around_the_best()
             fits = [one.fit for one in self._hypotheses.possible]
             of_size = [[fit for fit in fits if len(fit.names) == size] for size in range(1, MOST_EFFECTS)]
-            if not self._extended([fit for its in of_size for fit in its[:MOST_EXTENDED]]):
+            closest = [min(its, key=self._fitter.cost) for its in of_size if its]
+            if not self._extended([*(fit for its in of_size for fit in its[:MOST_EXTENDED]), *closest]):
                 return
 
     def _around_the_best(self) -> None:
@@ -60,8 +65,9 @@ class Search:
 
     def _extended(self, fits: Sequence[Fit]) -> bool:
         """Weigh some fits with one more effect, and say whether there was one of which that was not known."""
-        bases = [fit for fit in fits if len(fit.names) < MOST_EFFECTS and frozenset(fit.names) not in self._tried]
-        self._tried |= {frozenset(base.names) for base in bases}
+        of_names = {frozenset(fit.names): fit for fit in fits if len(fit.names) < MOST_EFFECTS}
+        bases = [fit for names, fit in of_names.items() if names not in self._tried]
+        self._tried |= of_names.keys()
         if bases:
             self._hypotheses.add(self._trials.with_one_more(bases, self._hypotheses.beside(bases)))
         return bool(bases)
