@@ -128,6 +128,11 @@ class Hypotheses:
         self._unnamed: list[Hypothesis] = []
 
     @property
+    def known(self) -> set[frozenset[str]]:
+        """All sets of effects that were weighed."""
+        return {frozenset(effects) for effects in self._best}
+
+    @property
     def possible(self) -> list[Hypothesis]:
         """Those that may be true, the most probable recording first; that of no effects is among them."""
         found = [one for one in self._best.values() if one.is_possible]

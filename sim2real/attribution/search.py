@@ -13,6 +13,9 @@ from wetwell.simulator.effects import EFFECTS
 MOST_EFFECTS = 4
 """Effects of a set: three, and the inertia that the water of each main has."""
 
+MANY_EFFECTS = 3
+"""Effects of a set that may do the work of fewer, one of which was never tried beside the others."""
+
 MOST_EXTENDED = 2
 """Sets of each size beside which one more effect is tried: a pair may be right that is less probable than many
 triples."""
@@ -35,6 +38,7 @@ class Search:
     def __init__(self, fitter: Fitter, trials: Trials, hypotheses: Hypotheses) -> None:
         self._fitter, self._trials, self._hypotheses = fitter, trials, hypotheses
         self._tried: set[frozenset[str]] = {frozenset()}
+        self._tried_anew: set[frozenset[str]] = set()
 
     def run(self) -> None:
         """Try one more effect beside the most probable set, and of each size beside the likeliest and the closest.
@@ -44,11 +48,17 @@ class Search:
         """
         while True:
             self._around_the_best()
-            fits = [one.fit for one in self._hypotheses.possible]
-            of_size = [[fit for fit in fits if len(fit.names) == size] for size in range(1, MOST_EFFECTS)]
-            closest = [min(its, key=self._fitter.cost) for its in of_size if its]
-            if not self._extended([*(fit for its in of_size for fit in its[:MOST_EXTENDED]), *closest]):
+            of_size = self._of_sizes()
+            likely = [fit for its in of_size for fit in its[:MOST_EXTENDED]]
+            closest = [min(its, key=self._fitter.cost) for its in of_size]
+            if not self._extended([*likely, *closest]) and not self._extended_anew():
                 return
+
+    def _of_sizes(self) -> list[list[Fit]]:
+        """Sets that may be the answer and can be extended, by their number of effects, the likeliest first."""
+        fits = [one.fit for one in self._hypotheses.possible]
+        of_size = ([fit for fit in fits if len(fit.names) == size] for size in range(1, MOST_EFFECTS))
+        return [its for its in of_size if its]
 
     def _around_the_best(self) -> None:
         """Try one more effect beside the most probable set, and beside it without each of its effects.
@@ -70,6 +80,18 @@ class Search:
         self._tried |= of_names.keys()
         if bases:
             self._hypotheses.add(self._trials.with_one_more(bases, self._hypotheses.beside(bases)))
+        return bool(bases)
+
+    def _extended_anew(self) -> bool:
+        """Where it takes many effects, try one beside the likeliest of fewer by what it does there; say as above."""
+        most = len(self._hypotheses.weighed[0].fit.names)
+        if most < MANY_EFFECTS:
+            return False
+        likeliest = {frozenset(its[0].names): its[0] for its in self._of_sizes() if len(its[0].names) <= most}
+        bases = [fit for names, fit in likeliest.items() if names not in self._tried_anew]
+        self._tried_anew |= likeliest.keys()
+        if bases:
+            self._hypotheses.add(self._trials.anew(bases, self._hypotheses.beside(bases), self._hypotheses.known))
         return bool(bases)
 
 

@@ -1,7 +1,7 @@
 """The effects of the library, tried one by one: alone, and beside others."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import cached_property, partial
 from itertools import chain
 from typing import Any
 
@@ -125,20 +125,40 @@ class Trials:
         besides : sequence of Beside
             The same, as what the others come beside.
         """
-        pairs = list(zip(bases, besides, strict=True))
-        alones = [self._alones(base) for base in bases]
-        promises = self._each(lambda pair: self._promising(*pair), zip(bases, besides, alones, strict=True))
-        likely = [(base, one) for base, its in zip(bases, promises, strict=True) for one in its]
+        return self._one_more(
+            [(base, beside, self._alones(base)) for base, beside in zip(bases, besides, strict=True)]
+        )
+
+    def anew(self, bases: Sequence[Fit], besides: Sequence[Beside], known: Collection[frozenset[str]]) -> list[Fit]:
+        """The same by what each effect does beside a fit, replayed there, where such a set is not known yet.
+
+        What it does alone may be something else: a leak makes no wet well run dry that an inflow feeds.
+        """
+        found = []
+        for base, beside in zip(bases, besides, strict=True):
+            names = frozenset(base.names)
+            others = [one for one in self._guesses if one.name not in names and names | {one.name} not in known]
+            tried = self._each(partial(self._weakest, base), [one for one in others if not one.is_pattern])
+            found.append((base, beside, {fits[0].candidates[-1]: self._doing(base, fits) for fits in tried if fits}))
+        return self._one_more(found)
+
+    def _weakest(self, base: Fit, candidate: Candidate) -> list[Fit]:
+        return self._fitter.along(candidate, [grid[:1] for grid in self._start_grids(candidate)], base)
+
+    def _one_more(self, bases: Sequence[tuple[Fit, Beside, Mapping[Candidate, Alone]]]) -> list[Fit]:
+        promises = self._each(lambda one: self._promising(*one), bases)
+        likely = [(base, one) for (base, *_), its in zip(bases, promises, strict=True) for one in its]
         tried = list(self._each(lambda pair: self._at(*pair), likely))
         firsts = []
-        for base, beside in pairs:
+        for base, beside, alones in bases:
             own = [fit for (its, _), fit in zip(likely, tried, strict=True) if its is base and fit is not None]
             promised = beside.promises([self._doing(base, [fit]) for fit in own])
             best: dict[str, tuple[Fit, Promise]] = {}
             for k in sorted(range(len(own)), key=lambda k: -promised[k][0].gain):
                 best.setdefault(own[k].candidates[-1].name, (own[k], promised[k][0]))
-            firsts += [(base, beside, *one) for one in list(best.values())[:MOST_REFINED]]
-        firsts.sort(key=lambda one: -one[2].position.size)  # the longest first, so that all cores end together
+            likeliest = list(best.values())[:MOST_REFINED]
+            firsts += [(base, beside, alones[fit.candidates[-1]], fit, promise) for fit, promise in likeliest]
+        firsts.sort(key=lambda one: -one[3].position.size)  # the longest first, so that all cores end together
         return list(self._each(lambda one: self._refined(*one), firsts))
 
     def _doing(self, base: Fit, fits: Sequence[Fit]) -> Alone:
@@ -171,7 +191,7 @@ class Trials:
     def _at(self, current: Fit, promise: Promise) -> Fit | None:
         return self._fitter.at((*current.candidates, promise.candidate), (*current.points, promise.point))
 
-    def _refined(self, current: Fit, beside: Beside, fit: Fit, promise: Promise) -> Fit:
+    def _refined(self, current: Fit, beside: Beside, alone: Alone, fit: Fit, promise: Promise) -> Fit:
         """A fit with one more effect, refined: where it ends worse than without that, from another start.
 
         What it does as it was replayed says how strong it should be: a limit does little more until it is passed.
@@ -183,7 +203,7 @@ class Trials:
         refined = fitter.refine(fit if nearer is None else min(fit, nearer, key=fitter.cost))
         if fitter.cost(refined) <= fitter.cost(current):
             return refined
-        ((stays, *_),) = beside.still.promises([self._alones(current)[fit.candidates[-1]]])
+        ((stays, *_),) = beside.still.promises([alone])
         again = self._at(current, stays)
         found = [refined] if again is None else [refined, fitter.refine(again)]
         return min(found, key=fitter.cost)

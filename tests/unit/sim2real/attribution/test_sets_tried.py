@@ -8,9 +8,9 @@ from wetwell.sim2real.attribution.search import MOST_EXTENDED, Search
 class Given:
     """Effects are letters; how probable each set of them is stands in a table."""
 
-    def __init__(self, logs, losses):
+    def __init__(self, logs, losses, masked):
         self._logs, self._known, self.tried = logs, {names for names in logs if len(names) == 1}, []
-        self._losses = losses
+        self._losses, self._masked, self.tried_anew = losses, masked, []
         self._hypotheses = {names: SimpleNamespace(fit=made(names), effects=names) for names in logs}
 
     def cost(self, fit):
@@ -24,7 +24,20 @@ class Given:
 
     def with_one_more(self, bases, _):
         self.tried += [base.names for base in bases]
-        return [made((*base.names, name)) for base in bases for name in "abcdefgh" if name not in base.names]
+        return [
+            made((*base.names, name))
+            for base in bases
+            for name in "abcdefgh"
+            if name not in (*base.names, self._masked)
+        ]
+
+    def anew(self, bases, _, known):
+        self.tried_anew += [base.names for base in bases]
+        return [made((*base.names, self._masked)) for base in bases if {*base.names, self._masked} not in known]
+
+    @property
+    def known(self):
+        return {frozenset(names) for names in self._known}
 
     def add(self, fits):
         self._known |= {fit.names for fit in fits if fit.names in self._logs}
@@ -40,8 +53,9 @@ def made(names):
     return SimpleNamespace(names=tuple(sorted(names)))
 
 
-def searched(logs, losses=()):
-    given = Given(*({tuple(sorted(names)): one for names, one in dict(its).items()} for its in (logs, losses)))
+def searched(logs, losses=(), masked=""):
+    tables = ({tuple(sorted(names)): one for names, one in dict(its).items()} for its in (logs, losses))
+    given = Given(*tables, masked)
     return given, Search(given, given, given)
 
 
@@ -94,6 +108,22 @@ def test_the_set_of_each_size_that_leaves_least_is_extended_though_others_are_li
     given, search = searched(logs, {"ef": -99.0})
     search.run()
     assert given.weighed[0].fit.names == ("e", "f", "g")
+
+
+def test_where_it_takes_many_effects_fewer_are_tried_with_one_that_promises_nothing_alone():
+    """A gain and an offset do the work of a leak that alone makes the wet well run dry."""
+    logs = {"a": 5.0, "b": 3.0, "c": 1.0, "d": 0.0, "ab": 8.0, "abc": 8.5, "abcd": 9.0, "h": -9.0, "abh": 20.0}
+    given, search = searched(logs, masked="h")
+    search.run()
+    assert given.weighed[0].fit.names == ("a", "b", "h")
+    assert len(given.tried_anew) == len(set(given.tried_anew))
+
+
+def test_a_set_of_two_is_taken_as_it_is():
+    given, search = searched({"a": 5.0, "b": 3.0, "ab": 8.0, "abh": 20.0}, masked="h")
+    search.run()
+    assert given.weighed[0].fit.names == ("a", "b")
+    assert not given.tried_anew
 
 
 def test_no_set_grows_beyond_three_effects_and_an_inertia():
