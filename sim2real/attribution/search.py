@@ -1,6 +1,6 @@
 """The search for sets of effects: one more, each member exchanged, and strengths that change between recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -14,7 +14,8 @@ MOST_EFFECTS = 4
 """Effects of a set: three, and the inertia that the water of each main has."""
 
 MANY_EFFECTS = 3
-"""Effects of a set that may do the work of fewer, one of which was never tried beside the others."""
+"""Effects of a set that may do the work of fewer, one of which was never tried beside the others. Of the search only:
+a set of fewer is not looked at anew, for the time that it takes."""
 
 MOST_EXTENDED = 2
 """Sets of each size beside which one more effect is tried: a pair may be right that is less probable than many
@@ -75,9 +76,7 @@ class Search:
 
     def _extended(self, fits: Sequence[Fit]) -> bool:
         """Weigh some fits with one more effect, and say whether there was one of which that was not known."""
-        of_names = {frozenset(fit.names): fit for fit in fits if len(fit.names) < MOST_EFFECTS}
-        bases = [fit for names, fit in of_names.items() if names not in self._tried]
-        self._tried |= of_names.keys()
+        bases = _untried((fit for fit in fits if len(fit.names) < MOST_EFFECTS), self._tried)
         if bases:
             self._hypotheses.add(self._trials.with_one_more(bases, self._hypotheses.beside(bases)))
         return bool(bases)
@@ -87,12 +86,19 @@ class Search:
         most = len(self._hypotheses.weighed[0].fit.names)
         if most < MANY_EFFECTS:
             return False
-        likeliest = {frozenset(its[0].names): its[0] for its in self._of_sizes() if len(its[0].names) <= most}
-        bases = [fit for names, fit in likeliest.items() if names not in self._tried_anew]
-        self._tried_anew |= likeliest.keys()
+        likeliest = (its[0] for its in self._of_sizes())
+        bases = _untried((fit for fit in likeliest if len(fit.names) <= most), self._tried_anew)
         if bases:
             self._hypotheses.add(self._trials.anew(bases, self._hypotheses.beside(bases), self._hypotheses.known))
         return bool(bases)
+
+
+def _untried(fits: Iterable[Fit], tried: set[frozenset[str]]) -> list[Fit]:
+    """Fits whose names were not tried, each once; they are from now on."""
+    of_names = {frozenset(fit.names): fit for fit in fits}
+    found = [fit for names, fit in of_names.items() if names not in tried]
+    tried.update(of_names)
+    return found
 
 
 def in_order(fitter: Fitter, fit: Fit, ends: Floats) -> tuple[Fit, Floats]:

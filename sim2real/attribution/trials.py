@@ -1,7 +1,7 @@
 """The effects of the library, tried one by one: alone, and beside others."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 from typing import Any
 
@@ -74,8 +74,14 @@ class Trials:
             self._progress(0.3 * (k + 1) / len(self._guesses))
         return found
 
-    def _tried(self, candidate: Candidate, beside: Fit | None = None) -> list[Fit]:
-        return self._fitter.along(candidate, self._start_grids(candidate), beside)
+    def _tried(self, candidate: Candidate, beside: Fit | None = None, most: int | None = None) -> list[Fit]:
+        """A candidate at its starts, at most so many of each grid."""
+        return self._fitter.along(candidate, [grid[:most] for grid in self._start_grids(candidate)], beside)
+
+    def _done_beside(self, base: Fit, others: Sequence[Candidate], most: int | None = None) -> dict[Candidate, Alone]:
+        """What some candidates do beside a fit, as it was replayed."""
+        tried = self._each(lambda one: self._tried(one, base, most), others)
+        return {one: self._doing(base, fits) for one, fits in zip(others, tried, strict=True) if fits}
 
     def _alones(self, base: Fit) -> Mapping[Candidate, Alone]:
         """What each candidate does alone; where the base has another layout of the station, what it does in that.
@@ -87,11 +93,7 @@ class Trials:
             return {one: alone for one, (alone, _) in self._alone.items()}
         if layout not in self._in_layout:
             station = self._fitter.only(base, [one.name for one in layout]) or self._fitter.plain
-            others = [one for one in self._guesses if one not in layout]
-            tried = self._each(lambda one: self._tried(one, station), others)
-            self._in_layout[layout] = {
-                one: self._doing(station, fits) for one, fits in zip(others, tried, strict=True) if fits
-            }
+            self._in_layout[layout] = self._done_beside(station, [one for one in self._guesses if one not in layout])
         return self._in_layout[layout]
 
     def _means(self, fit: Fit) -> Floats:
@@ -132,18 +134,15 @@ class Trials:
     def anew(self, bases: Sequence[Fit], besides: Sequence[Beside], known: Collection[frozenset[str]]) -> list[Fit]:
         """The same by what each effect does beside a fit, replayed there, where such a set is not known yet.
 
-        What it does alone may be something else: a leak makes no wet well run dry that an inflow feeds.
+        What it does alone may be something else: a leak keeps a wet well from running dry, as an inflow does already.
         """
         found = []
         for base, beside in zip(bases, besides, strict=True):
             names = frozenset(base.names)
             others = [one for one in self._guesses if one.name not in names and names | {one.name} not in known]
-            tried = self._each(partial(self._weakest, base), [one for one in others if not one.is_pattern])
-            found.append((base, beside, {fits[0].candidates[-1]: self._doing(base, fits) for fits in tried if fits}))
+            weakest = self._done_beside(base, [one for one in others if not one.is_pattern], most=1)
+            found.append((base, beside, weakest))
         return self._one_more(found)
-
-    def _weakest(self, base: Fit, candidate: Candidate) -> list[Fit]:
-        return self._fitter.along(candidate, [grid[:1] for grid in self._start_grids(candidate)], base)
 
     def _one_more(self, bases: Sequence[tuple[Fit, Beside, Mapping[Candidate, Alone]]]) -> list[Fit]:
         promises = self._each(lambda one: self._promising(*one), bases)

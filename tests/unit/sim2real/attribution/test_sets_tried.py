@@ -111,7 +111,7 @@ def test_the_set_of_each_size_that_leaves_least_is_extended_though_others_are_li
 
 
 def test_where_it_takes_many_effects_fewer_are_tried_with_one_that_promises_nothing_alone():
-    """A gain and an offset do the work of a leak that alone makes the wet well run dry."""
+    """A gain and an offset do the work of a leak, which alone does something else."""
     logs = {"a": 5.0, "b": 3.0, "c": 1.0, "d": 0.0, "ab": 8.0, "abc": 8.5, "abcd": 9.0, "h": -9.0, "abh": 20.0}
     given, search = searched(logs, masked="h")
     search.run()
