@@ -192,6 +192,7 @@ def diagnose(
     check_plausible(traces, station, regimes, plain)
     residuals = StationResiduals(traces, station, regimes, plain, replay.doubt)
     bins = residuals.bins
+    _check_compared(bins, traces)
     found = attribute(replay, residuals, regimes, candidates, progress, each, priors)
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
@@ -232,6 +233,15 @@ def diagnose(
         regimes=regimes,
         replay=replay,
     )
+
+
+def _check_compared(bins: Bins, traces: Traces) -> None:
+    """Refuse a recording of which nothing can be held against the simulator."""
+    if bins.size == 0:
+        raise ValueError(
+            f"no row shows a pump that has run for a while, and rows of {traces.rate_s:g} s hide whole cycles of the "
+            "wet well: nothing to hold the simulator against"
+        )
 
 
 def _taken(recordings: Sequence[Recording], station: Station) -> Traces:

@@ -1,85 +1,31 @@
 """Residuals of the controller: the level at which it starts and stops pumps, against its thresholds."""
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from scipy.special import ndtr
 
-from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
-from wetwell.sim2real.recording.regimes import START_RAMP, Event, Regimes
-from wetwell.sim2real.recording.traces import BETWEEN, Traces
+from wetwell.sim2real.recording.regimes import Regimes
+from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.level_noise import level_noise_m, told_noise_m
 from wetwell.sim2real.replay.observer import Observer
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.replay.steps import between_steps_m
+from wetwell.sim2real.replay.stretches import Stretches, switches_of
 from wetwell.sim2real.residuals.bins import NO_PUMP, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.sim2real.residuals.signals import QUANTUM_SHARE
 from wetwell.sim2real.residuals.telemetry import Pattern
 from wetwell.simulator.telemetry.channels import channels_of
 
-WINDOW_S = 30
-MIN_LEVELS = 8
 SCAN_S = 1.0
-NEVER_S = 10**6
-"""Since the event before the first one."""
 WAITING_S = 2.0
 """Scans that a timer may take beside its delay."""
 TOLERANCE_M = 0.002
 EVENT_FLOOR = 0.5
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stretches:
-    """Straight stretches of the level before each event, to be read at other times than they were recorded.
-
-    `counted` are the seconds of each, (events, `WINDOW_S`), and `is_counted` which of them count; `level_m` is (n,).
-    """
-
-    second: Integers
-    counted: Integers
-    is_counted: Flags
-    level_m: Floats
-
-    def lines(self, shift_s: float = 0.0) -> tuple[Floats, Floats]:
-        """(events,) level and slope at each event for a level that was recorded `shift_s` late. [m, m/s].
-
-        Where too few values are left the line of the unshifted stretch is gone on with.
-        """
-        if shift_s == 0.0:
-            return self._unshifted
-        whole = int(np.floor(shift_s))
-        share = shift_s - whole
-        near = self._fitted(whole)
-        far = self._fitted(whole + 1) if share > 0.0 else near
-        shifted_m, shifted_m_s = ((1.0 - share) * a + share * b for a, b in zip(near, far, strict=True))
-        is_known = np.isfinite(shifted_m)
-        if is_known.all():
-            return shifted_m, shifted_m_s
-        level_m, slope_m_s = self._unshifted
-        level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
-        return level_m, np.where(is_known, shifted_m_s, slope_m_s)
-
-    @cached_property
-    def _unshifted(self) -> tuple[Floats, Floats]:
-        return self._fitted(0)
-
-    def _fitted(self, later_s: int) -> tuple[Floats, Floats]:
-        place = self.counted + later_s
-        values_m = self.level_m[np.clip(place, 0, self.level_m.size - 1)]
-        is_known = self.is_counted & (place >= 0) & (place < self.level_m.size) & np.isfinite(values_m)
-        count = is_known.sum(axis=1)
-        enough = np.where(count >= MIN_LEVELS, count, np.nan)  # NaN is "no line"
-        time_s, values_m = (
-            np.where(is_known, self.counted - self.second[:, None], 0),
-            np.where(is_known, values_m, 0.0),
-        )
-        middle_s, middle_m = time_s.sum(axis=1) / enough, values_m.sum(axis=1) / enough
-        about_s = np.where(is_known, time_s - middle_s[:, None], 0.0)
-        slope_m_s = (about_s * values_m).sum(axis=1) / enough / ((about_s**2).sum(axis=1) / enough)
-        return middle_m - slope_m_s * middle_s, slope_m_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,64 +75,45 @@ class EventResiduals:
 def event_residuals(
     traces: Traces, station: Station, regimes: Regimes, observer: Observer, pattern: Pattern | None
 ) -> EventResiduals:
-    """Of every start and stop that follows a straight stretch of the level that an observer follows."""
+    """Of every start and stop that follows a straight stretch of the level that an observer follows.
+
+    Between rows that lie apart a command came at any time that their frequencies leave open, evenly. Cycles may keep
+    in step with the rows, so that what this leaves open may be alike in all of them: it is allowed.
+    """
     noise_m, level_m, half_step_m = level_noise_m(traces, station), traces.level_m, 0.0
     if observer.is_of_steps:
         noise_m, level_m = told_noise_m(traces, station, observer.level_m), between_steps_m(observer.level_m)
         half_step_m = 0.0 if pattern is None or pattern.is_usual else 0.5 * pattern.quantum
         pattern = None
-    events: list[Event] = []
-    waited_s: list[int] = []
-    calm: list[Flags] = []
-    last = -NEVER_S
-    ahead = np.arange(1 - WINDOW_S, 1)
-    for event in regimes.events:
-        window = event.second + ahead
-        is_calm = (window > last) & (regimes.of_station[window] != START_RAMP)
-        since_s = event.second - last
-        last = event.second
-        if (
-            window[0] >= 0
-            and _is_of_controller(traces, window[0], event.second + 2)
-            and 1 <= event.number <= len(station.control.start_levels_m)
-        ):
-            events.append(event)
-            waited_s.append(since_s)
-            calm.append(is_calm)
-    second = np.array([event.second for event in events], dtype=np.int64)
-    counted, is_counted = second[:, None] + ahead, np.array(calm, dtype=np.bool_).reshape(-1, WINDOW_S)
-    stretches = Stretches(second=second, counted=counted, is_counted=is_counted, level_m=level_m)
-    sign = np.array([1.0 if event.is_start else -1.0 for event in events])
-    kept = stretches.lines()[1] * sign > 0.0
-    second, sign = second[kept], sign[kept]
-    stretches = Stretches(second=second, counted=counted[kept], is_counted=is_counted[kept], level_m=level_m)
-    slope_m_s = stretches.lines()[1]
+    switches = switches_of(traces, station, regimes, level_m)
+    stretches, slope_m_s = switches.stretches, switches.stretches.lines()[1]
+    second, before = stretches.second, stretches.counted[:, -1]
+    is_start = np.array([event.is_start for event in switches.events], dtype=np.bool_)
+    open_m = slope_m_s * switches.open_s / np.sqrt(12.0)
     early_m = noise_m * _earliness(np.abs(slope_m_s) / noise_m)
-    deviation = np.sqrt((SCAN_S * slope_m_s) ** 2 + early_m**2 + noise_m**2 + TOLERANCE_M**2)
+    read_m2 = noise_m**2 * (1.0 + stretches.leverage)
+    deviation = np.sqrt(
+        (SCAN_S * slope_m_s) ** 2 + open_m**2 + switches.bent_m**2 + early_m**2 + read_m2 + TOLERANCE_M**2
+    )
     return EventResiduals(
         bins=Bins(
-            signal=np.where(sign > 0, START_LEVEL, STOP_LEVEL),
-            regime=regimes.of_station[second],
+            signal=np.where(is_start, START_LEVEL, STOP_LEVEL),
+            regime=regimes.of_station[before],
             cycle=regimes.cycle[second],
             pump=np.full(second.size, NO_PUMP),
             second=second,
             deviation=deviation,
             floor=np.full(second.size, EVENT_FLOOR),
             tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
-            material=np.hypot(station.materiality.threshold_m, SCAN_S * slope_m_s) / deviation,
+            material=np.hypot(np.hypot(station.materiality.threshold_m, SCAN_S * slope_m_s), open_m) / deviation,
         ),
-        number=np.array([event.number - 1 for event in events], dtype=np.int64)[kept],
-        since_s=np.array(waited_s, dtype=np.int64)[kept],
+        number=np.array([event.number - 1 for event in switches.events], dtype=np.int64),
+        since_s=switches.since_s,
         stretches=stretches,
         noise_m=noise_m,
         pattern=pattern,
         half_step_m=half_step_m,
     )
-
-
-def _is_of_controller(traces: Traces, begin: int, end: int) -> bool:
-    """Whether nobody else commanded the pumps meanwhile, and no recording ended."""
-    return not (traces.by_hand.is_commanding[begin:end].any() or np.any(traces.part[begin:end] == BETWEEN))
 
 
 def _earliness(slope_ratio: Floats) -> Floats:

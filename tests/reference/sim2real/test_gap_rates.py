@@ -16,6 +16,7 @@ from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.simulation import Simulation
 
 LENGTH_S = 43_200
+CONTROLLER = ("threshold_shift", "control_delay", "sump_area_profile")
 RATES = [(1, "instant"), (5, "instant"), (10, "instant"), (60, "instant"), (10, "mean"), (60, "mean"), (900, "mean")]
 
 
@@ -144,11 +145,34 @@ def test_a_lag_of_the_level_is_no_other_effect_where_nobody_measures_the_inflow(
     assert told.parameters["lag_s"].value == pytest.approx(lag_s, rel=0.05)
 
 
+@pytest.mark.parametrize(("every", "value"), [(10, "instant"), (60, "instant"), (60, "mean")])
+def test_other_start_and_stop_levels_are_told_in_slow_rows(alpha, every, value):
+    true = record(alpha, [{"name": "threshold_shift", "start_m": 0.15, "stop_m": 0.05}])
+    (told,) = diagnose(stored(true, every, value, ("inflow",)), alpha, only=CONTROLLER).effects
+    assert told.name == "threshold_shift"
+    assert told.parameters["start_m"].value == pytest.approx(0.15, abs=0.02)
+    assert told.parameters["stop_m"].value == pytest.approx(0.05, abs=0.02)
+
+
+@pytest.mark.parametrize(("every", "value"), [(10, "instant"), (60, "instant"), (60, "mean")])
+def test_a_late_controller_is_told_in_slow_rows(alpha, every, value):
+    true = record(alpha, [{"name": "control_delay", "delay_s": 25.0}])
+    (told,) = diagnose(stored(true, every, value, ("inflow",)), alpha, only=CONTROLLER).effects
+    assert told.name == "control_delay"
+    assert told.parameters["delay_s"].value == pytest.approx(25.0, abs=4.0)
+
+
+@pytest.mark.parametrize("every", [300, 900])
+def test_rows_that_show_nothing_are_refused(alpha, plain, every):
+    with pytest.raises(ValueError, match=f"rows of {every} s hide whole cycles of the wet well"):
+        diagnose(stored(plain, every), alpha)
+
+
 def test_what_cannot_be_shown_is_listed_with_the_reason(alpha, plain):
-    report = diagnose(stored(plain, 60, without=("inflow", "head")), alpha).report()
+    report = diagnose(stored(plain, 180, without=("inflow", "head")), alpha).report()
     reasons = {one.effect: one.reason for one in report.not_tested}
     assert reasons["head_sensor_offset"] == "head is not measured"
-    assert reasons["threshold_shift"] == "rows of 60 s do not show the level at which a pump was switched"
+    assert reasons["threshold_shift"] == "rows of 180 s do not show the level at which a pump was switched"
     assert "friction_bias" not in reasons
     assert {one.name for one in report.candidates}.isdisjoint(reasons)
 

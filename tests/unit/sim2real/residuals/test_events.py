@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from wetwell.sim2real.replay.replay import Prediction
+from wetwell.sim2real.replay.stretches import WINDOW_S, Stretches
 from wetwell.sim2real.residuals.bins import START_LEVEL, Bins
-from wetwell.sim2real.residuals.events import WINDOW_S, EventResiduals, Stretches
+from wetwell.sim2real.residuals.events import EventResiduals
 from wetwell.simulator.parameters import plant_parameters
 
 TURN_S = 100
