@@ -11,7 +11,7 @@ from wetwell.protocols.quantities import LEVEL
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import Regimes
 from wetwell.sim2real.recording.traces import Traces
-from wetwell.sim2real.replay.level_noise import level_noise_m, told_noise_m
+from wetwell.sim2real.replay.level_noise import MIN_NOISE_M, level_noise_m, told_noise_m
 from wetwell.sim2real.replay.observer import Observer
 from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.replay.steps import between_steps_m
@@ -32,8 +32,8 @@ EVENT_FLOOR = 0.5
 class EventResiduals:
     """Residuals at starts and stops, (events,) each; `number` is that of the threshold, from 0.
 
-    `since_s` is the time since the event before. Where the level is known when it passes from step to step, it may be
-    off by `half_step_m`: nobody says whether it is rounded or cut off.
+    `noise_m` is what the controller sees, and `since_s` the time since the event before. Where the level is known
+    when it passes from step to step, it may be off by `half_step_m`: nobody says whether it is rounded or cut off.
     """
 
     bins: Bins
@@ -90,7 +90,10 @@ def event_residuals(
     second, before = stretches.second, stretches.counted[:, -1]
     is_start = np.array([event.is_start for event in switches.events], dtype=np.bool_)
     open_m = slope_m_s * switches.open_s / np.sqrt(12.0)
-    early_m = noise_m * _earliness(np.abs(slope_m_s) / noise_m)
+    seen_m = noise_m  # between rows an inflow bends the level, which is no noise that a controller sees
+    if not traces.is_each_second:
+        seen_m = min(noise_m, max(station.sensors.level_noise_m, MIN_NOISE_M))
+    early_m = seen_m * _earliness(np.abs(slope_m_s) / seen_m)
     read_m2 = noise_m**2 * (1.0 + stretches.leverage)
     deviation = np.sqrt(
         (SCAN_S * slope_m_s) ** 2 + open_m**2 + switches.bent_m**2 + early_m**2 + read_m2 + TOLERANCE_M**2
@@ -104,13 +107,13 @@ def event_residuals(
             second=second,
             deviation=deviation,
             floor=np.full(second.size, EVENT_FLOOR),
-            tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * noise_m) / deviation,
+            tolerance=np.hypot(0.5 * SCAN_S * slope_m_s, 0.5 * seen_m) / deviation,
             material=np.hypot(np.hypot(station.materiality.threshold_m, SCAN_S * slope_m_s), open_m) / deviation,
         ),
         number=np.array([event.number - 1 for event in switches.events], dtype=np.int64),
         since_s=switches.since_s,
         stretches=stretches,
-        noise_m=noise_m,
+        noise_m=seen_m,
         pattern=pattern,
         half_step_m=half_step_m,
     )
