@@ -1,6 +1,6 @@
 """The level before each start and stop of a pump, along straight lines."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -152,8 +152,7 @@ def switches_of(traces: Traces, station: Station, regimes: Regimes, level_m: Flo
         NaN is "no value". [m]
     """
     rows = np.flatnonzero(traces.is_row)
-    events = () if hides_cycles(traces, station) else regimes.events
-    found = list(_found(events, traces, station, regimes, rows))
+    found = [] if hides_cycles(traces, station) else list(_found(traces, station, regimes, rows))
     values = ROWS_BEFORE if _lie_apart(traces) else WINDOW_S
     middle_s = (traces.span_s - 1) // 2  # of a mean
     stretches = Stretches(
@@ -176,18 +175,18 @@ def switches_of(traces: Traces, station: Station, regimes: Regimes, level_m: Flo
     is_start = np.array([event.is_start for event in switches.events], dtype=np.bool_)
     is_right = slope_m_s * np.where(is_start, 1.0, -1.0) > 0.0
     for way in (True, False) if _lie_apart(traces) else ():
-        known = np.count_nonzero(np.isfinite(slope_m_s[is_start == way]))
-        is_right[is_start == way] &= known >= MOST_OF_THEM * sum(event.is_start == way for event in events)
+        is_way = is_start == way
+        is_right[is_way] &= np.isfinite(slope_m_s[is_way]).sum() >= MOST_OF_THEM * is_way.sum()
     return switches.of(np.flatnonzero(is_right))
 
 
 def _found(
-    events: Sequence[Event], traces: Traces, station: Station, regimes: Regimes, rows: Integers
+    traces: Traces, station: Station, regimes: Regimes, rows: Integers
 ) -> Iterator[tuple[Event, int, Integers, Flags]]:
     """Events of the controller, each with the time since the one before, and the values before it that may count."""
-    places = np.searchsorted(rows, [event.second for event in events], side="right")
+    places = np.searchsorted(rows, [event.second for event in regimes.events], side="right")
     last = -NEVER_S
-    for event, place in zip(events, places.tolist(), strict=True):
+    for event, place in zip(regimes.events, places.tolist(), strict=True):
         before = _values_before(event, place, traces, rows)
         since_s, begun_s = event.second - last, last
         last = event.second
