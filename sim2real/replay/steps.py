@@ -66,13 +66,28 @@ def _begins(second: Integers, midway_m: Floats) -> Flags:
     """(k,) whether a change is the first of a passage.
 
     An even number of changes about one level is two passages, one up and one down, with the longest pause between.
+    An odd one is one passage, or three: if the longest pause is more than half of the time to another level, the
+    level was away meanwhile.
     """
     begins = np.r_[True, np.diff(midway_m) != 0.0][: second.size]
-    first = np.flatnonzero(begins)
-    row, count = np.cumsum(begins) - 1, np.diff(first, append=second.size)
     pause_s = np.diff(second, prepend=second[:1])
-    may_part = np.flatnonzero((count[row] % 2 == 0) & ((np.arange(second.size) - first[row]) % 2 == 1))
-    by_pause = may_part[np.lexsort((pause_s[may_part], row[may_part]))]
-    is_longest = np.r_[np.diff(row[by_pause]) != 0, True][: by_pause.size]
-    begins[by_pause[is_longest]] = True
+    row, inner, count = _groups(begins)
+    apart_s = np.r_[pause_s[begins], 0]
+    away_s = 0.5 * np.maximum(apart_s[:-1], apart_s[1:])
+    begins[_longest(np.flatnonzero((count[row] % 2 == 1) & (inner > 0) & (pause_s > away_s[row])), row, pause_s)] = True
+    row, inner, count = _groups(begins)
+    begins[_longest(np.flatnonzero((count[row] % 2 == 0) & (inner % 2 == 1)), row, pause_s)] = True
     return np.asarray(begins, dtype=np.bool_)
+
+
+def _groups(begins: Flags) -> tuple[Integers, Integers, Integers]:
+    """Group and place in it of each change, and how many are in each group."""
+    first = np.flatnonzero(begins)
+    row = np.cumsum(begins) - 1
+    return row, np.arange(begins.size) - first[row], np.diff(first, append=begins.size)
+
+
+def _longest(among: Integers, row: Integers, pause_s: Integers) -> Integers:
+    """Of some changes that with the longest pause before it in each group."""
+    by_pause = among[np.lexsort((pause_s[among], row[among]))]
+    return by_pause[np.r_[np.diff(row[by_pause]) != 0, True][: by_pause.size]]

@@ -51,6 +51,14 @@ def test_a_level_that_turns_within_a_step_passes_it_twice():
     np.testing.assert_allclose(told_m[[31, 52]], 1.05)
 
 
+@pytest.mark.parametrize(("away_s", "told_s"), [(100, [30, 60, 160, 180, 220]), (15, [30, 77, 135])])
+def test_a_level_that_was_away_meanwhile_passes_a_step_three_times(away_s, told_s):
+    """Else its passages there are one, in the mean of their seconds."""
+    levels_m, for_s = (1.2, 1.1, 1.0, 1.1, 1.0, 0.9), (30, 30, away_s, 20, 40, 30)
+    told_m = steps_m(np.repeat(levels_m, for_s))
+    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(told_m)), told_s)
+
+
 def test_a_level_without_a_change_tells_nothing():
     assert np.isnan(steps_m(np.array([1.0, np.nan, 1.0]))).all()
 
