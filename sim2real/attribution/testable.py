@@ -11,6 +11,7 @@ from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fitter
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.recording.regimes import MULTI_PUMP, Regimes
+from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.bins import Bins
 
@@ -72,8 +73,7 @@ def _least_gain(bins: Bins, rows: Flags) -> float:
 
 def _moves(candidate: Candidate, fitter: Fitter, least: float, replay: Replay) -> bool:
     if candidate.is_pattern:
-        is_level = candidate.name == "level_quantisation" and np.isfinite(replay.traces.level_m).any()
-        return replay.traces.is_each_second or (bool(is_level) and replay.traces.span_s == 1)
+        return _rows_show(candidate, replay.traces)
     if candidate.name in BESIDE_A_METER and replay.traces.inflow_m3h is None:
         return False
     plain = fitter.plain.residuals
@@ -85,6 +85,15 @@ def _moves(candidate: Candidate, fitter: Fitter, least: float, replay: Replay) -
                 if float(moved @ moved) > least:
                     return True
     return False
+
+
+def _rows_show(pattern: Candidate, traces: Traces) -> bool:
+    """Whether single values are seen as they came: means hide them, and what stores held values has a deadband."""
+    if traces.is_each_second:
+        return True
+    if pattern.name == "level_quantisation":
+        return traces.span_s == 1 and bool(np.isfinite(traces.level_m).any())
+    return traces.value == "instant"
 
 
 def _points(candidate: Candidate) -> list[list[Floats]]:

@@ -16,6 +16,7 @@ from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY, regimes
 from wetwell.sim2real.recording.seconds import is_change, trailing_means
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.changing import Acting, Changing, in_period
+from wetwell.sim2real.replay.held import as_sent
 from wetwell.sim2real.replay.inflow_process import MOST_SQUARE, InflowProcess, learnt_process
 from wetwell.sim2real.replay.kernel import replay_seconds
 from wetwell.sim2real.replay.level_filter import BEGUN_ANEW
@@ -280,6 +281,8 @@ class Replay:
     @cached_property
     def _observer_of_changes(self) -> Observer:
         level_m = self.traces.level_m
+        if not self.traces.is_each_second:
+            return self._begun_anew(as_sent(level_m, self.traces.rate_s))
         return self._begun_anew(np.where(is_change(level_m), level_m, np.nan))
 
     def _begun_anew(self, level_m: Floats) -> Observer:

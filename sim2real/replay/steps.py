@@ -74,9 +74,11 @@ def _begins(second: Integers, midway_m: Floats) -> Flags:
     row, inner, count = _groups(begins)
     apart_s = np.r_[pause_s[begins], 0]
     away_s = 0.5 * np.maximum(apart_s[:-1], apart_s[1:])
-    begins[_longest(np.flatnonzero((count[row] % 2 == 1) & (inner > 0) & (pause_s > away_s[row])), row, pause_s)] = True
+    comes_back = (count[row] % 2 == 1) & (inner > 0) & (pause_s > away_s[row])
+    begins[_longest(np.flatnonzero(comes_back), row, pause_s)] = True
     row, inner, count = _groups(begins)
-    begins[_longest(np.flatnonzero((count[row] % 2 == 0) & (inner % 2 == 1)), row, pause_s)] = True
+    turns = (count[row] % 2 == 0) & (inner % 2 == 1)
+    begins[_longest(np.flatnonzero(turns), row, pause_s)] = True
     return np.asarray(begins, dtype=np.bool_)
 
 
@@ -90,4 +92,4 @@ def _groups(begins: Flags) -> tuple[Integers, Integers, Integers]:
 def _longest(among: Integers, row: Integers, pause_s: Integers) -> Integers:
     """Of some changes that with the longest pause before it in each group."""
     by_pause = among[np.lexsort((pause_s[among], row[among]))]
-    return by_pause[np.r_[np.diff(row[by_pause]) != 0, True][: by_pause.size]]
+    return np.asarray(by_pause[np.r_[np.diff(row[by_pause]) != 0, True][: by_pause.size]], dtype=np.int64)

@@ -9,13 +9,12 @@ from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.protocols.station.station_file import Station
 from wetwell.sim2real.recording.regimes import IDLE, START_RAMP, STOP_RAMP, Regimes, first_runs
-from wetwell.sim2real.recording.seconds import repeated
 from wetwell.sim2real.recording.traces import Traces
 from wetwell.sim2real.replay.level_noise import told_noise_m
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S, Observer, without_s
 from wetwell.sim2real.replay.replay import Doubt, Prediction
 from wetwell.sim2real.residuals.bins import LEVEL, NO_PUMP, Seconds, binned
-from wetwell.sim2real.residuals.signals import UNRESOLVED, SignalResiduals, steps
+from wetwell.sim2real.residuals.signals import UNRESOLVED, SignalResiduals, may_be_old, steps
 from wetwell.sim2real.residuals.telemetry import Pattern
 
 IDLE_LEVEL_BIN_S = 30
@@ -54,12 +53,12 @@ def level_residuals(
     doubt : Doubt
         What a right level may be off.
     """
-    counted = np.isfinite(traces.level_m)
+    is_told, is_of_steps = np.isfinite(doubt.observer.level_m), doubt.observer.is_of_steps
+    recorded_m = np.where(is_told, doubt.observer.level_m, traces.level_m)
+    counted = np.isfinite(recorded_m)
     counted &= ~_after_gaps(traces.is_row) if doubt.level_m is None else np.isfinite(doubt.level_m)
     counted &= ~_has_no_past(traces, regimes)
-    is_told, is_of_steps = np.isfinite(doubt.observer.level_m), doubt.observer.is_of_steps
     counted &= is_told if is_of_steps else np.cumsum(is_told) > 0  # of a level that is held, its first change
-    recorded_m = doubt.observer.level_m if is_of_steps else traces.level_m
     regime = regimes.of_station
     is_ramp = (regime == START_RAMP) | (regime == STOP_RAMP)
     seconds = binned(counted, regime + 10 * regimes.cycle, np.where(is_ramp, RAMP_LEVEL_BIN_S, IDLE_LEVEL_BIN_S))
@@ -89,7 +88,7 @@ def level_residuals(
         pump=NO_PUMP,
         seconds=seconds,
         recorded=recorded_m[seconds.second],
-        is_repeated=repeated(traces.level_m)[seconds.second],
+        is_old=may_be_old(traces, traces.level_m)[seconds.second],
         pattern=None if is_of_steps else patterns.get("level_m"),
     )
 

@@ -62,7 +62,7 @@ class SignalResiduals:
     pump: int
     seconds: Seconds
     recorded: Floats
-    is_repeated: Flags
+    is_old: Flags
     pattern: Pattern | None
 
     def of(self, prediction: Prediction) -> Floats:
@@ -77,13 +77,18 @@ class SignalResiduals:
             if sensor.deadband > 0.0 and self.pattern.pause_s > 0:
                 low, high = _since(values, self.pattern.pause_s)
                 nearest = np.clip(self.recorded, low[self.seconds.second], high[self.seconds.second])
-                error = np.where(self.is_repeated, self.recorded - nearest, error)
-            held = min(sensor.deadband, self.pattern.deadband) * self.is_repeated
+                error = np.where(self.is_old, self.recorded - nearest, error)
+            held = min(sensor.deadband, self.pattern.deadband) * self.is_old
             allowed = held + QUANTUM_SHARE * self.pattern.rounding(sensor.quantum)
             error = np.sign(error) * np.maximum(np.abs(error) - allowed, 0.0)
         if sensor.cutoff > 0.0:
             error -= _cut(self.recorded, values[self.seconds.second], sensor.cutoff)
         return np.asarray(self.seconds.means_of(error) / self.bins.deviation, dtype=np.float64)
+
+
+def may_be_old(traces: Traces, values: Floats) -> Flags:
+    """(n,) whether a value may have been sent before its second: it repeats the last one, or rows lie apart."""
+    return repeated(values) | (not traces.is_each_second)
 
 
 def _since(values: Floats, pause_s: int) -> tuple[Floats, Floats]:
@@ -150,8 +155,9 @@ def pump_residuals(
             if traces.span_s > 1:
                 open_ = np.hypot(open_, TRANSIENT_S * switched[pump] * np.max(expected[pump], initial=0.0))
             known = np.where(counts[pump], recorded[pump], np.nan)
+            is_old, pattern = may_be_old(traces, known), patterns.get(name)
             one = _one_pump(
-                name, pump, known, expected[pump], open_, regimes, noise, station.materiality, patterns.get(name)
+                name, pump, known, is_old, expected[pump], open_, regimes, noise, station.materiality, pattern
             )
             if one is not None:
                 found.append(one)
@@ -204,6 +210,7 @@ def _one_pump(
     name: AnalogueQuantity,
     pump: int,
     recorded: Floats,
+    is_old: Flags,
     expected: Floats,
     unresolved: Floats,
     regimes: Regimes,
@@ -249,7 +256,7 @@ def _one_pump(
         pump=pump,
         seconds=seconds,
         recorded=recorded[seconds.second],
-        is_repeated=repeated(recorded)[seconds.second],
+        is_old=is_old[seconds.second],
         pattern=pattern,
     )
 

@@ -162,6 +162,23 @@ def test_a_late_controller_is_told_in_slow_rows(alpha, every, value):
     assert told.parameters["delay_s"].value == pytest.approx(25.0, abs=4.0)
 
 
+@pytest.mark.parametrize(
+    ("channel", "deadband", "every"),
+    [
+        ("level_m", 0.06, 10),
+        pytest.param("level_m", 0.15, 30, marks=pytest.mark.long),
+        pytest.param("head_m", 1.5, 10, marks=pytest.mark.long),
+        pytest.param("flow_m3h", 12.0, 30, marks=pytest.mark.long),
+    ],
+)
+def test_a_deadband_is_told_in_slow_rows_and_no_lag_beside_it(alpha, channel, deadband, every):
+    true = record(alpha, [{"name": "report_by_exception", "channel": channel, "deadband": deadband}])
+    (told,) = diagnose(stored(true, every, without=("inflow",)), alpha).effects
+    assert (told.name, told.parameters["channel"].value) == ("report_by_exception", channel)
+    low, high = told.parameters["deadband"].ci
+    assert low <= deadband <= high
+
+
 @pytest.mark.parametrize("every", [300, 900])
 def test_rows_that_show_nothing_are_refused(alpha, plain, every):
     with pytest.raises(ValueError, match=f"rows of {every} s hide whole cycles of the wet well"):

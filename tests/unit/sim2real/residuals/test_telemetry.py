@@ -137,3 +137,47 @@ def test_a_held_level_is_seen_though_it_is_stored_to_a_centimetre(recorded, dead
     assert [one.quantity for one in found] == ["level_m"]
     assert found[0].missed(deadband_m) == 0.0
     assert min(found[0].missed(0.0), found[0].missed(2.0 * deadband_m)) > 0.0
+
+
+def in_rows(recording, every):
+    columns = {name: values[::every] for name, values in recording.columns.items()}
+    return type(recording)(time_ns=recording.time_ns[::every], columns=columns)
+
+
+@pytest.mark.parametrize("stored", [0.0, 0.01])
+def test_a_deadband_is_seen_in_rows_that_lie_apart(recorded, stored):
+    station, recording = recorded
+    level_m = held(recording.columns["level_m"], 0.06, 900)
+    level_m = stored * np.round(level_m / stored) if stored else level_m
+    found = patterns(station, in_rows(recording, 10), level_m=level_m[::10])
+    (pattern,) = (one for one in found if one.deadband > 0.0)
+    assert (pattern.quantity, pattern.pause_s) == ("level_m", 0)
+    assert pattern.missed(0.06) == 0.0
+    assert min(pattern.missed(0.04), pattern.missed(0.09)) > 0.0
+
+
+def test_a_deadband_that_ramps_alone_pass_lies_under_them_in_rows_too(recorded):
+    station, recording = recorded
+    rows = in_rows(recording, 10)
+    found = patterns(station, rows, **{name: held(recording.columns[name], 3.0, 10**6)[::10] for name in NAMES})
+    assert all((one.quantity, one.missed(3.0), one.missed(0.1) > 0.0) == ("power_kw", 0.0, True) for one in found)
+    assert len(found) == (station.control.ramp_s > 2.0), "rows of 10 s pass over ramps of a second or two"
+
+
+@pytest.mark.parametrize("every", [10, 30])
+@pytest.mark.parametrize("anew_s", [30, 60, 120])
+def test_values_that_are_read_anew_at_times_are_not_held_by_a_deadband(recorded, every, anew_s):
+    station, recording = recorded
+    seconds = np.arange(len(recording))
+    readings = {n: v for n, v in recording.columns.items() if not n.endswith(("hz", "running"))}
+    old = {name: values[seconds - seconds % anew_s][::every] for name, values in readings.items()}
+    assert patterns(station, in_rows(recording, every), **old) == ()
+
+
+@pytest.mark.parametrize("every", [10, 60])
+@pytest.mark.parametrize("step", [0.1, 0.5, 2.0])
+def test_noise_and_rounding_are_not_held_in_rows(recorded, every, step):
+    station, recording = recorded
+    rounded = {name: step * np.round(recording.columns[name] / step)[::every] for name in NAMES}
+    assert patterns(station, in_rows(recording, every)) == ()
+    assert patterns(station, in_rows(recording, every), **rounded) == ()
