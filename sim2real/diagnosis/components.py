@@ -44,6 +44,19 @@ def component_probability(
     return dict(sorted(found.items(), key=lambda pair: -round(pair[1], DECIMALS)))
 
 
+def place_of_unknown(unknown: Sequence[UnknownShare], pattern: Component) -> Component:
+    """The component in which something unknown most probably is, if there is something.
+
+    What stands beside it is in no place of its own here: it may stand for a part of what is unknown, and it stands in
+    the same set alone, too, so that it is always more probable.
+    """
+    found: dict[Component, float] = {}
+    for way in unknown:
+        place = _place(way, pattern)
+        found[place] = found.get(place, 0.0) + way.share
+    return max(found, key=lambda place: round(found[place], DECIMALS), default=pattern)
+
+
 def _place(way: UnknownShare, pattern: Component) -> Component:
     return pattern if way.component is None or {pattern, way.component} == OF_POWER else way.component
 

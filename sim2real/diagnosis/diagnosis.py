@@ -13,7 +13,7 @@ from wetwell.sim2real.attribution.attribution import Attribution, attribute
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.correction.learning import columns_of_no_use, learn
-from wetwell.sim2real.diagnosis.components import component_probability
+from wetwell.sim2real.diagnosis.components import component_probability, place_of_unknown
 from wetwell.sim2real.diagnosis.correction import Correction, weighed
 from wetwell.sim2real.diagnosis.findings import found_effects, noise_check, ranking, where_it_lies
 from wetwell.sim2real.diagnosis.limitations import limitations
@@ -197,9 +197,10 @@ def diagnose(
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
     excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
-    pattern = localise(excess, found.plain, bins, plain.plant)
+    pattern = localise(excess, found.plain, bins, plain.plant, residuals.telemetry.component)
     by_component = component_probability(found.posterior, found.unknown, pattern)
-    blamed = next(iter(by_component)) if found.accepted is None else found.accepted.candidates[0].component
+    unknown_at = place_of_unknown(found.unknown, pattern)
+    blamed = unknown_at if found.accepted is None else found.accepted.candidates[0].component
     effects = () if found.accepted is None else found.accepted.effects
     tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
     correction: Correction | None = None

@@ -34,7 +34,9 @@ ALONE = 0.7
 """Share of the gap from which it is in one kind of signal alone."""
 
 
-def localise(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters) -> Component:
+def localise(
+    excess: Floats, residuals: Floats, bins: Bins, plant: PlantParameters, telemetry: Component
+) -> Component:
     """Component that is held responsible.
 
     Flow and head that move along the pump curve say that the main has changed, along the system curve the pump (in
@@ -48,6 +50,8 @@ def localise(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParamete
     bins : Bins
     plant : PlantParameters
         Of the station as it is.
+    telemetry : Component
+        Where patterns of the values themselves come from.
     """
     by_signal = np.maximum(np.bincount(bins.signal, excess, len(SIGNALS)), 0.0)
     total = max(by_signal.sum(), 1e-12)
@@ -59,7 +63,7 @@ def localise(excess: Floats, residuals: Floats, bins: Bins, plant: PlantParamete
     if by_signal[POWER] > 0.5 * total:
         return "power_meter" if _drifts(residuals, bins) else "drive"
     if by_signal[TELEMETRY] > 0.5 * total:
-        return "telemetry"
+        return telemetry
     if by_signal[START_LEVEL] + by_signal[STOP_LEVEL] > by_signal[LEVEL]:
         return "controller"
     level = bins.signal == LEVEL

@@ -15,6 +15,8 @@ from wetwell.sim2real.replay.replay import Prediction
 from wetwell.sim2real.residuals.bins import NO_PUMP, TELEMETRY, Bins
 from wetwell.sim2real.residuals.noise import configured_noise
 from wetwell.sim2real.residuals.phases import PHASES_S
+from wetwell.simulator.effects import EFFECTS
+from wetwell.simulator.effects.effect import Component
 from wetwell.simulator.telemetry.channels import channels_of
 
 MIN_QUANTUM_M = 0.0015
@@ -74,6 +76,12 @@ class TelemetryResiduals:
     def effects(self) -> set[str]:
         """Names of the effects of the patterns that count."""
         return {pattern.effect for pattern in _told(self.patterns)}
+
+    @property
+    def component(self) -> Component:
+        """Where they come from: a lattice from its sensor, the first that counts before others."""
+        components = [EFFECTS[pattern.effect].component for pattern in _told(self.patterns)]
+        return next(iter(components), "telemetry")
 
     def of(self, prediction: Prediction) -> Floats:
         """(patterns that count * cycles,) nothing where the plant holds or rounds so, else `STRENGTH`."""

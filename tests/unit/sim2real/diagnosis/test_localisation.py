@@ -31,7 +31,7 @@ def bins_of(signals, regime):
 
 
 def blamed(residuals, bins, station):
-    return localise(residuals**2, residuals, bins, plant_parameters(station))
+    return localise(residuals**2, residuals, bins, plant_parameters(station), "level_sensor")
 
 
 def test_power_that_runs_away_is_its_meter_and_power_that_swings_the_drive(alpha):
