@@ -2,7 +2,7 @@
 
 import pytest
 
-from wetwell.sim2real.diagnosis.components import component_probability
+from wetwell.sim2real.diagnosis.components import component_probability, place_of_unknown
 from wetwell.sim2real.likelihood.posterior import SetProbability, UnknownShare
 
 
@@ -40,3 +40,17 @@ def test_of_components_that_are_as_probable_that_of_what_is_unknown_comes_first(
     found = component_probability([answer(1.0, "unknown")], [way(1.0, "sump", "water_inertia")], "telemetry")
     assert list(found) == ["sump", "rising_main"]
     assert found == {"sump": 1.0, "rising_main": 1.0}
+
+
+def test_what_is_unknown_has_a_place_of_its_own_whatever_stands_beside_it():
+    """A lag that the library lacks is a late level beside a late controller: both stand in each likely set."""
+    posterior = [answer(0.85, "unknown"), answer(0.15, "effect", "channel_delay", "control_delay")]
+    unknown = [way(1.0, None, "channel_delay", "control_delay")]
+    assert next(iter(component_probability(posterior, unknown, "level_sensor"))) != "level_sensor"
+    assert place_of_unknown(unknown, "level_sensor") == "level_sensor"
+
+
+def test_ways_in_one_place_add_up():
+    unknown = [way(0.4, "sump"), way(0.3, "drive", "friction_bias"), way(0.3, "drive")]
+    assert place_of_unknown(unknown, "telemetry") == "drive"
+    assert place_of_unknown([], "telemetry") == "telemetry"
