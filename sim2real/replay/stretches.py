@@ -58,47 +58,44 @@ class Stretches:
         Where too few values are left the line of the unshifted stretch is gone on with.
         """
         if shift_s == 0.0:
-            return self._unshifted
+            return self._unshifted[:2]
         whole = int(np.floor(shift_s))
         share = shift_s - whole
-        near = self._fitted(whole)
-        far = self._fitted(whole + 1) if share > 0.0 else near
+        near = self._fitted(whole)[:2]
+        far = self._fitted(whole + 1)[:2] if share > 0.0 else near
         shifted_m, shifted_m_s = ((1.0 - share) * a + share * b for a, b in zip(near, far, strict=True))
         is_known = np.isfinite(shifted_m)
         if is_known.all():
             return shifted_m, shifted_m_s
-        level_m, slope_m_s = self._unshifted
+        level_m, slope_m_s = self._unshifted[:2]
         level_m = np.where(is_known, shifted_m, level_m + slope_m_s * shift_s)
         return level_m, np.where(is_known, shifted_m_s, slope_m_s)
 
     @property
     def leverage(self) -> Floats:
         """(events,) variance of the level of a line at its event, over that of the noise of a value. [1]."""
-        is_known = self.is_counted & np.isfinite(self.level_m[self.counted])
-        count = np.maximum(is_known.sum(axis=1), 1)
-        before_s = np.where(is_known, self.second[:, None] + self.late_s - self.counted, 0.0)
-        middle_s = before_s.sum(axis=1) / count
-        squares = np.where(is_known, (before_s - middle_s[:, None]) ** 2, 0.0).sum(axis=1)
-        return np.asarray(1.0 / count + middle_s**2 / np.maximum(squares, 1.0), dtype=np.float64)
+        return self._unshifted[2]
 
     @cached_property
-    def _unshifted(self) -> tuple[Floats, Floats]:
+    def _unshifted(self) -> tuple[Floats, Floats, Floats]:
         return self._fitted(0)
 
-    def _fitted(self, later_s: int) -> tuple[Floats, Floats]:
+    def _fitted(self, later_s: int) -> tuple[Floats, Floats, Floats]:
+        """(events,) level, slope and leverage of lines through values so much later; NaN where there is no line."""
         place = self.counted + later_s
         values_m = self.level_m[np.clip(place, 0, self.level_m.size - 1)]
         is_known = self.is_counted & (place >= 0) & (place < self.level_m.size) & np.isfinite(values_m)
         count = is_known.sum(axis=1)
-        enough = np.where(count >= self.least, count, np.nan)  # NaN is "no line"
+        enough = np.where(count >= self.least, count, np.nan)
         time_s, values_m = (
             np.where(is_known, self.counted - self.late_s - self.second[:, None], 0.0),
             np.where(is_known, values_m, 0.0),
         )
         middle_s, middle_m = time_s.sum(axis=1) / enough, values_m.sum(axis=1) / enough
         about_s = np.where(is_known, time_s - middle_s[:, None], 0.0)
-        slope_m_s = (about_s * values_m).sum(axis=1) / enough / ((about_s**2).sum(axis=1) / enough)
-        return middle_m - slope_m_s * middle_s, slope_m_s
+        square_s2 = (about_s**2).sum(axis=1) / enough
+        slope_m_s = (about_s * values_m).sum(axis=1) / enough / square_s2
+        return middle_m - slope_m_s * middle_s, slope_m_s, (1.0 + middle_s**2 / square_s2) / enough
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
