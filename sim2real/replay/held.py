@@ -38,7 +38,7 @@ Of the moves of noise a ninth lies within it at the most: those of a half normal
 """
 OVER_PILE = (0.8, 1.25)
 """Shares of the least of these moves between which the deadband may be."""
-MOSTLY = 0.5
+HALF_HELD = 0.5
 """Share of repeated values from which a channel is held where its moves from row to row do not pile up."""
 REGULAR = 0.75
 """Share of the waits from move to move that are alike where values are read anew at times: no deadband holds them."""
@@ -168,7 +168,7 @@ def held_between_rows(moves: Moves, quantum: float) -> Held | None:
     if piled > least:
         return Held(deadband=piled, within=OVER_PILE)
     largest = float(np.max(moves.calm, initial=0.0))
-    if moves.held_share <= MOSTLY or largest < least:
+    if moves.held_share <= HALF_HELD or largest < least:
         return None
     if moves.in_ramps.size >= FEWEST:
         return Held(deadband=float(np.quantile(moves.in_ramps, SMALL)), within=IN_RAMPS)

@@ -93,9 +93,9 @@ class Stretches:
         )
         middle_s, middle_m = time_s.sum(axis=1) / enough, values_m.sum(axis=1) / enough
         about_s = np.where(is_known, time_s - middle_s[:, None], 0.0)
-        square_s2 = (about_s**2).sum(axis=1) / enough
-        slope_m_s = (about_s * values_m).sum(axis=1) / enough / square_s2
-        return middle_m - slope_m_s * middle_s, slope_m_s, (1.0 + middle_s**2 / square_s2) / enough
+        square = (about_s**2).sum(axis=1) / enough
+        slope_m_s = (about_s * values_m).sum(axis=1) / enough / square
+        return middle_m - slope_m_s * middle_s, slope_m_s, (1.0 + middle_s**2 / square) / enough
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
