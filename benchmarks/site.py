@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from site_load import SETTLE_S, Played, play, prepare
-from site_processes import Site, free_endpoint, started
+from site_processes import Site, daemon, free_endpoint, started
 from site_week import memory_of_a_week
 
 from wetwell.protocols.bus.keys import SITE
@@ -62,7 +62,14 @@ async def observe(folder: Path, load: list[Played], given: argparse.Namespace) -
         player.start()
         await asyncio.sleep(SETTLE_S)
         hearing.append(asyncio.create_task(site.look(period_s)))
+        kill_s = time.monotonic() + (given.kill_router or np.inf)
         while player.is_alive():
+            if site.router_killed_s is None and time.monotonic() > kill_s:
+                running["router"].kill()
+                running["router"].wait()
+                running["router"] = daemon(commands_of(folder)["router"], endpoint, tables)
+                site.router_killed_s, site.pids["router"] = time.monotonic(), running["router"].pid
+                site.curve.clear()
             for name, process in running.items():
                 if process.poll() is not None:
                     raise SystemExit(f"{name} has ended with code {process.returncode}")
@@ -86,6 +93,14 @@ def latencies_ms(site: Site, load: list[Played], sent_s: np.ndarray, gather: int
         if 0 <= row < len(sent_s):  # else one that was told again after the start
             found.append(1e3 * (arrived_s - sent_s[row, column]))
     return np.array(found)
+
+
+def silence_s(site: Site) -> float | None:
+    """From the death of the router to the first verdict after it. [s]."""
+    if site.router_killed_s is None:
+        return None
+    arrived_s = np.array([arrived_s for arrived_s, _ in site.arrivals])
+    return round(float(np.min(arrived_s[arrived_s > site.router_killed_s])) - site.router_killed_s, 1)
 
 
 def slope(times_s: np.ndarray, values: np.ndarray) -> float:
@@ -145,6 +160,9 @@ def main() -> None:
     parser.add_argument("--gather", type=int, default=1, help="samples in a message")
     parser.add_argument("--health-s", type=float, default=10.0, help="between health messages of a service")
     parser.add_argument("--checkpoint-s", type=float, default=60.0, help="between saved states of a station")
+    parser.add_argument(
+        "--kill-router", type=float, metavar="S", help="so long after the first sample; it starts anew"
+    )
     parser.add_argument("--plots", type=Path, help="folder for soak.svg and soak-cpu.svg")
     parser.add_argument("--week", type=int, metavar="DAYS", help="so many days in one process instead")
     arguments = parser.parse_args()
@@ -181,6 +199,7 @@ def main() -> None:
         }
         if len(latency_ms)
         else {},
+        "silence_after_the_router_s": silence_s(site),
         "detector": {name: value for name, value in judged.items() if name != "sample_age_s"},
         "historian": site.figures.get((SITE, "historian"), {}) | {"in_database": in_database},
         "alarms": site.figures.get((SITE, "alarms"), {}),

@@ -30,18 +30,25 @@ def started(
     commands: Mapping[str, Sequence[str]], endpoint: str, **settings: Mapping[str, object]
 ) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
     """Daemons by their names, with their command lines behind `wetwell`; at the end they are asked to stop."""
-    given = {f"WETWELL_{name.upper()}": json.dumps(table) for name, table in settings.items()}
-    environment = os.environ | given | {PARENT_VARIABLE: "1", "WETWELL_LOG": json.dumps({"level": "ERROR"})}
     running: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, words in commands.items():
-            command = [sys.executable, "-m", "wetwell.services", *words, "--zenoh", endpoint]
-            running[name] = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE)  # noqa: S603 - our own commands
+            running[name] = daemon(words, endpoint, settings)
         yield running
     finally:
         for process in reversed(running.values()):
             process.terminate()
             process.wait()
+
+
+def daemon(
+    words: Sequence[str], endpoint: str, settings: Mapping[str, Mapping[str, object]]
+) -> subprocess.Popen[bytes]:
+    """A daemon of ours."""
+    given = {f"WETWELL_{name.upper()}": json.dumps(table) for name, table in settings.items()}
+    environment = os.environ | given | {PARENT_VARIABLE: "1", "WETWELL_LOG": json.dumps({"level": "ERROR"})}
+    command = [sys.executable, "-m", "wetwell.services", *words, "--zenoh", endpoint]
+    return subprocess.Popen(command, env=environment, stdin=subprocess.PIPE)  # noqa: S603 - our own commands
 
 
 def free_endpoint() -> str:
@@ -64,7 +71,8 @@ class Site:
         self.arrivals: list[tuple[float, Verdict]] = []
         self.figures: dict[tuple[str, str], dict[str, float]] = {}
         self.curve: list[dict[str, float]] = []
-        self._pids = pids
+        self.router_killed_s: float | None = None
+        self.pids = pids
         self._verdicts = bus.subscribe(verdict_key("*"), capacity=1_000_000, pace_s=LOOK_S)
         self._statuses = bus.subscribe(status_key("*", "*"), history=1, capacity=1_000_000)
 
@@ -110,7 +118,7 @@ class Site:
     def look_once(self) -> None:
         """Note what the processes use."""
         point = {"time_s": time.monotonic(), "load": os.getloadavg()[0]}
-        for name, pid in self._pids.items():
+        for name, pid in self.pids.items():
             point[f"{name}_cpu_s"], point[f"{name}_mb"] = cpu_and_memory(pid)
         self.curve.append(point)
 
