@@ -167,12 +167,12 @@ def held_between_rows(moves: Moves, quantum: float) -> Held | None:
     piled = _pile(moves.soon[moves.is_soon_calm])
     if piled > least:
         return Held(deadband=piled, within=OVER_PILE)
-    largest = float(np.max(moves.calm, initial=0.0))
-    if moves.held_share <= HALF_HELD or largest < least:
+    usual = float(np.median(moves.calm)) if moves.calm.size else 0.0
+    if moves.held_share <= HALF_HELD or usual < least:
         return None
     if moves.in_ramps.size >= FEWEST:
         return Held(deadband=float(np.quantile(moves.in_ramps, SMALL)), within=IN_RAMPS)
-    return Held(deadband=largest, within=BETWEEN_ROWS) if moves.calm.size >= FEWEST else None
+    return Held(deadband=float(moves.calm.max()), within=BETWEEN_ROWS) if moves.calm.size >= FEWEST else None
 
 
 def as_sent(values: Floats, rate_s: float) -> Floats:

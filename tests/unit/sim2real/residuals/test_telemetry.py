@@ -182,3 +182,12 @@ def test_noise_and_rounding_are_not_held_in_rows(recorded, every, step):
     rounded = {name: step * np.round(recording.columns[name] / step)[::every] for name in NAMES}
     assert patterns(station, in_rows(recording, every)) == ()
     assert patterns(station, in_rows(recording, every), **rounded) == ()
+
+
+def test_a_level_that_is_rounded_and_fills_slowly_is_not_held_in_rows(recorded):
+    """Most of its values repeat, and pumps move it by several steps from row to row."""
+    station, recording = recorded
+    level_m = np.r_[np.linspace(0.5, 1.6, 21_000), np.linspace(1.6, 0.5, 600)]
+    level_m = 0.01 * np.round(level_m[: len(recording)] / 0.01)
+    found = patterns(station, in_rows(recording, 30), level_m=level_m[::30])
+    assert all(one.deadband == 0.0 for one in found)
