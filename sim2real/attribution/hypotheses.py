@@ -2,14 +2,16 @@
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from wetwell.protocols.arrays import Flags, Floats, Integers
+from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.fitting import ROUNDS, Fit, Fitter
 from wetwell.sim2real.attribution.intervals import left_open
 from wetwell.sim2real.attribution.presence import (
     are_needed,
+    could_others,
     is_only_late,
     own_signature,
     strengths_of,
@@ -359,7 +361,7 @@ class Hypotheses:
             slopes=shown.slopes,
             is_there=shown.may_each_lack
             and bool(is_needed.all())
-            and self._are_apart(fit.position, of_member, told, shown.signatures, shown.slopes),
+            and not any(self._could_others(fit, k, np.isin(of_member, told) & (of_member != k), shown) for k in told),
             told=tuple(sorted(fit.names[member] for member in told)),
             needed=tuple(sorted(fit.names[member] for member in told if is_needed[member] or member != least)),
         )
@@ -390,17 +392,19 @@ class Hypotheses:
         most = self._cells.group_squares(share * self._cells.allowed)
         return bool(np.all(self._cells.group_squares(change) <= most))
 
-    def _are_apart(
-        self, position: Floats, of_member: Integers, told: Sequence[int], signatures: Sequence[Floats], slopes: Floats
-    ) -> bool:
-        """Whether each effect that is told does more than is allowed that the others that are told cannot do."""
-        for member in told:
-            is_other = np.isin(of_member, told) & (of_member != member)
-            room = -position[is_other], 1.0 - position[is_other]
-            own = own_signature(signatures[member], slopes[:, is_other], self._cells.allowed, room)
-            if self._is_within(own, 1.0):
-                return False
-        return True
+    def _could_others(self, fit: Fit, member: int, is_other: Flags, shown: _Shown) -> bool:
+        """Whether other parameters could do all of an effect's work, but for what is allowed."""
+
+        def left_of(its: Floats) -> Floats | None:
+            position = fit.position.copy()
+            position[is_other] = its
+            moved = self._fitter.without(replace(fit, points=fit.split(position)), member)
+            return None if moved is None else self._means(moved) - shown.residuals
+
+        others, is_within = shown.slopes[:, is_other], partial(self._is_within, share=1.0)
+        return could_others(
+            shown.signatures[member], others, fit.position[is_other], self._cells.allowed, is_within, left_of
+        )
 
     def _matters(self, signature: Floats, form: Form, late: Floats) -> bool:
         """Whether an effect does more in some group than what is allowed, and than the others may have wrong there.

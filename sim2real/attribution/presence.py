@@ -1,6 +1,6 @@
 """Whether each effect of a set is there, and what of it the others could do."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -14,6 +14,8 @@ from wetwell.sim2real.likelihood.evidence import Evidence
 
 SURE = 0.95
 """Probability with which the recording must be likelier with an effect than without it."""
+GONE_ON = 3
+"""Steps that others may take to do an effect's work: slopes do not hold for all of the way."""
 
 
 def are_needed(found: Evidence, strengths: Sequence[int]) -> Flags:
@@ -73,11 +75,52 @@ def own_signature(signature: Floats, others: Floats, allowed: Floats, room: tupl
     room : (parameters,) array, (parameters,) array
         l and u, how far the others may go down and up.
     """
+    return np.asarray(signature + others @ _instead(signature, others, allowed, room), dtype=np.float64)
+
+
+def could_others(
+    signature: Floats,
+    others: Floats,
+    position: Floats,
+    allowed: Floats,
+    is_within: Callable[[Floats], bool],
+    left_of: Callable[[Floats], Floats | None],
+) -> bool:
+    """Whether the others of a set could do all of an effect's work, but for what is allowed.
+
+    Their slopes say how far they would have to go, and the simulator what they do there: a short lag goes like a
+    delay, and a long one does not.
+
+    Parameters
+    ----------
+    signature, others, allowed
+        As of `own_signature`.
+    position : (parameters,) array
+        Of the others, 0 to 1.
+    is_within : callable
+        Whether what is left is what is allowed, or less.
+    left_of : callable
+        What the simulator leaves without the effect, the others at a position; None where they cannot be there.
+    """
+    left = signature
+    for _ in range(GONE_ON):
+        change = _instead(left, others, allowed, (-position, 1.0 - position))
+        if not is_within(left + others @ change):
+            return False
+        position = np.clip(position + change, 0.0, 1.0)
+        replayed = left_of(position)
+        if replayed is None or is_within(replayed):
+            return replayed is not None
+        left = replayed
+    return False
+
+
+def _instead(signature: Floats, others: Floats, allowed: Floats, room: tuple[Floats, Floats]) -> Floats:
+    """(parameters,) x̂ of `own_signature`: how far the others go to do an effect's work, by their slopes."""
     if others.shape[1] == 0:
-        return signature
+        return np.zeros(0)
     directions, inner = np.linalg.qr(others / allowed[:, None])
-    change = lsq_linear(inner, -directions.T @ (signature / allowed), room).x
-    return np.asarray(signature + others @ change, dtype=np.float64)
+    return np.asarray(lsq_linear(inner, -directions.T @ (signature / allowed), room).x, dtype=np.float64)
 
 
 def unshifted(cells: Cells, signature: Floats, late: Floats) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wetwell.sim2real.attribution.presence import SURE, are_needed, own_signature, unshifted
+from wetwell.sim2real.attribution.presence import SURE, are_needed, could_others, own_signature, unshifted
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 
@@ -51,6 +51,28 @@ def test_no_effect_does_anothers_work_beyond_its_range():
     assert own_signature(0.4 * form, form[:, None], allowed, at_its_end) == pytest.approx(0.4 * form)
     assert own_signature(0.4 * form, -form[:, None], allowed, at_its_end) == pytest.approx(np.zeros(50))
     assert own_signature(1.4 * form, -form[:, None], allowed, at_its_end) == pytest.approx(0.4 * form)
+
+
+@pytest.mark.parametrize(("power", "could"), [(1.0, True), (1.3, True), (4.0, False)])
+def test_the_simulator_says_whether_others_could_do_an_effects_work(power, could):
+    """A lag goes like a delay by its slope, but not all of the way; what bends a little is gone on with."""
+    form, allowed, seen = np.random.default_rng(7).normal(size=50), np.ones(50), []
+
+    def left_of(position):
+        seen.append(float(position[0]))
+        return (8.0 - 10.0 * position[0] ** power) * form + 20.0 * (power > 2.0) * position[0] * np.abs(form)
+
+    def is_within(left):
+        return float(np.mean(left**2)) <= 1.0
+
+    slope = -10.0 * form[:, None]
+    assert could_others(8.0 * form, slope, np.zeros(1), allowed, is_within, left_of) == could
+    assert all(0.0 <= one <= 1.0 for one in seen)
+
+
+def test_others_that_cannot_be_there_do_no_work():
+    form = np.ones(5)
+    assert not could_others(form, -form[:, None], np.zeros(1), form, lambda left: not left.any(), lambda _: None)
 
 
 def test_what_a_shift_of_the_others_does_in_a_whole_block_is_not_an_effects_own():
