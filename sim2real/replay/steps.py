@@ -73,7 +73,8 @@ def _begins(second: Integers, midway_m: Floats) -> Flags:
     pause_s = np.diff(second, prepend=second[:1])
     row, inner, count = _groups(begins)
     apart_s = np.r_[pause_s[begins], 0]
-    away_s = 0.5 * np.maximum(apart_s[:-1], apart_s[1:])
+    longer_s = np.maximum(apart_s[:-1], apart_s[1:])
+    away_s = np.where(longer_s > 0, 0.5 * longer_s, np.inf)  # with no other level there is nothing to go by
     comes_back = (count[row] % 2 == 1) & (inner > 0) & (pause_s > away_s[row])
     begins[_longest(np.flatnonzero(comes_back), row, pause_s)] = True
     row, inner, count = _groups(begins)

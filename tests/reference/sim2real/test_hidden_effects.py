@@ -33,18 +33,36 @@ def test_a_single_effect_is_told(seed, effect, metered_share):
     ("kind", "seed", "plant", "names"),
     [
         pytest.param(
-            "pair", 8204, "fine", ("air_pocket", "level_sensor_lag"), id="a lag behind steps of a centimetre"
+            "pair",
+            8204,
+            "fine",
+            ("air_pocket", "level_sensor_lag"),
+            id="a lag behind steps of a centimetre",
+            marks=pytest.mark.long,
         ),
         pytest.param(
-            "pair", 8207, "elastic", ("level_dependent_static_head", "level_quantisation"), id="steps of 16 mm"
+            "pair",
+            8207,
+            "elastic",
+            ("level_dependent_static_head", "level_quantisation"),
+            id="steps of 16 mm",
+            marks=pytest.mark.long,
         ),
-        pytest.param("pair", 8206, "elastic", ("ragging", "static_head_bias"), id="rags of two kinds beside a lift"),
+        pytest.param(
+            "pair",
+            8206,
+            "elastic",
+            ("ragging", "static_head_bias"),
+            id="rags of two kinds beside a lift",
+            marks=pytest.mark.long,
+        ),
         pytest.param(
             "triple",
             8648,
             "elastic",
             ("flow_meter_gain", "level_sensor_lag", "supply_voltage_variation"),
             id="a supply whose swing is no sine",
+            marks=pytest.mark.long,
         ),
         pytest.param(
             "triple",

@@ -144,6 +144,7 @@ def test_a_case_whose_pumps_run_the_wet_well_dry_is_drawn_anew():
     assert passage_of(truth, "elastic").lowest_level_m > 0.05
 
 
+@pytest.mark.long
 def test_a_case_in_which_swmm_loses_the_solution_is_drawn_anew():
     """Its pumps carry twice their duty above their shut-off head there: the iteration swings between two steps."""
     pytest.importorskip("pyswmm", exc_type=ImportError)
