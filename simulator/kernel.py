@@ -170,7 +170,8 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         state.curves[i, 0] = factor * (pump.c0 + (pump.c1 + pump.c2 * leak_m3h) * leak_m3h)
         state.curves[i, 1] = factor * (pump.c1 + 2.0 * pump.c2 * leak_m3h)
         state.curves[i, 2] = factor * pump.c2 - pump.ragging_h2_m5 * now.ragging
-        now.ragging += (1.0 - now.ragging) / pump.ragging_s
+        carried = max(state.flow_m3h[i], 0.0) / pump.rated_flow_m3h
+        now.ragging += (1.0 - now.ragging) * min(carried / pump.ragging_s, 1.0)
 
 
 @inlined

@@ -33,10 +33,10 @@ class PumpParameters:
     """A pump: its main, its curve and rated duty, and what is not as new.
 
     Its shaft power is a line over the flow, from `shutoff_power_share` of the rated one at no flow. Rags gather in a
-    run with time constant `ragging_s`: all of them cost `ragging_speed_loss` of the speed, and `ragging_h2_m5` Q² of
-    head. `slip` is the loss of speed at rated torque, and `slip_power_exponent` the power of that speed with which
-    the electrical power falls. While the pump stands, `valve_leak_m3h` flows back through its check valve at 1 m of
-    head.
+    run at the rated flow with time constant `ragging_s`: all of them cost `ragging_speed_loss` of the speed, and
+    `ragging_h2_m5` Q² of head. `slip` is the loss of speed at rated torque, and `slip_power_exponent` the power of
+    that speed with which the electrical power falls. While the pump stands, `valve_leak_m3h` flows back through its
+    check valve at 1 m of head.
     """
 
     c0: float

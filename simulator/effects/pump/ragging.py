@@ -8,9 +8,9 @@ from wetwell.simulator.parameters import PlantParameters
 
 
 class Ragging(Effect):
-    r"""Rags gather in a run, to a limit: on the impeller they cost speed, before it head; the stop sheds them.
+    r"""Rags come with the water, to a limit: on the impeller they cost speed, before it head; the stop sheds them.
 
-    $$\frac{d\rho}{dt} = \frac{1 - \rho}{\tau} \text{ in a run}, \qquad \rho = 0 \text{ after a stop}, \qquad
+    $$\frac{d\rho}{dt} = \frac{1 - \rho}{\tau}\,\frac{Q}{Q_r}, \qquad \rho = 0 \text{ after a stop}, \qquad
     N = N_c (1 - \rho\,n), \qquad H = H(Q, N) - \rho\,h\,(Q / Q_r)^2$$
 
     with the rated flow Q_r.
@@ -22,7 +22,7 @@ class Ragging(Effect):
     throttle_m : float
         h, head that all rags together cost at the rated flow; 0 is none. [m]
     growth_s : float
-        τ, running time in which 63 % of the rags have gathered. [s]
+        τ, running time at the rated flow in which 63 % of the rags have gathered. [s]
     pump : int
         0 for all.
 
