@@ -99,8 +99,8 @@ def silence_s(site: Site) -> float | None:
     """From the death of the router to the first verdict after it. [s]."""
     if site.router_killed_s is None:
         return None
-    arrived_s = np.array([arrived_s for arrived_s, _ in site.arrivals])
-    return round(float(np.min(arrived_s[arrived_s > site.router_killed_s])) - site.router_killed_s, 1)
+    after_s = np.array([arrived_s for arrived_s, _ in site.arrivals]) - site.router_killed_s
+    return round(float(np.min(after_s[after_s > 0.0], initial=np.inf)), 1)
 
 
 def slope(times_s: np.ndarray, values: np.ndarray) -> float:

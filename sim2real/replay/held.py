@@ -179,7 +179,7 @@ def as_sent(values: Floats, rate_s: float) -> Floats:
     """(n,) what a held channel sent, at about the second in which it did: rows tell of it later.
 
     A single move came at any time since the row before, so half of it ago in the mean. Of several the last did, and
-    that is as much less as a deadband is of what they moved together.
+    that is as much less as a deadband is of what they moved together. If they tell of no deadband they stay.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def as_sent(values: Floats, rate_s: float) -> Floats:
     known = np.flatnonzero(np.isfinite(values))
     moved = np.diff(values[known])
     held = held_between_rows(moves_of([values[known]], np.zeros((1, known.size), dtype=np.bool_), rate_s), 0.0)
-    single = np.inf if held is None else held.deadband
+    single = 0.0 if held is None else held.deadband
     is_sent = moved != 0.0
     ago_s = 0.5 * np.diff(known)[is_sent] * np.minimum(single / np.abs(moved[is_sent]), 1.0)
     sent = np.full(values.size, np.nan)

@@ -281,9 +281,9 @@ class Replay:
     @cached_property
     def _observer_of_changes(self) -> Observer:
         level_m = self.traces.level_m
-        if not self.traces.is_each_second:
-            return self._begun_anew(as_sent(level_m, self.traces.rate_s))
-        return self._begun_anew(np.where(is_change(level_m), level_m, np.nan))
+        if self.traces.is_each_second or self.traces.value != "instant":
+            return self._begun_anew(np.where(is_change(level_m), level_m, np.nan))
+        return self._begun_anew(as_sent(level_m, self.traces.rate_s))
 
     def _begun_anew(self, level_m: Floats) -> Observer:
         """Observer of some values of the level, that begins with the first of them."""

@@ -5,7 +5,9 @@ import pytest
 
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.sim2real.recording.traces import traces_of
+from wetwell.sim2real.replay.held import as_sent
 from wetwell.sim2real.replay.replay import Replay
+from wetwell.sim2real.truth.telemetry import by_exception
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
@@ -57,3 +59,26 @@ def test_a_level_that_comes_late_begins_with_its_first_value(alpha, every):
     replay, true_m = replayed(alpha, 0.0, has_inflow=True, every=every)
     delayed = replay.run([EFFECTS["channel_delay"](channel="level_m", delay_s=20.0)])
     assert delayed.level_m[20] == pytest.approx(true_m[20], abs=0.08)
+
+
+@pytest.mark.parametrize(("up_m_s", "down_m_s"), [(0.0013, 0.0043), (0.0009, 0.0067)])
+def test_a_value_of_a_row_is_followed_when_it_was_sent(up_m_s, down_m_s):
+    """A row tells of a value up to ten seconds late, and of less where the level moved by several deadbands since."""
+    up_m = np.arange(0.5, 1.6, up_m_s)
+    true_m = np.tile(np.r_[up_m, np.arange(1.6, 0.5, -down_m_s)], 20)
+    rows_m = np.full(true_m.size, np.nan)
+    rows_m[::10] = by_exception(true_m, 0.05, np.inf)[::10]
+    sent_m = as_sent(rows_m, 10.0)
+    told = np.flatnonzero(np.isfinite(sent_m))
+    is_up = told % (true_m.size // 20) < up_m.size
+    for way, slope_m_s in ((is_up, up_m_s), (~is_up, -down_m_s)):
+        early_s = (sent_m - true_m)[told[way]] / slope_m_s
+        assert abs(np.mean(early_s)) < 2.0
+        assert np.quantile(np.abs(early_s), 0.9) < 5.5
+
+
+def test_values_that_tell_of_no_deadband_stay_where_they_are():
+    rows_m = np.full(1_000, np.nan)
+    rows_m[::10] = np.random.default_rng(2).normal(size=100)
+    sent_m = as_sent(rows_m, 10.0)
+    np.testing.assert_array_equal(sent_m[10:], rows_m[10:])
