@@ -128,7 +128,8 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
     if traces.span_s > 1:
         return []
     if traces.value == "held":
-        return _rounding(traces.level_m[traces.is_row])
+        level_m = traces.level_m[traces.is_row]
+        return _rounding(lattice(level_m)) if np.isfinite(level_m).any() else []
     is_row = np.ones(traces.seconds, dtype=np.bool_) if traces.is_each_second else traces.is_row
     held_of = held_each_second if traces.is_each_second else held_between_rows
     running = traces.frequency_hz > 0.0
@@ -147,15 +148,15 @@ def _patterns(traces: Traces, sensors: Sensors, regimes: Regimes) -> list[Patter
         moves = moves_of(parts, is_ramp & (quantity in traces.signals), traces.rate_s)
         if moves.all.size < FEWEST:
             continue
+        quantum = lattice(np.concatenate(parts))
         if quantity == "level_m" and moves.all.size >= MIN_MOVES:
-            found += _rounding(parts[0])
-        held = held_of(moves, lattice(np.concatenate(parts)))
+            found += _rounding(quantum)
+        held = held_of(moves, quantum)
         if held is not None:
             found.append(Pattern(quantity=quantity, deadband=held.deadband, within=held.within, pause_s=held.pause_s))
     return found
 
 
-def _rounding(level_m: Floats) -> list[Pattern]:
-    """Lattice of the level."""
-    quantum_m = lattice(level_m) if np.isfinite(level_m).any() else 0.0
+def _rounding(quantum_m: float) -> list[Pattern]:
+    """Pattern of a level that lies on a lattice."""
     return [Pattern(quantity="level_m", quantum=quantum_m)] if quantum_m >= MIN_QUANTUM_M else []
