@@ -29,47 +29,24 @@ def test_a_single_effect_is_told(seed, effect, metered_share):
     assert accepted.names == (effect,)
 
 
+def hidden(what, kind, seed, plant, *names, marks=pytest.mark.long):
+    return pytest.param(kind, seed, plant, names, id=what, marks=marks)
+
+
 @pytest.mark.parametrize(
     ("kind", "seed", "plant", "names"),
     [
-        pytest.param(
-            "pair",
-            8204,
-            "fine",
-            ("air_pocket", "level_sensor_lag"),
-            id="a lag behind steps of a centimetre",
-            marks=pytest.mark.long,
+        hidden("a lag behind steps of a centimetre", "pair", 8204, "fine", "air_pocket", "level_sensor_lag"),
+        hidden("steps of 16 mm", "pair", 8207, "elastic", "level_dependent_static_head", "level_quantisation"),
+        hidden("rags of two kinds beside a lift", "pair", 8206, "elastic", "ragging", "static_head_bias"),
+        hidden(
+            *("a supply whose swing is no sine", "triple", 8648, "elastic"),
+            *("flow_meter_gain", "level_sensor_lag", "supply_voltage_variation"),
         ),
-        pytest.param(
-            "pair",
-            8207,
-            "elastic",
-            ("level_dependent_static_head", "level_quantisation"),
-            id="steps of 16 mm",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "pair",
-            8206,
-            "elastic",
-            ("ragging", "static_head_bias"),
-            id="rags of two kinds beside a lift",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "triple",
-            8648,
-            "elastic",
-            ("flow_meter_gain", "level_sensor_lag", "supply_voltage_variation"),
-            id="a supply whose swing is no sine",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "triple",
-            8661,
-            "fine",
-            ("flow_meter_gain", "friction_bias", "threshold_shift"),
-            id="a friction that a meter hides, whose start leads away alone",
+        hidden(
+            *("a friction that a meter hides, whose start leads away alone", "triple", 8661, "fine"),
+            *("flow_meter_gain", "friction_bias", "threshold_shift"),
+            marks=(),
         ),
     ],
 )
