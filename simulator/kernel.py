@@ -171,7 +171,7 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         state.curves[i, 1] = factor * (pump.c1 + 2.0 * pump.c2 * leak_m3h)
         state.curves[i, 2] = factor * pump.c2 - pump.ragging_h2_m5 * now.ragging
         carried = max(state.flow_m3h[i], 0.0) / pump.rated_flow_m3h
-        now.ragging += (1.0 - now.ragging) * min(carried / pump.ragging_s, 1.0)
+        now.ragging += (1.0 - now.ragging) * carried / pump.ragging_s
 
 
 @inlined
