@@ -24,7 +24,7 @@ from wetwell.simulator.rising_main.flows import back_flow_m3h, gather_air, move_
 from wetwell.simulator.state import PlantState, Truth
 from wetwell.simulator.telemetry.sending import is_plain_telemetry, read_channel, read_pumps, silence
 from wetwell.simulator.telemetry.sensors import delayed
-from wetwell.simulator.wet_well import level_at_volume_m, next_volume_m3, overflow_m3h
+from wetwell.simulator.wet_well import daily_swing_m3h, level_at_volume_m, next_volume_m3, overflow_m3h
 
 
 @compiled
@@ -115,7 +115,11 @@ def move_plant(
         for m in range(plant.mains.size):
             gather_air(plant, state, m)
     over_m3h = overflow_m3h(level_m, station.overflow_level_m, station.weir_width_m, plant.profile)
-    inflow_m3h = forcing.inflow_m3h[second] + station.unmetered_inflow_m3h + extra_inflow_m3h
+    unmetered_m3h = station.unmetered_inflow_m3h
+    unmetered_m3h += daily_swing_m3h(
+        station.unmetered_cosine_m3h, station.unmetered_sine_m3h, forcing.clock_s[second]
+    )
+    inflow_m3h = forcing.inflow_m3h[second] + unmetered_m3h + extra_inflow_m3h
     inflow_m3h += state.correction[LEVEL_BALANCE, 0]
     inflow_m3h += back_flow_m3h(plant, state, forcing, second, level_m)
     now.volume_m3 = next_volume_m3(now.volume_m3, inflow_m3h, over_m3h, state.mean_flow_m3h)

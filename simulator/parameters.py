@@ -135,17 +135,19 @@ class SensorParameters:
 class PlantParameters:
     """A station as the kernel reads it.
 
-    Wet well: profile, an overflow weir, inflow that no meter sees. Pumps: see `PumpParameters`. Mains: see
-    `MainParameters`. Drive: shape of the ramp. Control: levels, delay, rotation, limits, level controller.
-    `rated_level_m` is where the rated duties are told. Electrical: a power that follows the frequency, or the load,
-    or between the two by `load_share`. Sensors: one a channel. Corrections: learnt addends to terms, and the columns
-    of a user that they go by, in the order of the forcing's.
+    Wet well: profile, an overflow weir, inflow that no meter sees, as its mean and its swing over the day. Pumps: see
+    `PumpParameters`. Mains: see `MainParameters`. Drive: shape of the ramp. Control: levels, delay, rotation, limits,
+    level controller. `rated_level_m` is where the rated duties are told. Electrical: a power that follows the
+    frequency, or the load, or between the two by `load_share`. Sensors: one a channel. Corrections: learnt addends to
+    terms, and the columns of a user that they go by, in the order of the forcing's.
     """
 
     profile: Records[ProfileSlice]
     overflow_level_m: float
     weir_width_m: float
     unmetered_inflow_m3h: float = 0.0
+    unmetered_cosine_m3h: float = 0.0
+    unmetered_sine_m3h: float = 0.0
 
     pumps: tuple[PumpParameters, ...]
 

@@ -11,6 +11,7 @@ from wetwell.protocols.jit import compiled
 from wetwell.simulator.records import Records, records_of
 
 SECONDS_PER_HOUR = 3600
+DAY_S = 86_400.0
 WEIR_COEFFICIENT_M05_S = 1.84
 """Of a sharp-crested weir in metric units (Francis)."""
 
@@ -162,6 +163,30 @@ def overflow_m3h(level_m: float, crest_m: float, width_m: float, profile: Record
     weir_m3h = WEIR_COEFFICIENT_M05_S * width_m * height_m * math.sqrt(height_m) * SECONDS_PER_HOUR
     above_m3 = volume_at_level_m3(level_m, profile) - volume_at_level_m3(crest_m, profile)
     return min(weir_m3h, above_m3 * SECONDS_PER_HOUR)
+
+
+@compiled
+def daily_swing_m3h(cosine_m3h: float, sine_m3h: float, clock_s: float) -> float:
+    r"""What an inflow is above its mean at a time of the day.
+
+    $$Q_c \cos\frac{2 \pi t}{24\,\text{h}} + Q_s \sin\frac{2 \pi t}{24\,\text{h}}$$
+
+    Parameters
+    ----------
+    cosine_m3h, sine_m3h : float
+        Q_c and Q_s, above the mean at midnight and at six. [m³/h]
+    clock_s : float
+        t, since a midnight. [s]
+
+    Examples
+    --------
+    >>> round(daily_swing_m3h(1.0, 3.0, 21_600.0), 12)
+    3.0
+    """
+    if cosine_m3h == 0.0 and sine_m3h == 0.0:
+        return 0.0
+    angle = 2.0 * math.pi * clock_s / DAY_S
+    return cosine_m3h * math.cos(angle) + sine_m3h * math.sin(angle)
 
 
 @compiled

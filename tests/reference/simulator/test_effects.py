@@ -258,6 +258,19 @@ def test_unmetered_inflow_raises_the_level_and_no_meter(quiet_alpha):
     assert set(rows["inflow_m3h"]) == {91.0}
 
 
+def test_unmetered_inflow_swings_with_the_day(quiet_alpha):
+    """Its mean over a day is that of no swing; the time of the day is that of the clock, not of the start."""
+    effect = {"name": "unmetered_inflow", "flow_m3h": 2.0, "daily_share": 0.5, "daily_phase_h": 8.0}
+    station = quiet_alpha.model_copy(update={"sump": quiet_alpha.sump.model_copy(update={"area_m2": 1e4})})
+    station = station.model_copy(update={"effect": (EffectTable(**effect),)})
+    inflow = RecordedInflow(time_s=[0.0], flow_m3h=[0.0])
+    scenario = Scenario(name="r", start_time="2026-03-01T05:00:00Z", initial_level_m=0.6, inflow=inflow)
+    rows = Simulation(station, scenario, 1).advance(86_400).columns
+    hour = 5.0 + np.arange(86_399) / 3600.0
+    coming_m3h = 2.0 * (1.0 + 0.5 * np.cos(2.0 * np.pi * (hour - 8.0) / 24.0))
+    np.testing.assert_allclose(np.diff(rows["level_m"]), coming_m3h / 3600.0 / 1e4, atol=1e-12)
+
+
 def test_check_valve_leak_after_a_stop(quiet_alpha):
     """Three standing pumps give back 3 K sqrt(H_s)."""
     rows = run(quiet_alpha, {"name": "check_valve_leak", "leak_m3h": 10.0}, inflow_m3h=60.0)
