@@ -6,8 +6,9 @@ from wetwell.sim2real.likelihood.posterior import DECIMALS, SetProbability, Unkn
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.effects.effect import Component
 
-OF_POWER = {"drive", "power_meter"}
-"""Components of which the readings of the power alone tell: one draws it, and one reads it."""
+BY_READINGS = {("drive", "power_meter"), ("pump", "drive")}
+"""Components of a term, and others that the pattern of the readings tells from them. The power is drawn by one and
+read by the other; a head that is off in ramps alone, or swings within a run, is off by the speed."""
 
 
 def component_probability(
@@ -16,8 +17,9 @@ def component_probability(
     """Probability of each component in which something may be, the largest first.
 
     Something unknown acts in the component of the term that it changes, and so do the effects beside it in theirs. A
-    discrepancy of the readings is where their pattern points. Whether a change of the power is the drive's or the
-    meter's, the pattern says too. Of components that are as probable, that of something unknown comes first.
+    discrepancy of the readings is where their pattern points, and so is what comes late or is held: no term does so.
+    Whether a change of the power is the drive's or the meter's, and one of the head the pump's or the drive's, the
+    pattern says too. Of components that are as probable, that of something unknown comes first.
 
     Parameters
     ----------
@@ -58,7 +60,9 @@ def place_of_unknown(unknown: Sequence[UnknownShare], pattern: Component) -> Com
 
 
 def _place(way: UnknownShare, pattern: Component) -> Component:
-    return pattern if way.component is None or {pattern, way.component} == OF_POWER else way.component
+    if way.component is None or pattern == "telemetry" or (way.component, pattern) in BY_READINGS:
+        return pattern
+    return way.component
 
 
 def _components(effects: Iterable[str]) -> set[Component]:

@@ -197,7 +197,9 @@ def diagnose(
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
     excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
-    pattern = localise(excess, found.plain, bins, plain.plant, residuals.telemetry.component)
+    likeliest = max(found.unknown, key=lambda way: way.share, default=None)
+    patterns = residuals.telemetry.components(() if likeliest is None else likeliest.acting)
+    pattern = localise(excess, found.plain, bins, plain.plant, patterns)
     by_component = component_probability(found.posterior, found.unknown, pattern)
     unknown_at = place_of_unknown(found.unknown, pattern)
     blamed = unknown_at if found.accepted is None else found.accepted.candidates[0].component

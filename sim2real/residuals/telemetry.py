@@ -1,5 +1,6 @@
 """Residuals of the telemetry itself: values that are held, values that lie on a lattice."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,11 +78,10 @@ class TelemetryResiduals:
         """Names of the effects of the patterns that count."""
         return {pattern.effect for pattern in _told(self.patterns)}
 
-    @property
-    def component(self) -> Component:
-        """Where they come from: a lattice from its sensor, the first that counts before others."""
-        components = [EFFECTS[pattern.effect].component for pattern in _told(self.patterns)]
-        return next(iter(components), "telemetry")
+    def components(self, acting: Collection[str]) -> dict[AnalogueQuantity, Component]:
+        """Where the patterns come from that count and that no effect among these makes, by channel."""
+        unexplained = [pattern for pattern in _told(self.patterns) if pattern.effect not in acting]
+        return {pattern.quantity: EFFECTS[pattern.effect].component for pattern in unexplained}
 
     def of(self, prediction: Prediction) -> Floats:
         """(patterns that count * cycles,) nothing where the plant holds or rounds so, else `STRENGTH`."""

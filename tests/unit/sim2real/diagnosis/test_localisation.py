@@ -1,10 +1,12 @@
 """Which component a gap points to, from how its residuals move."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wetwell.sim2real.diagnosis.localisation import localise
-from wetwell.sim2real.recording.regimes import START_RAMP, STEADY
+from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins
 from wetwell.simulator.parameters import plant_parameters
 
@@ -30,8 +32,8 @@ def bins_of(signals, regime):
     )
 
 
-def blamed(residuals, bins, station):
-    return localise(residuals**2, residuals, bins, plant_parameters(station), "level_sensor")
+def blamed(residuals, bins, station, patterns=None):
+    return localise(residuals**2, residuals, bins, plant_parameters(station), patterns or {})
 
 
 def test_power_that_runs_away_is_its_meter_and_power_that_swings_the_drive(alpha):
@@ -54,8 +56,60 @@ def test_a_speed_that_swings_within_a_run_is_the_drive(alpha, period_s, componen
 def test_a_flow_that_is_ever_later_is_telemetry(alpha, growth, component):
     bins = bins_of([FLOW, HEAD], START_RAMP)
     turn = bins.second / bins.second.max()
-    late = np.where(bins.signal == FLOW, 20.0 * (growth * turn + (1.0 - growth)), 0.0)
+    late = np.where(bins.signal == FLOW, -20.0 * (growth * turn + (1.0 - growth)), 0.0)
     assert blamed(late, bins, alpha) == component
+
+
+@pytest.mark.parametrize(
+    ("signal", "at_stops", "component"),
+    [(HEAD, 1.0, "telemetry"), (HEAD, -1.0, "head_sensor"), (POWER, 1.0, "telemetry"), (POWER, -1.0, "drive")],
+)
+def test_what_is_late_is_too_low_at_starts_and_too_high_at_stops(alpha, signal, at_stops, component):
+    """A power or a head that goes otherwise with the frequency is off to the same side in both."""
+    bins = bins_of([FLOW, signal], START_RAMP)
+    bins = replace(bins, regime=np.where(np.arange(bins.size) % 2 == 0, START_RAMP, STOP_RAMP))
+    size = np.where(bins.regime == START_RAMP, -10.0, 10.0 * at_stops)
+    assert blamed(np.where(bins.signal == signal, size, 0.0), bins, alpha) == component
+
+
+def test_a_clock_that_is_set_at_times_is_telemetry(alpha):
+    bins = bins_of([FLOW, HEAD], START_RAMP)
+    late = -2.0 * (bins.cycle % 15) / 15.0
+    assert blamed(np.where(bins.signal == FLOW, late, 0.0), bins, alpha) == "telemetry"
+
+
+@pytest.mark.parametrize(("at_starts", "component"), [(8.0, "level_sensor"), (0.5, "sump")])
+def test_a_level_that_follows_slowly_shows_in_starts_and_in_stops(alpha, at_starts, component):
+    """Another area at the bottom shows at stops alone."""
+    bins = bins_of([LEVEL], STEADY)
+    place = np.arange(bins.size) % BINS_PER_RUN
+    bins = replace(bins, regime=np.select([place == 0, place == 10], [START_RAMP, STOP_RAMP], STEADY))
+    size = np.select([place == 0, place == 10], [at_starts, 8.0], 2.0)
+    assert blamed(size, bins, alpha) == component
+
+
+def test_a_flow_that_departs_at_random_in_ramps_does_not_run_late(alpha):
+    """A few large ones at the end make most of the gap there; they are on both sides."""
+    bins = bins_of([FLOW, HEAD], START_RAMP)
+    turn = bins.second / bins.second.max()
+    swing = np.random.default_rng(5).normal(0.0, 10.0, bins.size) * turn**2
+    assert blamed(np.where(bins.signal == FLOW, swing, 0.0), bins, alpha) != "telemetry"
+
+
+@pytest.mark.parametrize(
+    ("signals", "patterns", "component"),
+    [
+        ([HEAD], {"head_m": "telemetry"}, "telemetry"),
+        ([HEAD], {"flow_m3h": "telemetry"}, "head_sensor"),
+        ([FLOW, HEAD], {"head_m": "telemetry"}, "pump"),
+        ([LEVEL, START_LEVEL], {"level_m": "level_sensor"}, "level_sensor"),
+    ],
+)
+def test_a_channel_that_departs_alone_and_has_a_pattern_is_what_makes_it(alpha, signals, patterns, component):
+    """What a held head is off follows from its being held; where the flow is off too, something else is."""
+    bins = bins_of([FLOW, HEAD, LEVEL, START_LEVEL], STEADY)
+    residuals = np.where(np.isin(bins.signal, signals), 5.0, 0.0)
+    assert blamed(residuals, bins, alpha, patterns) == component
 
 
 @pytest.mark.parametrize(("sign", "component"), [(-1.0, "telemetry"), (1.0, "controller")])

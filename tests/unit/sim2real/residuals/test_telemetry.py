@@ -85,7 +85,8 @@ def test_a_level_that_is_stored_to_a_centimetre_is_no_gap(recorded, step_m, is_t
     telemetry = telemetry_residuals(traces, station, regimes_of(traces, station))
     (pattern,) = telemetry.patterns
     assert pattern.quantum == pytest.approx(step_m, rel=0.05)
-    assert telemetry.component == ("level_sensor" if is_told else "telemetry")
+    assert telemetry.components(()) == ({"level_m": "level_sensor"} if is_told else {})
+    assert telemetry.components(["level_quantisation"]) == {}, "it is known what makes it"
     assert pattern.rounding(0.0) == (0.0 if is_told else pattern.quantum), "a usual step is excused in any case"
     assert bool(telemetry.bins.size) == is_told
 
