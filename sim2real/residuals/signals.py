@@ -149,7 +149,7 @@ def pump_residuals(
         expected = plain.signals[name]
         noise = noise_of(_steady_ratios(recorded, expected, regimes, has_lost), configured[name], TOLERANCE, block)
         for pump in range(traces.pumps):
-            open_ = _unresolved(expected[pump], is_step)
+            open_ = _unresolved(expected[pump], recorded[pump], is_step, regimes.of_pumps[pump], is_ramp[pump])
             if name in doubt.signals:
                 open_ = np.hypot(open_, doubt.signals[name][pump])
             if traces.span_s > 1:
@@ -200,10 +200,19 @@ def steps(traces: Traces, plain: Prediction) -> Flags:
     return np.asarray(np.any(moved > UNRESOLVED_STEP, axis=0))
 
 
-def _unresolved(expected: Floats, is_step: Flags) -> Floats:
-    """(n,) how far a right model may be off since nobody knows when within a second a pump was switched."""
+def _unresolved(expected: Floats, recorded: Floats, is_step: Flags, regime: Integers, is_ramp: Flags) -> Floats:
+    """(n,) how far a right model may be off since nobody knows when within a second a pump was switched.
+
+    What jumps then jumps later in a channel that comes late: so far as recorded ones usually jump at that second.
+    """
+    if not is_step.any():
+        return np.zeros(expected.size)
     jumps = np.abs(np.diff(expected, prepend=expected[:1])) * is_step
-    return np.asarray(np.convolve(jumps, UNRESOLVED)[: expected.size], dtype=np.float64)
+    usual = np.abs(_usual(np.diff(recorded, prepend=recorded[:1]), regime, is_ramp))
+    seen = np.zeros(expected.size)
+    seen[is_ramp] = usual
+    open_ = [np.convolve(one, UNRESOLVED)[: expected.size] for one in (jumps, seen)]
+    return np.asarray(np.maximum(*open_), dtype=np.float64)
 
 
 def _one_pump(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wetwell.sim2real.recording.regimes import regimes_of
+from wetwell.sim2real.recording.regimes import IDLE, START_RAMP, regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.signals import _cut, _since, _unresolved, pump_residuals
@@ -15,14 +15,36 @@ from wetwell.simulator.simulation import Simulation
 def test_a_jump_is_open_by_half_when_it_happens_and_by_less_and_less_afterwards():
     expected = np.r_[np.zeros(3), np.full(9, 100.0)]
     is_step = np.arange(12) == 3
-    open_m3h = _unresolved(expected, is_step)
+    open_m3h = _unresolved(expected, expected, is_step, *starting_at(3, 12))
     np.testing.assert_allclose(open_m3h[:3], 0.0)
     np.testing.assert_allclose(open_m3h[3:8], 50.0 * np.exp(-np.arange(5.0)))
     np.testing.assert_allclose(open_m3h[8:], 0.0)
 
 
+def test_a_jump_that_comes_late_is_open_where_it_comes():
+    """Not where one record jumps: noise is no jump, as ramps do not have it at the same second."""
+    count = 40
+    expected = np.tile(np.r_[np.zeros(3), np.full(17, 100.0)], count)
+    recorded = np.tile(np.r_[np.zeros(10), np.full(10, 80.0)], count)
+    regime, is_ramp = (np.tile(one, count) for one in starting_at(3, 20))
+    is_step = np.tile(np.arange(20) == 3, count)
+    noise = np.random.default_rng(1).normal(0.0, 1.0, recorded.size)
+    open_m3h = _unresolved(expected, recorded + noise, is_step, regime, is_ramp)
+    by_second = open_m3h.reshape(count, 20)
+    np.testing.assert_allclose(by_second[:, 3], 50.0)
+    np.testing.assert_allclose(by_second[:, 10], 40.0, atol=0.5)
+    np.testing.assert_allclose(by_second[:, 12], 40.0 * np.exp(-2.0), atol=0.5)
+
+
 def test_a_slow_ramp_leaves_nothing_open():
-    assert not np.any(_unresolved(np.linspace(0.0, 100.0, 12), np.zeros(12, dtype=bool)))
+    slow = np.linspace(0.0, 100.0, 12)
+    assert not np.any(_unresolved(slow, slow, np.zeros(12, dtype=bool), *starting_at(0, 12)))
+
+
+def starting_at(second, seconds):
+    """(seconds,) regimes in which a start begins at a second, and whether it is one."""
+    is_ramp = np.arange(seconds) >= second
+    return np.where(is_ramp, START_RAMP, IDLE), is_ramp
 
 
 @pytest.mark.parametrize(
