@@ -8,7 +8,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.fitting import ROUNDS, Fit, Fitter
-from wetwell.sim2real.attribution.intervals import left_open
+from wetwell.sim2real.attribution.intervals import are_named, left_open
 from wetwell.sim2real.attribution.presence import (
     are_needed,
     could_others,
@@ -361,6 +361,7 @@ class Hypotheses:
             slopes=shown.slopes,
             is_there=shown.may_each_lack
             and bool(is_needed.all())
+            and are_named(fit, found, [fit.names[member] for member in told])
             and not any(self._could_others(fit, k, np.isin(of_member, told) & (of_member != k), shown) for k in told),
             told=tuple(sorted(fit.names[member] for member in told)),
             needed=tuple(sorted(fit.names[member] for member in told if is_needed[member] or member != least)),

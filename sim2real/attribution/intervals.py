@@ -151,6 +151,17 @@ def are_sized(fit: Fit, ends: Floats, told: Collection[str]) -> bool:
     )
 
 
+def are_named(fit: Fit, found: Evidence, told: Collection[str]) -> bool:
+    """Whether some effects of a fit are none of another name, by the likelihood.
+
+    Rags that may be there at once are wear, and tell nothing of rags.
+    """
+    x, spread = fit.position + found.step, left_open(found)
+    ends = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
+    parts = zip(fit.candidates, fit.split(ends), strict=False)  # of no candidates it is one empty part
+    return not any(any(_may_be_another(one, its)) for one, its in parts if one.name in told)
+
+
 def _may_be_neutral(candidate: Candidate, ends: Floats) -> list[bool]:
     """Of each strength."""
     return _hold(candidate, ends, {free.name: free.neutral for free in candidate.free})

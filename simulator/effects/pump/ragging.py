@@ -41,7 +41,7 @@ class Ragging(Effect):
     name: Literal["ragging"] = "ragging"
     speed_loss: Annotated[float, limits(0.0, 0.5, "1")] = 0.0
     throttle_m: Annotated[float, limits(0.0, 20.0, "m")] = 0.0
-    growth_s: Annotated[float, limits(30.0, 1.0e5, "s")] = 600.0
+    growth_s: Annotated[float, limits(5.0, 1.0e5, "s")] = 600.0
     pump: PumpNumber = 0
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from wetwell.sim2real.attribution.candidates import candidates_of
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.intervals import are_sized, intervals_of, sharpened
+from wetwell.sim2real.attribution.intervals import are_named, are_sized, intervals_of, sharpened
 from wetwell.sim2real.recording.regimes import regimes_of
 from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
@@ -89,6 +89,16 @@ def test_what_the_fit_knows_stays_as_it_is():
     fit = fit_of("check_valve_leak", "pump_wear")
     ends = np.array([[0.3, 0.9]] + [[0.0, 1.0]] * (fit.position.size - 1))
     assert sharpened(fit, ends, likelihood(len(ends), 400.0)) == pytest.approx(ends)
+
+
+@pytest.mark.parametrize("name", ["ragging", "air_pocket"])
+@pytest.mark.parametrize(("precision", "is_named"), [(400.0, True), (1.0, False)])
+def test_what_may_be_another_effect_by_the_likelihood_has_no_name(name, precision, is_named):
+    """A companion is too small to be told, whatever it is."""
+    fit = fit_of(name, "pump_wear")
+    found = likelihood(fit.position.size, precision)
+    assert are_named(fit, found, fit.names) is is_named
+    assert are_named(fit, found, ["pump_wear"])
 
 
 def test_nothing_has_no_size_to_be_told():
