@@ -3,13 +3,20 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.stats import rankdata
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.protocols.quantities import AnalogueQuantity
+from wetwell.sim2real.diagnosis.lateness import (
+    ALONE,
+    DRIFT_BLOCKS,
+    OF_CHANNEL,
+    SWINGING,
+    WHERE_IT_MOVES,
+    is_late,
+    mean_of,
+)
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S
-from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.bins import (
     FLOW,
     HEAD,
@@ -24,7 +31,6 @@ from wetwell.sim2real.residuals.bins import (
 from wetwell.simulator.effects.effect import Component
 from wetwell.simulator.parameters import PlantParameters
 
-DRIFT_BLOCKS = 12
 STRAIGHT = 0.8
 """Share of the scatter of blocks that a straight line explains; 0.6 for a sine of one period."""
 NEAR_S = 60
@@ -32,20 +38,6 @@ LASTING = 0.3
 """Share of the square of an imbalance that is still there a minute later; of a sensor that wanders, hardly any."""
 ONE_SIDED = 5.0
 """Gap in starts over that in stops from which the check valve opens late: inertia shows in both."""
-SWINGING = 0.4
-ALONE = 0.7
-"""Share of the gap from which it is in one kind of signal alone."""
-UNLIKE = 0.2
-"""Scatter of what starts depart by, over their mean, from which they are not alike."""
-RISING = 0.7
-"""Rank correlation of blocks with time that chance passes once in a hundred recordings."""
-OF_CHANNEL: dict[AnalogueQuantity, tuple[int, ...]] = {
-    "flow_m3h": (FLOW,),
-    "head_m": (HEAD,),
-    "power_kw": (POWER,),
-    "level_m": (LEVEL, START_LEVEL, STOP_LEVEL),
-}
-"""Signals in which the readings of a channel depart."""
 
 
 def localise(
@@ -77,7 +69,7 @@ def localise(
     for quantity, component in patterns.items():
         if by_signal[[TELEMETRY, *OF_CHANNEL.get(quantity, ())]].sum() > 0.5 * total:
             return component
-    if _is_late(excess, residuals, bins):
+    if is_late(excess, residuals, bins):
         return "telemetry"
     hydraulic = by_signal[FLOW] + by_signal[HEAD]
     if hydraulic > (1.0 - ALONE) * total:
@@ -88,8 +80,8 @@ def localise(
         return "controller"
     level = bins.signal == LEVEL
     calm = level & ((bins.regime == IDLE) | (bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
-    in_ramps = min(_mean(excess, level & (bins.regime == ramp)) for ramp in (START_RAMP, STOP_RAMP))
-    is_sensor = in_ramps > 3.0 * _mean(excess, calm) or _wanders(residuals, bins, calm)
+    in_ramps = min(mean_of(excess, level & (bins.regime == ramp)) for ramp in (START_RAMP, STOP_RAMP))
+    is_sensor = in_ramps > WHERE_IT_MOVES * mean_of(excess, calm) or _wanders(residuals, bins, calm)
     return "level_sensor" if is_sensor else "sump"
 
 
@@ -120,58 +112,6 @@ def _wanders(residuals: Floats, bins: Bins, calm: Flags) -> bool:
     noise = (noise_m2[1:] + noise_m2[:-1]) / np.maximum(np.diff(second), 1) ** 2
     square = float(np.mean((slope**2 - noise)[:-2][together]))
     return float(np.mean((slope[:-2] * slope[2:])[together])) < LASTING * square
-
-
-def _is_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
-    """Whether one channel departs where it moves: it comes late, or its clock runs away, or is set at times.
-
-    What is late is too low at starts and too high at stops. A flow meter follows slowly or cuts off, but alike in
-    each start. How far a level is off goes by the inflow, which has one side grow while the other shrinks.
-    """
-    by_signal = np.maximum(np.bincount(bins.signal, excess, len(SIGNALS)), 0.0)
-    is_start, is_stop = bins.regime == START_RAMP, bins.regime == STOP_RAMP
-    for signal in (FLOW, HEAD, POWER):
-        rows = bins.signal == signal
-        if by_signal[signal] > ALONE * by_signal.sum():
-            if _mean(excess, rows & (is_start | is_stop)) <= 3.0 * _mean(excess, rows & ~(is_start | is_stop)):
-                return False
-            if signal == FLOW:
-                return _wanders_slowly(_of_events(residuals, bins, rows & is_start))
-            return _mean(residuals, rows & is_start) < 0.0 < _mean(residuals, rows & is_stop)
-    if by_signal[[*OF_CHANNEL["level_m"]]].sum() > ALONE * by_signal.sum():
-        starts, stops = (_of_events(residuals, bins, bins.signal == one) for one in (START_LEVEL, STOP_LEVEL))
-        return _grows(-starts) and _grows(stops)
-    return False
-
-
-def _of_events(residuals: Floats, bins: Bins, rows: Flags) -> Floats:
-    """(events,) means over starts, or stops, in order of time."""
-    _, event = np.unique(bins.cycle[rows] * 64 + bins.pump[rows] + 1, return_inverse=True)
-    count = np.bincount(event)
-    time_s = np.bincount(event, bins.second[rows]) / count
-    return np.asarray((np.bincount(event, residuals_of(residuals[rows])) / count)[np.argsort(time_s)])
-
-
-def _wanders_slowly(events: Floats) -> bool:
-    """Whether they differ by a good part of themselves, and neighbours by less than those that lie apart."""
-    if events.size < DRIFT_BLOCKS:
-        return False
-    square = float(np.var(events))
-    is_smooth = float(np.mean(np.diff(events) ** 2)) / 2.0 < SWINGING * square
-    return is_smooth and square > (UNLIKE * float(np.mean(events))) ** 2
-
-
-def _grows(events: Floats) -> bool:
-    """Whether they are positive at the end, and the larger the later."""
-    if events.size < DRIFT_BLOCKS:
-        return False
-    means = np.array([part.mean() for part in np.array_split(events, DRIFT_BLOCKS)])
-    rank, place = (one - one.mean() for one in (rankdata(means), np.arange(DRIFT_BLOCKS)))
-    return bool(means[-1] > 0.0 and float(rank @ place) > RISING * float(place @ place))
-
-
-def _mean(values: Floats, rows: Flags) -> float:
-    return float(values[rows].mean()) if rows.any() else 0.0
 
 
 def _hunts(residuals: Floats, bins: Bins, rows: Integers) -> bool:
