@@ -37,7 +37,9 @@ NEAR_S = 60
 LASTING = 0.3
 """Share of the square of an imbalance that is still there a minute later; of a sensor that wanders, hardly any."""
 ONE_SIDED = 5.0
-"""Gap in starts over that in stops from which the check valve opens late: inertia shows in both."""
+"""Gap in starts over that in stops, or in stops over that in starts, from which it is in these alone. A check valve
+that opens late shows in starts alone, and inertia in both; another area at the bottom in stops alone, and a level
+sensor in both. [1]"""
 
 
 def localise(
@@ -80,8 +82,11 @@ def localise(
         return "controller"
     level = bins.signal == LEVEL
     calm = level & ((bins.regime == IDLE) | (bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
-    in_ramps = min(mean_of(excess, level & (bins.regime == ramp)) for ramp in (START_RAMP, STOP_RAMP))
-    is_sensor = in_ramps > WHERE_IT_MOVES * mean_of(excess, calm) or _wanders(residuals, bins, calm)
+    in_starts, in_stops = (mean_of(excess, level & (bins.regime == ramp)) for ramp in (START_RAMP, STOP_RAMP))
+    in_calm = mean_of(excess, calm)
+    if in_stops > max(ONE_SIDED * in_starts, in_calm):
+        return "sump"  # of another area at the bottom
+    is_sensor = min(in_starts, in_stops) > WHERE_IT_MOVES * in_calm or _wanders(residuals, bins, calm)
     return "level_sensor" if is_sensor else "sump"
 
 
