@@ -80,12 +80,17 @@ def localise(
         return "power_meter" if _drifts(residuals, bins) else "drive"
     if by_signal[START_LEVEL] + by_signal[STOP_LEVEL] > by_signal[LEVEL]:
         return "controller"
+    return _of_level(excess, residuals, bins)
+
+
+def _of_level(excess: Floats, residuals: Floats, bins: Bins) -> Component:
+    """Sump or level sensor: what is off in stops alone is another area at the bottom."""
     level = bins.signal == LEVEL
     calm = level & ((bins.regime == IDLE) | (bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
     in_starts, in_stops = (mean_of(excess, level & (bins.regime == ramp)) for ramp in (START_RAMP, STOP_RAMP))
     in_calm = mean_of(excess, calm)
     if in_stops > max(ONE_SIDED * in_starts, in_calm):
-        return "sump"  # of another area at the bottom
+        return "sump"
     is_sensor = min(in_starts, in_stops) > WHERE_IT_MOVES * in_calm or _wanders(residuals, bins, calm)
     return "level_sensor" if is_sensor else "sump"
 
