@@ -20,7 +20,7 @@ SWINGING = 0.4
 UNLIKE = 0.2
 """Scatter of what starts depart by, over their mean, from which they are not alike. [1]"""
 EVER_LATER = 0.7
-"""Rank correlation of blocks with time that chance passes once in a hundred recordings. [1]"""
+"""Rank correlation of blocks with time that chance passes in fewer than one recording of a hundred. [1]"""
 OF_CHANNEL: dict[AnalogueQuantity, tuple[int, ...]] = {
     "flow_m3h": (FLOW,),
     "head_m": (HEAD,),
