@@ -111,8 +111,7 @@ def sharpened(fit: Fit, ends: Floats, found: Evidence) -> Floats:
     found : Evidence
         Of the same fit, its candidates in the same order.
     """
-    x, spread = fit.position + found.step, left_open(found)
-    likely = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
+    likely = _likely_ends(fit, found)
     sharp, first = ends.copy(), 0
     for candidate in fit.candidates:
         its = ends[first : first + len(candidate.free)]
@@ -156,10 +155,16 @@ def are_named(fit: Fit, found: Evidence, told: Collection[str]) -> bool:
 
     Rags that may be there at once are wear, and tell nothing of rags.
     """
-    x, spread = fit.position + found.step, left_open(found)
-    ends = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
-    parts = zip(fit.candidates, fit.split(ends), strict=False)  # of no candidates it is one empty part
+    parts = zip(
+        fit.candidates, fit.split(_likely_ends(fit, found)), strict=False
+    )  # of no candidates it is one empty part
     return not any(any(_may_be_another(one, its)) for one, its in parts if one.name in told)
+
+
+def _likely_ends(fit: Fit, found: Evidence) -> Floats:
+    """(parameters, 2) ends of 95 % intervals by the likelihood alone."""
+    x, spread = fit.position + found.step, left_open(found)
+    return np.asarray(np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0), dtype=np.float64)
 
 
 def _may_be_neutral(candidate: Candidate, ends: Floats) -> list[bool]:
