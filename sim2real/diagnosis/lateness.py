@@ -7,7 +7,8 @@ from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.quantities import AnalogueQuantity
 from wetwell.sim2real.recording.regimes import START_RAMP, STOP_RAMP
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
-from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, SIGNALS, START_LEVEL, STOP_LEVEL, Bins
+from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins
+from wetwell.sim2real.residuals.groups import groups_of
 
 ALONE = 0.7
 """Share of the gap from which it is in one kind of signal alone. [1]"""
@@ -30,7 +31,7 @@ OF_CHANNEL: dict[AnalogueQuantity, tuple[int, ...]] = {
 """Signals in which the readings of a channel depart."""
 
 
-def is_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
+def is_late(by_signal: Floats, excess: Floats, residuals: Floats, bins: Bins) -> bool:
     """Whether one channel departs where it moves: it comes late, or its clock runs away, or is set at times.
 
     What is late is too low at starts and too high at stops. A flow meter follows slowly or cuts off, but alike in
@@ -38,13 +39,14 @@ def is_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
 
     Parameters
     ----------
+    by_signal : (signals,) array
+        Sums of `excess`, no less than 0.
     excess : (bins,) array
         What of the square of each residual is beyond noise.
     residuals : (bins,) array
         As `asinh_loss` makes them.
     bins : Bins
     """
-    by_signal = np.maximum(np.bincount(bins.signal, excess, len(SIGNALS)), 0.0)
     is_start, is_stop = bins.regime == START_RAMP, bins.regime == STOP_RAMP
     is_ramp = is_start | is_stop
     for signal in (FLOW, HEAD, POWER):
@@ -63,10 +65,8 @@ def is_late(excess: Floats, residuals: Floats, bins: Bins) -> bool:
 
 def _of_events(residuals: Floats, bins: Bins, rows: Flags) -> Floats:
     """(events,) means over starts, or stops, in order of time."""
-    _, event = np.unique(bins.cycle[rows] * 64 + bins.pump[rows] + 1, return_inverse=True)
-    count = np.bincount(event)
-    time_s = np.bincount(event, bins.second[rows]) / count
-    return np.asarray((np.bincount(event, residuals_of(residuals[rows])) / count)[np.argsort(time_s)])
+    events = groups_of(bins.cycle * 64 + bins.pump + 1, rows)
+    return events.means(residuals_of(residuals))[np.argsort(events.means(bins.second.astype(np.float64)))]
 
 
 def _wanders_slowly(events: Floats) -> bool:
@@ -82,9 +82,14 @@ def _grows(events: Floats) -> bool:
     """Whether they are positive at the end, and the larger the later."""
     if events.size < DRIFT_BLOCKS:
         return False
-    means = np.array([part.mean() for part in np.array_split(events, DRIFT_BLOCKS)])
+    means = block_means(events)
     rank, place = (one - one.mean() for one in (rankdata(means), np.arange(DRIFT_BLOCKS)))
     return bool(means[-1] > 0.0 and float(rank @ place) > EVER_LATER * float(place @ place))
+
+
+def block_means(values: Floats) -> Floats:
+    """(`DRIFT_BLOCKS`,) means of values in order of time, at least as many as blocks."""
+    return np.array([part.mean() for part in np.array_split(values, DRIFT_BLOCKS)])
 
 
 def mean_of(values: Floats, rows: Flags) -> float:

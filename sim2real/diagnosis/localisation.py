@@ -12,6 +12,7 @@ from wetwell.sim2real.diagnosis.lateness import (
     OF_CHANNEL,
     SWINGING,
     WHERE_IT_MOVES,
+    block_means,
     is_late,
     mean_of,
 )
@@ -71,7 +72,7 @@ def localise(
     for quantity, component in patterns.items():
         if by_signal[[TELEMETRY, *OF_CHANNEL.get(quantity, ())]].sum() > 0.5 * total:
             return component
-    if is_late(excess, residuals, bins):
+    if is_late(by_signal, excess, residuals, bins):
         return "telemetry"
     hydraulic = by_signal[FLOW] + by_signal[HEAD]
     if hydraulic > (1.0 - ALONE) * total:
@@ -101,7 +102,7 @@ def _drifts(residuals: Floats, bins: Bins) -> bool:
     if rows.sum() < DRIFT_BLOCKS:
         return False
     order = np.argsort(bins.second[rows], kind="stable")
-    means = np.array([part.mean() for part in np.array_split(residuals[rows][order], DRIFT_BLOCKS)])
+    means = block_means(residuals[rows][order])
     return bool(np.corrcoef(means, np.arange(DRIFT_BLOCKS))[0, 1] ** 2 > STRAIGHT)
 
 
