@@ -6,7 +6,7 @@ from wetwell.protocols.arrays import Floats
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.orders import Orders, go_on, valves
 from wetwell.protocols.quantities import FIRST_PUMP, INFLOW, LEVEL
-from wetwell.simulator.control.drive import turned_ratio
+from wetwell.simulator.control.drive import slipped, turned_ratio
 from wetwell.simulator.control.supervision import drive, supervise
 from wetwell.simulator.corrections.acting import correct
 from wetwell.simulator.corrections.parts import (
@@ -162,18 +162,25 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         )
         if now.shaft_ratio <= 0.0:
             state.speed_ratio[i] = 0.0
-            now.load = 0.0
             now.ragging = 0.0
             if state.flow_m3h[i] <= 0.0:
                 continue
-        left = (1.0 - pump.slip * now.load) * (1.0 - pump.ragging_speed_loss * now.ragging)
         factor = forcing.speed_factor[i, second] * (1.0 + state.correction[SPEED, i])
-        state.speed_ratio[i] = now.shaft_ratio * left * factor
+        factor *= 1.0 - pump.ragging_speed_loss * now.ragging
+        speed_ratio, fall_h_m3 = slipped(
+            now.shaft_ratio, max(state.flow_m3h[i], 0.0), pump.slip, pump.shutoff_power_share, pump.rated_flow_m3h
+        )
+        state.speed_ratio[i] = speed_ratio * factor
+        falling = fall_h_m3 * factor
         factor = forcing.head_factor[i, second] * (1.0 + state.correction[PUMP_HEAD, i])
         leak_m3h = forcing.internal_leak_m3h[i, second]
         state.curves[i, 0] = factor * (pump.c0 + (pump.c1 + pump.c2 * leak_m3h) * leak_m3h)
         state.curves[i, 1] = factor * (pump.c1 + 2.0 * pump.c2 * leak_m3h)
         state.curves[i, 2] = factor * pump.c2 - pump.ragging_h2_m5 * now.ragging
+        if falling > 0.0:  # N = N0 - b Q in the affinity laws
+            c0, c1 = state.curves[i, 0], state.curves[i, 1]
+            state.curves[i, 1] -= 2.0 * c0 * falling
+            state.curves[i, 2] += (c0 * falling - c1) * falling
         carried = max(state.flow_m3h[i], 0.0) / pump.rated_flow_m3h
         now.ragging += (1.0 - now.ragging) * carried / pump.ragging_s
 
@@ -190,12 +197,14 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
         power_kw = 0.0
         if now.shaft_ratio > 0.0:  # a standing pump reads 0, also while the water still moves through it
             head_m = pump_head_m(curve[0], curve[1], curve[2], state.speed_ratio[i], flow_m3h)
-            turning = now.shaft_ratio * (1.0 + state.correction[SPEED, i])
+            speed_ratio, fall_h_m3 = slipped(
+                now.shaft_ratio, flow_m3h, pump.slip, pump.shutoff_power_share, pump.rated_flow_m3h
+            )
+            turned = (speed_ratio - fall_h_m3 * flow_m3h) / now.shaft_ratio
+            turning = now.shaft_ratio * (1.0 + state.correction[SPEED, i]) * turned
             shaft_kw = shaft_power_kw(
                 turning, flow_m3h, pump.rated_flow_m3h, pump.rated_shaft_kw, pump.shutoff_power_share
             )
-            turned = 1.0 - pump.slip * now.load
-            now.load = shaft_kw / (pump.rated_shaft_kw * now.shaft_ratio)
             if now.frequency_hz > 0.0:
                 by_load = station.load_share
                 power_kw = (1.0 - by_load) * electrical_power_kw(
@@ -205,8 +214,8 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
                     now.frequency_hz / pump.nominal_frequency_hz,
                 )
                 if by_load > 0.0:
-                    power_kw += by_load * loaded_power_kw(
-                        shaft_kw, pump.rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
+                    power_kw += by_load * loaded_power_kw(  # the field turns faster than the shaft, with its torque
+                        shaft_kw / turned, pump.rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
                     )
                 power_kw *= voltage_factor * (1.0 + state.correction[POWER_TERM, i])
                 if pump.slip_power_exponent > 0.0:

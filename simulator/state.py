@@ -50,7 +50,6 @@ class PumpState:
     frequency_hz: float = 0.0
     shaft_ratio: float = 0.0
     air_m: float = 0.0
-    load: float = 0.0
     ragging: float = 0.0
     dwell_left_s: float = 0.0
     run_s: float = 0.0

@@ -92,3 +92,49 @@ def turned_ratio(
         return ratio
     ratio = before_ratio + (ratio - before_ratio) * (1.0 - math.exp(-1.0 / lag_s))
     return ratio if commanded_ratio > 0.0 or ratio > AT_REST else 0.0
+
+
+@compiled
+def slipped(
+    shaft_ratio: float, flow_m3h: float, slip: float, shutoff_share: float, rated_flow_m3h: float
+) -> tuple[float, float]:
+    r"""Speed of a motor that slips along its tangent at a flow: that at no flow, and its fall with the flow.
+
+    $$N = N_c - s\, \frac{M}{M_n}, \qquad \frac{M}{M_n} = N \left(s_0 N + (1 - s_0) \frac{Q}{Q_n}\right)$$
+
+    Under a constant ratio of voltage and frequency a torque takes the same speed at any frequency.
+
+    Parameters
+    ----------
+    shaft_ratio, flow_m3h : float
+        Command N_c, and Q. [1, m³/h]
+    slip : float
+        s, at the rated torque. [1]
+    shutoff_share : float
+        s_0, share of the rated torque that is left at no flow. [1]
+    rated_flow_m3h : float
+        Q_n. [m³/h]
+
+    Returns
+    -------
+    speed_ratio, fall_h_m3 : float
+        N is the first less Q times the second. [1, h/m³]
+
+    References
+    ----------
+    .. [1] B. K. Bose, Modern Power Electronics and AC Drives: speed at constant volts per hertz in open loop.
+
+    Examples
+    --------
+    >>> speed_ratio, fall_h_m3 = slipped(1.0, 150.0, 0.05, 0.4, 200.0)
+    >>> round(speed_ratio - 150.0 * fall_h_m3, 5), round(speed_ratio, 5)
+    (0.95997, 0.98033)
+    """
+    if slip == 0.0:
+        return shaft_ratio, 0.0
+    by_speed, by_flow_h_m3 = slip * shutoff_share, slip * (1.0 - shutoff_share) / rated_flow_m3h
+    linear = 1.0 + by_flow_h_m3 * flow_m3h
+    root = math.sqrt(linear * linear + 4.0 * by_speed * shaft_ratio)
+    speed_ratio = 2.0 * shaft_ratio / (linear + root)
+    fall_h_m3 = by_flow_h_m3 * speed_ratio / root
+    return speed_ratio + fall_h_m3 * flow_m3h, fall_h_m3

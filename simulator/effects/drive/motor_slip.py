@@ -10,20 +10,23 @@ from wetwell.simulator.parameters import PlantParameters, PumpParameters
 class MotorSlip(Effect):
     r"""An asynchronous motor turns slower than its frequency asks for, in proportion to its torque.
 
-    $$N = N_c \left(1 - s\, \frac{M}{M_n}\right), \qquad P = P_c \left(\frac{N}{N_c}\right)^{e}$$
+    $$N = N_c - s\, \frac{M}{M_n}, \qquad \frac{M}{M_n} = \frac{P_s(Q, N)}{N P_n}, \qquad
+    P = P_c \left(\frac{N}{N_c}\right)^{e}$$
 
-    The torque is that of the second before: shaft power over speed, where the shaft power is a straight line in the
-    flow from the station's `shutoff_power_share` of the rated one at no flow. The smaller that share, the less a
-    throttled pump slips; with a share of 1 the slip at nominal speed is s at every flow.
+    The torque M is that of the speed N that the motor has: shaft power over speed, where the shaft power is a
+    straight line in the flow from the station's `shutoff_power_share` of the rated one at no flow. The smaller that
+    share, the less a throttled pump slips. Under a constant ratio of voltage and frequency a torque takes as much
+    speed at any frequency. Where the electrical power follows the load, $P_c$ has that torque at the speed $N_c$ of
+    the field; where it does not, $P_c$ is the power of the command.
 
     Parameters
     ----------
     slip : float
         s, share of the speed that is lost at the rated torque M_n; 0 is no effect. [1]
     power_exponent : float
-        e, power of the speed with which the electrical power P falls under that of the command: 0 where it follows
-        the command, 2 where the torque follows the affinity laws and the field turns as commanded, 3 as power of the
-        shaft, and more where a high lift lets the flow fall faster than the speed. [1]
+        e, power of the speed with which the electrical power P falls under $P_c$: 0 where it follows the command, or
+        the torque. Of a power that follows the frequency it is 2 where the torque follows the affinity laws, and more
+        where a high lift lets the flow fall faster than the speed. [1]
 
     References
     ----------

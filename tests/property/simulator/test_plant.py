@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from wetwell.protocols.station.control import Control
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.protocols.station.sump import Sump
+from wetwell.simulator.control.drive import slipped
 from wetwell.simulator.faults.pump.blockage import Blockage
 from wetwell.simulator.faults.rising_main.pipe_clogging import PipeClogging
 from wetwell.simulator.hydraulics import common_flows, flow_at_head_m3h, pump_head_m
@@ -340,3 +341,17 @@ def test_changed_levels_act_from_the_next_second_on(station, seed):
     )
     simulation.change_settings({"start_level1_m": 3.0, "stop_level1_m": 2.5})
     assert np.argmax(simulation.advance(5).columns["pump1_frequency_hz"]) == 0
+
+
+@given(numbers(0.05, 1), numbers(0, 300), numbers(0, 0.3), numbers(0, 1))
+def test_a_motor_that_slips_turns_at_the_speed_at_which_its_torque_leaves_it(commanded, flow_m3h, slip, share):
+    rated_m3h = 200.0
+
+    def speed_at(at_m3h, along_m3h):
+        at_rest, fall_h_m3 = slipped(commanded, along_m3h, slip, share, rated_m3h)
+        return at_rest - fall_h_m3 * at_m3h
+
+    speed = speed_at(flow_m3h, flow_m3h)
+    torque = speed * (share * speed + (1.0 - share) * flow_m3h / rated_m3h)
+    assert speed == pytest.approx(commanded - slip * torque, abs=1e-12)
+    assert speed_at(flow_m3h + 1.0, flow_m3h) == pytest.approx(speed_at(flow_m3h + 1.0, flow_m3h + 1.0), abs=1e-5)

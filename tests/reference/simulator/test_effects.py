@@ -17,6 +17,7 @@ from wetwell.protocols.station.control import Control
 from wetwell.protocols.station.station_file import EffectTable
 from wetwell.simulator.inflow.recorded import RecordedInflow
 from wetwell.simulator.parameters import plant_parameters
+from wetwell.simulator.power import STANDING_LOSS_SHARE
 from wetwell.simulator.scenario import Scenario
 from wetwell.simulator.simulation import Simulation
 
@@ -388,13 +389,33 @@ def test_rags_that_throttle_cost_head_with_the_square_of_the_flow(quiet_alpha):
 
 @pytest.mark.parametrize("slip", [0.05, 0.15])
 def test_motor_slip_follows_the_torque(quiet_alpha, slip):
-    """Torque over rated torque at commanded speed: 0.4 + 0.6 Q / Q_n; power as commanded."""
+    """Torque over the rated one at the real speed n: n (0.4 n + 0.6 Q / Q_n); power as commanded."""
     rows, plain = run(quiet_alpha, {"name": "motor_slip", "slip": slip}, seconds=120), run(quiet_alpha, seconds=120)
-    rated_m3h = duty_m3h()
-    speed = brentq(lambda n: 1 - slip * (0.4 + 0.6 * duty_m3h(speed=n) / rated_m3h) - n, 0.7, 1.0, xtol=1e-12)
+    speed, _ = slipping(slip)
     assert rows["pump1_flow_m3h"][60] == pytest.approx(duty_m3h(speed=speed), abs=EXACT)
     assert speeds_of(rows)[60] == pytest.approx(speed, abs=1e-8)
     np.testing.assert_array_equal(rows["pump1_power_kw"][:120], plain["pump1_power_kw"])
+
+
+@pytest.mark.parametrize("slip", [0.05, 0.15])
+def test_a_motor_that_slips_takes_its_torque_at_the_speed_of_the_field(quiet_alpha, slip):
+    """Where the power follows the load: that of the shaft, and what the rotor turns into heat."""
+    load = {"name": "load_dependent_power", "share": 1.0, "shutoff_share": 0.4}
+    rows = run(quiet_alpha, load, {"name": "motor_slip", "slip": slip}, seconds=120)
+    plain = run(quiet_alpha, load, seconds=120)
+    _, torque = slipping(slip)
+    expected = (torque + STANDING_LOSS_SHARE) / (1.0 + STANDING_LOSS_SHARE)
+    assert rows["pump1_power_kw"][60] / plain["pump1_power_kw"][60] == pytest.approx(expected, rel=1e-6)
+
+
+def slipping(slip):
+    """Speed and torque over the rated ones of a pump whose motor slips, alone on its main."""
+
+    def torque(speed):
+        return speed * (0.4 * speed + 0.6 * duty_m3h(speed=speed) / duty_m3h())
+
+    speed = brentq(lambda n: 1 - slip * torque(n) - n, 0.7, 1.0, xtol=1e-12)
+    return speed, torque(speed)
 
 
 @pytest.mark.parametrize("exponent", [2.0, 3.0])
