@@ -187,7 +187,7 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
 
 @inlined
 def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, truth: Truth, second: int) -> None:
-    """Note flow, head and power of each pump, and the torque of its motor as a share of the rated one."""
+    """Note flow, head and power of each pump."""
     station = plant.station[0]
     for i in range(state.pumps.size):
         pump, now, curve, flow_m3h = plant.pumps[i], state.pumps[i], state.curves[i], state.mean_flow_m3h[i]

@@ -42,7 +42,7 @@ class StationState:
 
 @dataclass(slots=True)
 class PumpState:
-    """Drive and pump; `load` is the torque as a share of the rated one.
+    """Drive and pump.
 
     For corrections: seconds of this run and of this rest, and for how long nothing had moved in its pipe before.
     """
