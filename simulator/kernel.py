@@ -167,8 +167,9 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
                 continue
         factor = forcing.speed_factor[i, second] * (1.0 + state.correction[SPEED, i])
         factor *= 1.0 - pump.ragging_speed_loss * now.ragging
+        flow_m3h = max(state.flow_m3h[i], 0.0)
         speed_ratio, fall_h_m3 = slipped(
-            now.shaft_ratio, max(state.flow_m3h[i], 0.0), pump.slip, pump.shutoff_power_share, pump.rated_flow_m3h
+            now.shaft_ratio, flow_m3h, pump.slip, pump.shutoff_power_share, pump.rated_flow_m3h
         )
         state.speed_ratio[i] = speed_ratio * factor
         falling = fall_h_m3 * factor
@@ -181,8 +182,7 @@ def turn_pumps(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
             c0, c1 = state.curves[i, 0], state.curves[i, 1]
             state.curves[i, 1] -= 2.0 * c0 * falling
             state.curves[i, 2] += (c0 * falling - c1) * falling
-        carried = max(state.flow_m3h[i], 0.0) / pump.rated_flow_m3h
-        now.ragging += (1.0 - now.ragging) * carried / pump.ragging_s
+        now.ragging += (1.0 - now.ragging) * (flow_m3h / pump.rated_flow_m3h) / pump.ragging_s
 
 
 @inlined

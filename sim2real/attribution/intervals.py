@@ -155,9 +155,8 @@ def are_named(fit: Fit, found: Evidence, told: Collection[str]) -> bool:
 
     Rags that may be there at once are wear, and tell nothing of rags.
     """
-    parts = zip(
-        fit.candidates, fit.split(_likely_ends(fit, found)), strict=False
-    )  # of no candidates it is one empty part
+    ends = _likely_ends(fit, found)
+    parts = zip(fit.candidates, fit.split(ends), strict=False)  # of no candidates it is one empty part
     return not any(any(_may_be_another(one, its)) for one, its in parts if one.name in told)
 
 
