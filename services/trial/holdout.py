@@ -57,10 +57,11 @@ def measure_holdout(case: TrialCase, published: Path, reports: Path, command: Se
         name: gap(whitened(predicted, recorded, sensors))
         for name, predicted in (("before", before), ("after", after), ("oracle", oracle), ("regressor", bound))
     }
+    is_shown = set(case.components) != {"controller"}  # a replay is given what a controller does
     figures: dict[str, Any] = {
         **gaps,
-        "shrinkage": shrinkage(gaps["before"], gaps["after"], gaps["oracle"]),
-        "regressor_shrinkage": shrinkage(gaps["before"], gaps["regressor"], gaps["oracle"]),
+        "shrinkage": shrinkage(gaps["before"], gaps["after"], gaps["oracle"]) if is_shown else None,
+        "regressor_shrinkage": shrinkage(gaps["before"], gaps["regressor"], gaps["oracle"]) if is_shown else None,
     }
     with atomic_file(reports / HOLDOUT_FILE) as file:
         file.write(json.dumps(figures).encode() + b"\n")

@@ -191,6 +191,15 @@ def test_unseen_recordings_are_stored_as_the_case_is(tmp_path, monkeypatch):
     assert result["unseen"]["before"] > result["unseen"]["oracle"] > 0.0
 
 
+def test_a_controller_has_no_shrinkage_where_a_replay_is_given_what_it_does(tmp_path, monkeypatch):
+    replay = (sys.executable, str(Path(__file__).with_name("fake_replay.py")))
+    small = {"count": 1, "kinds": ("single",), "seconds": 14_400, "effects": ("control_delay",)}
+    _, result = run_fake("perfect", tmp_path, monkeypatch, replay=replay, **small)
+    assert result["unseen"]["cases"] == 1
+    assert result["unseen"]["before"] > result["unseen"]["oracle"]
+    assert result["unseen"]["shrinkage"] is None
+
+
 def test_every_effect_takes_its_turn():
     plan = TrialPlan(seed=5, count=50, kinds=("single",), seconds=3600)
     names = [plan.case(number).names[0] for number in range(50)]
