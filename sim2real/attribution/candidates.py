@@ -24,7 +24,10 @@ OF_TELEMETRY = {"report_by_exception", "level_quantisation"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeParameter:
-    """A free parameter of an effect: its range, unit, start, and its neutral value if it is a strength."""
+    """A free parameter of an effect: its range, unit and start, its neutral value if it is a strength, and its forms.
+
+    Forms are values between which no slope leads.
+    """
 
     name: str
     unit: str
@@ -32,6 +35,7 @@ class FreeParameter:
     high: float
     start: float
     neutral: float | None
+    forms: tuple[float, ...] = ()
 
     @property
     def is_logarithmic(self) -> bool:
@@ -187,7 +191,12 @@ def candidates_of(
             for parameter in row["parameters"]
             if "unit" not in parameter and (parameter["name"], mains) != ("main", 1)
         }
-        free = tuple(_free_parameter(parameter) for parameter in row["parameters"] if "unit" in parameter)
+        forms = EFFECTS[row["name"]].forms
+        free = tuple(
+            _free_parameter(parameter, forms.get(parameter["name"], ()))
+            for parameter in row["parameters"]
+            if "unit" in parameter
+        )
         found += [
             Candidate(name=row["name"], fixed=tuple(zip(choices, picked, strict=True)), free=free)
             for picked in product(*choices.values())
@@ -200,7 +209,7 @@ def _numbers(count: int) -> list[int]:
     return [0, *(range(1, count + 1) if count > 1 else ())]
 
 
-def _free_parameter(parameter: Mapping[str, Any]) -> FreeParameter:
+def _free_parameter(parameter: Mapping[str, Any], forms: tuple[float, ...]) -> FreeParameter:
     neutral = parameter.get("neutral")
     start = parameter.get("default", neutral)
     return FreeParameter(
@@ -210,4 +219,5 @@ def _free_parameter(parameter: Mapping[str, Any]) -> FreeParameter:
         high=parameter["high"],
         start=float(parameter["low"] if start is None else start),
         neutral=neutral,
+        forms=forms,
     )

@@ -136,6 +136,12 @@ class Fitter:
         return -float(weighed @ left) / squares if squares > 0.0 else np.inf
 
     def refine(self, fit: Fit) -> Fit:
+        """Where a fit leads down to, in the form that fits best there."""
+        found = self._descended(fit)
+        formed = self._in_best_form(found)
+        return found if formed is found else self._descended(formed)
+
+    def _descended(self, fit: Fit) -> Fit:
         """Levenberg and Marquardt's method from where a fit stands, within the ranges.
 
         Limits have no slope that leads anywhere: where that ends they are tried nearer to neutral and further off,
@@ -193,6 +199,18 @@ class Fitter:
                     tried = self.at(fit.candidates, fit.split(position))
                     if tried is not None and self.cost(tried) < self.cost(best):
                         best = tried
+        return best
+
+    def _in_best_form(self, fit: Fit) -> Fit:
+        """Fit with each parameter that has forms in the one that fits best, if that is not where it stands."""
+        best = fit
+        for k, free in enumerate(free for candidate in fit.candidates for free in candidate.free):
+            for form in free.forms:
+                position = best.position.copy()
+                position[k] = free.normalised(form)
+                tried = self.at(fit.candidates, fit.split(position))
+                if tried is not None and self.cost(tried) < self.cost(best):
+                    best = tried
         return best
 
     def slopes(self, fit: Fit) -> Floats:

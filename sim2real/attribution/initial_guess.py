@@ -27,8 +27,6 @@ REFERENCES = (0.0, 1.0, 3.0, 8.0)
 CUTOFFS = (1.04, 0.98, 0.85, 0.7, 0.5, 0.35)
 """Limits that are tried, in least flows that are not 0: a meter may show a flow again only a little over its limit,
 and a ramp may pass what is between within a second."""
-WAVES_S = (0.0, 1.0, 3.0, 8.0)
-"""Ways of a wave there and back: rigid water, and mains of some hundred metres to some kilometres."""
 KNEES = (0.1, 0.3, 0.6)
 """Shares of a ramp at which the first of two slopes may end."""
 AHEAD = 0.5
@@ -71,8 +69,9 @@ def _forms(candidate: Candidate, guess: dict[str, float], replay: Replay) -> lis
         flow_m3h = replay.traces.signals["flow_m3h"]
         least_m3h = float(np.min(flow_m3h[flow_m3h > ZERO_SHARE * np.nanmax(flow_m3h)], initial=np.inf))
         return [guess | {"cutoff_m3h": share * least_m3h} for share in CUTOFFS if np.isfinite(least_m3h)] or [guess]
-    if "wave_s" in names:
-        return [guess | {"wave_s": wave_s} for wave_s in WAVES_S]
+    for free in candidate.free:
+        if free.forms:
+            return [guess | {free.name: form} for form in free.forms]
     if "knee" in names:
         straight = {free.name: free.neutral for free in candidate.free if free.neutral is not None}
         return [guess, *(straight | {"ahead": AHEAD, "knee": knee} for knee in KNEES)]

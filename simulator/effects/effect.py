@@ -40,7 +40,8 @@ class Effect(Table):
     `another_at` names those with an end of their range at which it is another effect: rags that are there at once.
     `may_change` says that its strength may be another one weeks later: what wears, grows or drifts, and no geometry.
     `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_limit`
-    says that readings pass its strength one by one: what it does has no slope. `is_learnt` says that its form comes
+    says that readings pass its strength one by one: what it does has no slope. `forms` has values of a parameter
+    between which no slope leads, as from rigid water to waves. `is_learnt` says that its form comes
     from a recording: it is not among those that a diagnosis tries. Its component is the "station", and its parameters
     say which part of it.
 
@@ -55,6 +56,7 @@ class Effect(Table):
     another_at: ClassVar[dict[str, Literal["low", "high"]]] = {}
     has_one_form: ClassVar[bool] = False
     is_limit: ClassVar[bool] = False
+    forms: ClassVar[dict[str, tuple[float, ...]]] = {}
     may_change: ClassVar[bool] = False
     is_learnt: ClassVar[bool] = False
 

@@ -103,6 +103,17 @@ def test_a_limit_that_stands_wrong_is_put_right_though_another_effect_came_last(
     assert fitter.cost(found) <= 1.01 * fitter.cost(fitter.refine(fitter.at([lag, limit], [np.array([0.05]), right])))
 
 
+def test_a_fit_is_in_the_form_that_fits_best_wherever_it_began(fitter, alpha):
+    """No slope leads from waves of three seconds to water that moves as one."""
+    lag, inertia = candidate(alpha, "flow_meter_lag"), candidate(alpha, "water_inertia")
+    lag = replace(lag, free=lag.free[:1])
+    begun = [free.normalised(value) for free, value in zip(inertia.free, (350.0, 3.0), strict=True)]
+    found = fitter.refine(fitter.at([lag, inertia], [np.array([0.1]), np.array(begun)]))
+    values = {effect.name: effect.model_dump() for effect in found.effects}
+    assert values["water_inertia"]["wave_s"] < 0.7
+    assert values["water_inertia"]["inertia_s2_m2"] == pytest.approx(400.0, rel=0.1)
+
+
 def test_each_form_of_an_effect_has_a_promise_of_its_own(fitter, lag, alpha):
     """What a wave does there and back is not linear in its time: each start of it is replayed."""
     inertia = candidate(alpha, "water_inertia")
