@@ -40,6 +40,7 @@ class Search:
         self._fitter, self._trials, self._hypotheses = fitter, trials, hypotheses
         self._tried: set[frozenset[str]] = {frozenset()}
         self._tried_anew: set[frozenset[str]] = set()
+        self._tried_in_pairs: set[frozenset[str]] = set()
 
     def run(self) -> None:
         """Try one more effect beside the most probable set, and of each size beside the likeliest and the closest.
@@ -52,7 +53,7 @@ class Search:
             of_size = self._of_sizes()
             likely = [fit for its in of_size for fit in its[:MOST_EXTENDED]]
             closest = [min(its, key=self._fitter.cost) for its in of_size]
-            if not self._extended([*likely, *closest]) and not self._extended_anew():
+            if not (self._extended([*likely, *closest]) or self._extended_anew() or self._paired()):
                 return
 
     def _of_sizes(self) -> list[list[Fit]]:
@@ -91,6 +92,15 @@ class Search:
         if bases:
             self._hypotheses.add(self._trials.anew(bases, self._hypotheses.beside(bases), self._hypotheses.known))
         return bool(bases)
+
+    def _paired(self) -> bool:
+        """Weigh the most promising pairs of which no part was near, and say whether there were any."""
+        singles = [one.fit for one in self._hypotheses.possible if len(one.effects) == 1]
+        bases = _untried((fit for fit in singles if frozenset(fit.names) not in self._tried), self._tried_in_pairs)
+        besides = self._hypotheses.beside(bases)
+        pairs = self._trials.of_pairs(bases, besides, self._hypotheses.known)
+        self._hypotheses.add(pairs)
+        return bool(pairs)
 
 
 def _untried(fits: Iterable[Fit], tried: set[frozenset[str]]) -> list[Fit]:

@@ -28,6 +28,8 @@ MOST_KEPT = 4.0
 """Times what it promises that an effect may be worth: with less than a set lacks, it is not tried beside that."""
 PART_OF_MOST = 0.5
 """Part of what the most promising effect promises with which another one is tried, where that is."""
+MOST_PAIRED = 2
+"""Pairs of effects that are far off alone which are tried: each costs as much as a single effect does."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -143,6 +145,40 @@ class Trials:
             weakest = self._done_beside(base, [one for one in others if not one.is_pattern], most=1)
             found.append((base, beside, weakest))
         return self._one_more(found)
+
+    def of_pairs(
+        self, bases: Sequence[Fit], besides: Sequence[Beside], known: Collection[frozenset[str]]
+    ) -> list[Fit]:
+        """The most promising pairs that are not known yet, whichever of some single effects they begin with.
+
+        Two that undo each other in a signal may each be far off alone: wear, and a head sensor that reads high.
+        """
+        found = [
+            (2.0 * beside.lacks - promise.gain, base, beside, alone, promise)
+            for base, beside in zip(bases, besides, strict=True)
+            for alone, promise in self._pairs(base, beside, known)
+        ]
+        best: dict[frozenset[str], tuple[float, Fit, Beside, Alone, Promise]] = {}
+        for one in sorted(found, key=lambda one: one[0]):
+            best.setdefault(frozenset({*one[1].names, one[3].candidate.name}), one)
+        firsts = [
+            (base, beside, alone, fit, promise)
+            for _, base, beside, alone, promise in list(best.values())[:MOST_PAIRED]
+            if (fit := self._at(base, promise)) is not None
+        ]
+        return list(self._each(lambda one: self._refined(*one), firsts))
+
+    def _pairs(self, base: Fit, beside: Beside, known: Collection[frozenset[str]]) -> list[tuple[Alone, Promise]]:
+        """What may come beside an effect in a pair that is not known and could be as likely as the best set."""
+        names = frozenset(base.names)
+        alones = [
+            alone
+            for candidate, alone in self._alones(base).items()
+            if candidate.name not in names and names | {candidate.name} not in known
+        ]
+        least = max(LEAST_PROMISED, 2.0 * beside.lacks / MOST_KEPT)
+        promised = zip(alones, beside.promises(alones), strict=True)
+        return [(alone, promise) for alone, (promise, *_) in promised if promise.gain > least]
 
     def _one_more(self, bases: Sequence[tuple[Fit, Beside, Mapping[Candidate, Alone]]]) -> list[Fit]:
         promises = self._each(lambda one: self._promising(*one), bases)

@@ -8,9 +8,10 @@ from wetwell.sim2real.attribution.search import MOST_EXTENDED, Search
 class Given:
     """Effects are letters; how probable each set of them is stands in a table."""
 
-    def __init__(self, logs, losses, masked):
+    def __init__(self, logs, losses, masked, apart):
         self._logs, self._known, self.tried = logs, {names for names in logs if len(names) == 1}, []
         self._losses, self._masked, self.tried_anew = losses, masked, []
+        self._apart, self.paired = apart, []
         self._hypotheses = {names: SimpleNamespace(fit=made(names), effects=names) for names in logs}
 
     def cost(self, fit):
@@ -35,6 +36,14 @@ class Given:
         self.tried_anew += [base.names for base in bases]
         return [made((*base.names, self._masked)) for base in bases if {*base.names, self._masked} not in known]
 
+    def of_pairs(self, bases, _, known):
+        self.paired += [base.names for base in bases]
+        return [
+            made(self._apart)
+            for base in bases
+            if set(base.names) < set(self._apart) and frozenset(self._apart) not in known
+        ]
+
     @property
     def known(self):
         return {frozenset(names) for names in self._known}
@@ -53,9 +62,9 @@ def made(names):
     return SimpleNamespace(names=tuple(sorted(names)))
 
 
-def searched(logs, losses=(), masked=""):
+def searched(logs, losses=(), masked="", apart=""):
     tables = ({tuple(sorted(names)): one for names, one in dict(its).items()} for its in (logs, losses))
-    given = Given(*tables, masked)
+    given = Given(*tables, masked, apart)
     return given, Search(given, given, given)
 
 
@@ -131,3 +140,14 @@ def test_no_set_grows_beyond_three_effects_and_an_inertia():
     given, search = searched(dict.fromkeys("abcde", -9.0) | logs)
     search.run()
     assert max(len(one.fit.names) for one in given.weighed) == 4
+
+
+def test_a_pair_is_tried_of_which_neither_part_is_near_and_extended():
+    """Wear and a head sensor that reads high undo each other in the head: other effects are nearer, one by one."""
+    logs = {"a": 9.0, "b": 8.0, "c": 7.0, "h": -50.0, "i": -60.0, "hi": 12.0, "hij": 15.0}
+    given, search = searched(logs | {"ahi": -9.0}, apart="hi")
+    given.with_one_more = lambda bases, _: [made((*base.names, name)) for base in bases for name in "abcj"]
+    search.run()
+    assert given.weighed[0].fit.names == ("h", "i", "j")
+    assert len(given.paired) == len(set(given.paired))
+    assert not {("a",), ("b",)} & set(given.paired), "what was tried beside those is known"

@@ -215,3 +215,19 @@ def test_a_correction_that_says_what_a_set_says_is_that_set(alpha):
         hypotheses.add(trials.singles())
         hypotheses.add_unnamed([fitter.at([correction], [point])])
         assert [one.is_apart for one in hypotheses.unnamed_weights()] == are_apart
+
+
+def test_the_most_promising_pair_is_tried_from_either_part_once(alpha):
+    truth = [EFFECTS["flow_meter_gain"](factor=1.1), EFFECTS["head_sensor_offset"](offset_m=1.2)]
+    pair = {"flow_meter_gain", "head_sensor_offset"}
+    candidates = [of_all(alpha, name) for name in (*pair, "check_valve_leak", "friction_bias")]
+    fitter, _, hypotheses, trials = searched(recorded(alpha, truth), alpha, candidates)
+    hypotheses.add(trials.singles())
+    bases = [one.fit for one in hypotheses.possible if len(one.effects) == 1]
+    besides = hypotheses.beside(bases)
+    first, *others = trials.of_pairs(bases, besides, hypotheses.known)
+    assert set(first.names) == pair
+    assert fitter.cost(first) < min(fitter.cost(fit) for fit in bases)
+    assert pair not in [set(fit.names) for fit in others]
+    known = hypotheses.known | {frozenset(pair)}
+    assert pair not in [set(fit.names) for fit in trials.of_pairs(bases, besides, known)]
