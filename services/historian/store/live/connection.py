@@ -8,6 +8,8 @@ BUSY_S = 10.0
 """So long one process waits for another that writes."""
 UNREADABLE = (sqlite3.DatabaseError, UnicodeDecodeError)
 """What reading a damaged file raises: what SQLite says of a broken name in the schema is no text for Python."""
+_WRITE_FORMAT_AT, _NEWEST_FORMAT = 18, 2
+"""Place of the format for writing in the head of a file [byte], and the newest that SQLite has: with a log."""
 
 
 def connect(place: Path | str, **options: Any) -> sqlite3.Connection:
@@ -27,6 +29,16 @@ def connect(place: Path | str, **options: Any) -> sqlite3.Connection:
     database: sqlite3.Connection = sqlite3.connect(place, timeout=BUSY_S, **options)
     database.text_factory = _text
     return database
+
+
+def is_for_reading_only(path: Path) -> bool:
+    """Whether the head of a file names a format that SQLite only reads; none is made like that."""
+    try:
+        with path.open("rb") as file:
+            file.seek(_WRITE_FORMAT_AT)
+            return file.read(1) > bytes([_NEWEST_FORMAT])
+    except OSError:
+        return False
 
 
 def of_key(*columns: str) -> str:

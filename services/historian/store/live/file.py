@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
-from wetwell.services.historian.store.live.connection import UNREADABLE, connect
+from wetwell.services.historian.store.live.connection import UNREADABLE, connect, is_for_reading_only
 from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, read_end, write_end
 from wetwell.services.historian.store.live.refused_rows import RefusedRows
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
@@ -159,8 +159,13 @@ class LiveFile:
             if not error.object.startswith(b"malformed"):
                 raise error
             self.is_damaged = True
-        elif getattr(error, "sqlite_errorcode", None) in _DAMAGE:
+        elif self._is_damage(error):
             self.is_damaged = True
+
+    def _is_damage(self, error: sqlite3.Error) -> bool:
+        """Whether an error of SQLite says that the file is damaged: one that forbids writing by its head is, too."""
+        code = getattr(error, "sqlite_errorcode", None)
+        return code in _DAMAGE or (code == sqlite3.SQLITE_READONLY and is_for_reading_only(self._path))
 
     def _begin_anew(self, reason: object) -> None:
         """Put the file aside, and begin a new one with what can be read of it and is what was written."""

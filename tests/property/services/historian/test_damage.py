@@ -323,6 +323,25 @@ def test_a_broken_word_in_the_schema_is_damage_though_it_is_no_text(content, tmp
     assert "a new one is begun" in caplog.text
 
 
+@pytest.mark.parametrize("is_open", [False, True])
+def test_a_head_that_forbids_writing_is_damage_and_costs_no_row(content, tmp_path, caplog, is_open):
+    changed = bytearray(content)
+    changed[18] ^= 0x10  # the format for writing
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(content if is_open else changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        if is_open:
+            store.file._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            path.write_bytes(changed)
+            store.file._writer.execute("PRAGMA shrink_memory")  # it is read anew
+            with pytest.raises(StoreError, match="readonly"):
+                store.write(Batch())
+        store.write(batch("alpha", TIMES, TIMES + 1))
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(TIMES + 1))
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+    assert "a new one is begun" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("word", "broken", "part"),
     [
