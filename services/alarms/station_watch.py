@@ -90,6 +90,8 @@ class StationWatch:
     seq: int = -1
     older: int = 0
     has_samples: bool = False
+    is_heard: bool = False
+    """Whether a sample came since its absence counts."""
     is_held: bool = False
     """Whether it is a simulated plant that stands until it is let go: then nothing of it is missed."""
     verdicts: dict[int, PumpVerdicts] = field(default_factory=dict)
@@ -109,7 +111,7 @@ class StationWatch:
                 return False
         self.time_ns, self.seq, self.older = sample.time, sample.seq, 0
         self.heard_s = self.missed_s = now.steady_s
-        self.has_samples = True
+        self.has_samples = self.is_heard = True
         level_m = sample.level_m
         if level_m is not None and math.isfinite(level_m) and sample.quality != "bad":
             self._look_at_level("level_high", level_m, limits.high_m, limits.deadband_m, now, registry)
@@ -214,7 +216,7 @@ class StationWatch:
             self.gone_s[service] = None if is_alive else now.steady_s if gone_s is None else gone_s
 
     def look(self, now: Now, registry: AlarmRegistry, stale_after_s: float, silent_after_s: float) -> None:
-        """Look for what does not come any more."""
+        """Look for what does not come any more; a silence that is told lasts until it comes, after a restart too."""
         time_ns = self.clock_ns(now)
         if self.is_held:
             self.begin_again(now)
@@ -222,14 +224,22 @@ class StationWatch:
             self.gone_s.setdefault("detector", now.steady_s)
             age_s = now.steady_s - self.missed_s
             text = f"no samples for {age_s:.0f} s"
-            registry.observe(self.name, "samples_stale", age_s > stale_after_s, time_ns, now.wall_ns, text=text)
+            is_stale = age_s > stale_after_s or (not self.is_heard and self._is_told("samples_stale", registry))
+            registry.observe(self.name, "samples_stale", is_stale, time_ns, now.wall_ns, text=text)
         for service, gone_s in self.gone_s.items():
-            is_silent = gone_s is not None and now.steady_s - gone_s > silent_after_s
-            registry.observe(self.name, self.services[service], is_silent, time_ns, now.wall_ns)
+            rule = self.services[service]
+            is_silent = gone_s is not None and (
+                now.steady_s - gone_s > silent_after_s or self._is_told(rule, registry)
+            )
+            registry.observe(self.name, rule, is_silent, time_ns, now.wall_ns)
+
+    def _is_told(self, rule: RuleName, registry: AlarmRegistry) -> bool:
+        """Whether a silence is told already; of a plant that is held none is."""
+        return not self.is_held and registry.is_wanted(self.name, rule)
 
     def begin_again(self, now: Now) -> None:
         """Count silence from now on: until now the bus was silent, or the plant stood."""
-        self.missed_s = now.steady_s
+        self.missed_s, self.is_heard = now.steady_s, False
         self.gone_s = {service: None if gone_s is None else now.steady_s for service, gone_s in self.gone_s.items()}
 
 

@@ -298,6 +298,25 @@ def test_a_detector_that_does_not_come_back_with_us_is_missed(tmp_path):
     assert ("detector_silent", "unacknowledged") in site.look(1)
 
 
+def test_a_silence_that_is_told_stands_over_a_restart_until_it_ends(tmp_path):
+    site = Site(tmp_path)
+    site.sample()
+    for station, service in (("alpha", "detector"), ("_site", "gateway")):
+        site.service.handle_presence(Presence(alive_key(station, service), is_alive=True))
+        site.service.handle_presence(Presence(alive_key(station, service), is_alive=False))
+    assert len(site.look(61)) == 3
+    site.start()
+    assert site.look(1) == site.look(61) == []
+    site.sample()
+    site.service.handle_presence(Presence(alive_key("alpha", "detector"), is_alive=True))
+    site.service.handle_presence(Presence(alive_key("_site", "gateway"), is_alive=True))
+    assert {name for name, state in site.look() if state == "returned"} == {
+        "samples_stale",
+        "detector_silent",
+        "gateway_silent",
+    }
+
+
 @pytest.mark.parametrize("damage", [lambda text: text[:-20], lambda text: text.replace("state/1", "state/9")])
 def test_a_damaged_state_is_put_aside_and_told(damage, tmp_path, caplog):
     site = Site(tmp_path)
