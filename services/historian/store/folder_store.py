@@ -68,6 +68,7 @@ class FolderStore:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
+        self._is_at_work = False
         self.file = LiveFile(folder / "live.sqlite", self.alone)
         self.live = LiveDatabase(self.file)
         if self.file.replaced is not None:
@@ -89,7 +90,7 @@ class FolderStore:
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
-        """Hold the folder, so that no second historian works on it.
+        """Hold the folder, so that no second historian works on it; at work it is held already.
 
         Raises
         ------
@@ -97,10 +98,11 @@ class FolderStore:
             If another holds it, or it cannot be held.
         """
         with contextlib.ExitStack() as stack:
-            try:
-                stack.enter_context(folder_held(self._folder, "historian.folder", "historian"))
-            except ConfigError as error:
-                raise StoreError(str(error)) from error
+            if not self._is_at_work:
+                try:
+                    stack.enter_context(folder_held(self._folder, "historian.folder", "historian"))
+                except ConfigError as error:
+                    raise StoreError(str(error)) from error
             yield
 
     @contextlib.contextmanager
@@ -113,10 +115,12 @@ class FolderStore:
             As `alone`.
         """
         with self.alone():
+            self._is_at_work = True
             try:
                 yield
             finally:
                 self.file.mark_end()
+                self._is_at_work = False
 
     def write(self, batch: Batch) -> int:
         """Keep a batch in the database."""

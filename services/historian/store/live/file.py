@@ -32,7 +32,7 @@ class LiveFile:
     ----------
     path : Path
     alone : function
-        Context in which no historian works on the file, for the upgrade.
+        Context in which no other historian works on the file, for the upgrade and to put it aside.
 
     Raises
     ------
@@ -168,13 +168,22 @@ class LiveFile:
         return code in _DAMAGE or (code == sqlite3.SQLITE_READONLY and is_for_reading_only(self._path))
 
     def _begin_anew(self, reason: object) -> None:
-        """Put the file aside, and begin a new one with what can be read of it and is what was written."""
+        """Put the file aside, and begin a new one with what can be read of it and is what was written.
+
+        Raises
+        ------
+        StoreError
+            If another historian works on it: that one has to do it; or if a new one cannot be begun now.
+        """
         try:
-            aside = _put_aside(self._path)
-            self.ids.clear()
-            self._writer = self._open()
-            saved, lost = salvage(aside, self._writer)
-            write_end(self._path, End.of(self._writer))
+            with self._alone():  # else the historian that works on it would go on in the file that is put aside
+                aside = _put_aside(self._path)
+                self.ids.clear()
+                self._writer = self._open()
+                saved, lost = salvage(aside, self._writer)
+                write_end(self._path, End.of(self._writer))
+        except StoreError as error:
+            raise StoreError(f"{self._path}: {reason}; {error}") from error
         except (sqlite3.Error, OSError) as error:
             raise StoreError(f"{self._path}: {error}") from error
         self.is_damaged = False

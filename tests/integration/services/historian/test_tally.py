@@ -11,7 +11,7 @@ from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.rows import pack
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import DAY_NS, Batch, EventRow
+from wetwell.services.historian.store.interface import DAY_NS, Batch, EventRow, StoreError
 from wetwell.services.historian.store.live.row_checksum import event_checksum, sample_checksum
 from wetwell.services.historian.store.live.salvage import damage_of
 
@@ -201,6 +201,25 @@ def test_a_database_without_its_head_is_put_aside_and_saved(path, statement):
         assert store.damages == 1
         assert len(store.samples("alpha", 0, 2**62)) == 120
     assert damage_of(path) == []
+
+
+def test_a_damaged_database_is_put_aside_by_the_historian_that_works_on_it_and_by_nobody_else(path):
+    with contextlib.closing(FolderStore(path.parent)) as store, store.at_work():
+        with contextlib.closing(FolderStore(path.parent)) as importer:
+            behind_its_back(path, "UPDATE head SET commits = 'x'")
+            importer.file.is_damaged = True
+            refused = r"live\.sqlite: damaged; historian\.folder: .*: another historian works here$"
+            with pytest.raises(StoreError, match=refused):
+                importer.write(batch(120, 130))
+        with pytest.raises(StoreError, match=r"its head is damaged; .* another historian works here$"):
+            FolderStore(path.parent)
+        assert not path.with_name("live.sqlite.refused-1").exists()
+        store.file.is_damaged = True
+        store.write(batch(120, 130))
+    assert path.with_name("live.sqlite.refused-1").exists()
+    assert damage_of(path) == []
+    with contextlib.closing(FolderStore(path.parent)) as store:
+        assert len(store.samples("alpha", 0, 2**62)) == 130
 
 
 @pytest.mark.parametrize(
