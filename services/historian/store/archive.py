@@ -8,7 +8,7 @@ columns, of which four are lists as long as `columns_of`, so that a file is read
 import logging
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -35,6 +35,23 @@ _STAMP = pa.timestamp("ns", tz="UTC")
 _SUMMARY = ("count", "mean", "low", "high")
 _FEW_VALUES = ("running", "count", "quality")
 """Endings of columns that repeat a few values; the others are measured, and take a third less as streams of bytes."""
+
+
+class DamagedDayError(StoreError):
+    """The file of a day cannot be read, or is not what was written.
+
+    Parameters
+    ----------
+    text : str
+    form, station, day_ns
+        Of the file, as `Archive.path` takes them.
+    """
+
+    def __init__(self, text: str, form: Form, station: str, day_ns: int) -> None:
+        super().__init__(text)
+        self.form = form
+        self.station = station
+        self.day_ns = day_ns
 
 
 class Archive:
@@ -115,7 +132,7 @@ class Archive:
         values = dict(zip(samples.columns, samples.values.T, strict=True))
         path = self.path("samples", station, day_ns)
         _write(path, samples.time_ns, values, columns, Origin(station=station))
-        _check(path, self.samples(station, day_ns), samples, ("time_ns", "seq", "quality", "values"))
+        _check(path, lambda: self.samples(station, day_ns), samples, ("time_ns", "seq", "quality", "values"))
         self._ledger.note(station, "write", path)
 
     def write_minutes(self, station: str, day_ns: int, minutes: Summary) -> None:
@@ -124,7 +141,7 @@ class Archive:
         counts = {f"{name}_count": column for name, column in zip(names, minutes.count.T, strict=True)}
         path = self.path("minutes", station, day_ns)
         _write(path, minutes.time_ns, minutes.columns() | counts, {}, Origin(station=station))
-        _check(path, self.minutes(station, day_ns), minutes, ("time_ns", *_SUMMARY))
+        _check(path, lambda: self.minutes(station, day_ns), minutes, ("time_ns", *_SUMMARY))
         self._ledger.note(station, "write", path)
 
     def write_tens(self, station: str, day_ns: int, tens: Summary) -> None:
@@ -132,7 +149,7 @@ class Archive:
         path = self.path("tens", station, day_ns)
         lists = {name: _as_lists(getattr(tens, name)) for name in _SUMMARY}
         _write(path, tens.time_ns, {}, lists, Origin(station=station))
-        _check(path, self.tens(station, day_ns), tens, ("time_ns", *_SUMMARY))
+        _check(path, lambda: self.tens(station, day_ns), tens, ("time_ns", *_SUMMARY))
         self._ledger.note(station, "write", path)
 
     def damage(self) -> list[str]:
@@ -224,10 +241,10 @@ class Archive:
 
         Raises
         ------
-        StoreError
+        DamagedDayError
             If the file cannot be read, is not what was written, or is that of another form, station or day.
         """
-        path = self.path(form, station, day_ns)
+        path, place = self.path(form, station, day_ns), (form, station, day_ns)
         try:
             file = pa.parquet.ParquetFile(path, page_checksum_verification=True)
             table, names = file.read(columns), set(file.schema_arrow.names)
@@ -235,12 +252,12 @@ class Archive:
         except FileNotFoundError:
             return None
         except (OSError, ValueError, pa.ArrowException) as error:
-            raise StoreError(f"{path}: cannot be read: {error}") from error
+            raise DamagedDayError(f"{path}: cannot be read: {error}", *place) from error
         if not names.issuperset(_columns(form, names)):
-            raise StoreError(f"{path}: holds no {form}")
+            raise DamagedDayError(f"{path}: holds no {form}", *place)
         time_ns = _stamps(table)
         if said not in (station, None) or not np.all((time_ns >= day_ns) & (time_ns < day_ns + DAY_NS)):
-            raise StoreError(f"{path}: is of station '{said}' or of another day")
+            raise DamagedDayError(f"{path}: is of station '{said}' or of another day", *place)
         return table
 
 
@@ -254,7 +271,17 @@ def _columns(form: Form, names: Iterable[str]) -> set[str]:
     return {"time", *values, *(f"{name}_{end}" for name in values for end in ("count", "min", "max"))}
 
 
-def _check(path: Path, kept: Samples | Summary | None, given: Samples | Summary, names: tuple[str, ...]) -> None:
+def _check(
+    path: Path,
+    read: Callable[[], Samples | Summary | None],
+    given: Samples | Summary,
+    names: tuple[str, ...],
+) -> None:
+    """See that a file just written holds what it should; a disk that cannot hold it now is asked again later."""
+    try:
+        kept = read()
+    except DamagedDayError as error:
+        raise StoreError(str(error)) from error
     if kept is None or not all(
         np.array_equal(getattr(kept, name), getattr(given, name), equal_nan=True) for name in names
     ):

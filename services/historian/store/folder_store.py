@@ -11,7 +11,7 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.services.historian.hours import Hours
 from wetwell.services.historian.rows import HOUR_NS
 from wetwell.services.historian.samples import Samples, merged
-from wetwell.services.historian.store.archive import Archive, Form
+from wetwell.services.historian.store.archive import Archive, DamagedDayError, Form
 from wetwell.services.historian.store.file_query import Named, summary_of_files
 from wetwell.services.historian.store.interface import (
     DAY_NS,
@@ -226,8 +226,17 @@ class FolderStore:
         return self.live.hours(station, start_ns, end_ns)
 
     def maintain(self, now_ns: int) -> str | None:
-        """Turn one day into files, or one old file into minutes, or delete one that is too old."""
-        return self._upkeep.one(now_ns)
+        """Turn one day into files, or one old file into minutes, or delete one that is too old.
+
+        A damaged file that is in the way of it is put aside: it would hold up all that is due.
+        """
+        try:
+            return self._upkeep.one(now_ns)
+        except DamagedDayError as error:
+            if not self.archive.put_aside_damaged(error.form, error.station, error.day_ns):
+                raise
+            self._refused_files += 1
+            return f"station '{error.station}': a damaged file put aside"
 
     def scrub(self) -> Iterator[None]:
         """Look through all that is kept, a part at a time; what is damaged is put aside and told."""

@@ -3,6 +3,7 @@
 import contextlib
 import shutil
 
+import pyarrow.parquet
 import pytest
 
 from wetwell.protocols.messages.sample import PumpReading, Sample
@@ -12,7 +13,7 @@ from wetwell.services.historian.store import archive
 from wetwell.services.historian.store.archive import Archive
 from wetwell.services.historian.store.day_ledger import DayLedger
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import DAY_NS, Batch
+from wetwell.services.historian.store.interface import DAY_NS, Batch, StoreError
 
 START_NS = 20_000 * DAY_NS
 
@@ -154,3 +155,36 @@ def test_a_full_disk_does_not_keep_what_is_too_old(folder):
     with pytest.raises(archive.StoreError, match="cannot be written"):
         kept.delete("samples", "alpha", START_NS)
     assert not path.exists()
+
+
+@pytest.mark.parametrize("day", [3, 4])
+def test_a_damaged_file_of_a_day_or_of_the_day_before_is_put_aside_and_holds_no_maintenance_up(folder, caplog, day):
+    """Day 4 becomes a file, whose hours ask for the end of day 3; day 3 has a file, and gets a late sample."""
+    path = Archive(folder).path("samples", "alpha", START_NS + 3 * DAY_NS)
+    path.write_bytes(path.read_bytes()[:-200])
+    late = Sample(station="alpha", seq=9_000, time=START_NS + day * DAY_NS + 5_000 * NS_PER_S, pumps=())
+    with contextlib.closing(FolderStore(folder)) as store:
+        store.write(Batch(samples=[pack("alpha", late)]))
+        write(store, [6])
+        filed_ns = store.archive.days_ns("samples", "alpha")
+        assert filed_ns == [START_NS + number * DAY_NS for number in (0, 1, 2, 3, 4) if (number, day) != (3, 4)]
+        assert store.damages == 1
+    assert path.with_name(f"{path.name}.refused").exists()
+    assert f"{path}: cannot be read" in caplog.text
+
+
+def test_a_disk_that_spoils_what_is_just_written_is_asked_again_in_the_next_pause(folder, monkeypatch):
+    write_table = pyarrow.parquet.write_table
+
+    def spoil(table, file, **options):
+        write_table(table, file, **options)
+        file.seek(-4, 2)
+        file.write(bytes(4))
+
+    with contextlib.closing(FolderStore(folder)) as store:
+        with monkeypatch.context() as patch:
+            patch.setattr(pyarrow.parquet, "write_table", spoil)
+            with pytest.raises(StoreError, match="cannot be read"):
+                write(store, [6])
+        write(store, [])
+        assert len(store.archive.samples("alpha", START_NS + 4 * DAY_NS)) == 100
