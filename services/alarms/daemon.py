@@ -97,17 +97,20 @@ async def keep_alone(settings: Settings, bus: Bus, stations: Sequence[Station], 
     Raises
     ------
     ConfigError
-        If others work there, or the folder cannot be used.
+        If others work there, or the folder cannot be used; in a group, once another one is in its place.
     """
     kept = settings.alarms
-    with folder_held(kept.state_dir, "alarms.state_dir", "alarms"):
+    with folder_held(kept.state_dir, "alarms.state_dir", "alarms") as hold:
         service = AlarmService(bus, kept, stations, clocks, is_held=is_held)
         try:
             if kept.state_dir is None:
                 log.info("alarms.state_dir is not set: acts are only logged, and the state ends with the process")
-            await keep(bus, service, settings.health.period_s)
+            async with asyncio.TaskGroup() as group:
+                group.create_task(hold.watch(), name="alarms.hold")
+                group.create_task(keep(bus, service, settings.health.period_s), name="alarms.keep")
         finally:
-            service.save()
+            if not hold.is_lost:
+                service.save()
 
 
 async def keep(

@@ -22,7 +22,7 @@ from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.folder_lock import folder_held
+from wetwell.services.runtime.folder_lock import Hold, folder_held
 from wetwell.services.runtime.lifecycle import report_health_in_turn, run_until_stopped, ticks
 from wetwell.services.runtime.settings import Settings
 from wetwell.services.security.audit import audit_in
@@ -94,14 +94,21 @@ async def judge_alone(settings: Settings, bus: Bus, stations: Sequence[Station])
     Raises
     ------
     ConfigError
-        If another detector works there, or the folder cannot be used.
+        If another detector works there, or the folder cannot be used; in a group, once another one is in its place.
     """
-    with folder_held(settings.detector.state_dir, "detector.state_dir", "detector"):
-        await judge_all(settings, bus, stations, "detector")
+    with folder_held(settings.detector.state_dir, "detector.state_dir", "detector") as hold:
+        async with asyncio.TaskGroup() as group:
+            group.create_task(hold.watch(), name="detector.hold")
+            group.create_task(judge_all(settings, bus, stations, "detector", hold=hold), name="detector.judge")
 
 
 async def judge_all(
-    settings: Settings, bus: Bus, stations: Sequence[Station], name: str, turn: Turn | None = None
+    settings: Settings,
+    bus: Bus,
+    stations: Sequence[Station],
+    name: str,
+    turn: Turn | None = None,
+    hold: Hold | None = None,
 ) -> None:
     """Judge stations for ever; their states are saved at the end.
 
@@ -117,6 +124,8 @@ async def judge_all(
         Of this group of stations, for the trace of a crash.
     turn : Turn, optional
         Of one of a pair.
+    hold : Hold, optional
+        Of the folder of states: once it is lost, none is saved at the end.
     """
     kept = settings.detector
     outlet: Outlet = bus if turn is None else turn.outbox
@@ -134,7 +143,7 @@ async def judge_all(
                 checkpoint_in(kept.state_dir, station.name) if turn is None else turn.checkpoint(station.name)
             )
             judge = StationDetector(outlet, station, kept.costs, checkpoint, quarantine, audit)
-            stack.callback(judge.keep)
+            stack.callback(_keep_at_the_end, judge, hold)
             judges.append(judge)
         intake = Intake(bus, judges, None if turn is None else turn.follower)
         gc.freeze()  # looking through the states of a thousand stations for garbage takes a quarter of a second
@@ -146,6 +155,11 @@ async def judge_all(
             report_health_in_turn(bus, "detector", settings.health.period_s, figures), name=f"{name}.health"
         )
         group.create_task(keep_in_turn(judges, intake, kept.checkpoint_s), name=f"{name}.checkpoint")
+
+
+def _keep_at_the_end(judge: StationDetector, hold: Hold | None) -> None:
+    if hold is None or not hold.is_lost:
+        judge.keep()
 
 
 async def _show_left_out(bus: Bus, station: str, period_s: float) -> None:

@@ -21,6 +21,7 @@ from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
+from wetwell.services.runtime.folder_lock import LOOK_S
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 
@@ -133,7 +134,8 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
     Raises
     ------
     ExceptionGroup
-        With a `DamagedHistoryError` if something has to be fetched again, on a new connection.
+        With a `DamagedHistoryError` if something has to be fetched again, on a new connection; with a `StoreError`
+        once another folder is in the place of that of the history.
     """
     subscriptions: dict[PayloadKind, Subscription[bytes]] = {
         "samples": bus.subscribe(sample_key("*"), history=ALL_KEPT, capacity=CAPACITY, pace_s=PACE_S),
@@ -154,6 +156,7 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
     async with asyncio.TaskGroup() as group:
         for kind, subscription in subscriptions.items():
             group.create_task(_handle(historian, kind, subscription), name=f"historian.{kind}")
+        group.create_task(_watch(historian), name="historian.hold")
         group.create_task(_commit(historian, commit_s), name="historian.commit")
         group.create_task(_maintain(historian, maintain_s), name="historian.maintain")
         group.create_task(_answer(historian, questions), name="historian.answer")
@@ -166,6 +169,13 @@ async def _handle(historian: Historian, kind: PayloadKind, subscription: Subscri
             historian.handle(kind, payload)
             if number % PAYLOADS_AT_ONCE == 0:
                 await asyncio.sleep(0)
+
+
+async def _watch(historian: Historian) -> None:
+    """Look for ever whether the history is still in its place."""
+    while True:
+        historian.check_place()
+        await asyncio.sleep(LOOK_S)
 
 
 async def _commit(historian: Historian, period_s: float) -> None:

@@ -141,6 +141,16 @@ class Historian:
         """How often the store has put something aside that was not what was written."""
         return self._store.damages
 
+    def check_place(self) -> None:
+        """See whether what is written is where it is read.
+
+        Raises
+        ------
+        StoreError
+            If it is not, such as once a backup is in the place of the folder.
+        """
+        self._store.check_place()
+
     def answer(self, station: str, payload: bytes) -> bytes:
         """`History` that answers a `HistoryQuery`; knows what was committed."""
         return answer(self._store, station, payload).encode()

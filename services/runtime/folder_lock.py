@@ -1,15 +1,72 @@
 """A folder that one daemon of a kind may work in: a second of the same name is refused."""
 
+import asyncio
 import contextlib
 import fcntl
+import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 from wetwell.protocols.errors import ConfigError
 
+LOOK_S = 10.0
+"""Between two looks whether the folder that is held is still the one in its place. [s]"""
+
+
+class Hold:
+    """A folder that is held, or none: by its lock, which goes with it where a backup is put in its place.
+
+    Parameters
+    ----------
+    file : file, optional
+        The lock.
+    place : str
+        Setting and folder, for who is told.
+    """
+
+    def __init__(self, file: IO[str] | None, place: str) -> None:
+        self._file = file
+        self._place = place
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the lock is no longer in its place: whoever comes next holds another one."""
+        if self._file is None:
+            return False
+        try:
+            return not os.path.samestat(os.fstat(self._file.fileno()), Path(self._file.name).stat())
+        except FileNotFoundError:
+            return True
+        except OSError:
+            return False  # the disk may answer again
+
+    def check(self) -> None:
+        """See whether the folder is still held.
+
+        Raises
+        ------
+        ConfigError
+            If it is lost.
+        """
+        if self.is_lost:
+            raise ConfigError(f"{self._place}: its lock is gone: another folder, such as a backup, is in its place")
+
+    async def watch(self) -> None:
+        """Look for ever whether the folder is still held.
+
+        Raises
+        ------
+        ConfigError
+            Once it is lost.
+        """
+        while True:
+            self.check()
+            await asyncio.sleep(LOOK_S)
+
 
 @contextlib.contextmanager
-def folder_held(folder: Path | None, setting: str, owner: str) -> Iterator[None]:
+def folder_held(folder: Path | None, setting: str, owner: str) -> Iterator[Hold]:
     """Hold a folder until the block ends; the system lets go of it when the process dies. Without a folder nothing.
 
     Parameters
@@ -27,7 +84,7 @@ def folder_held(folder: Path | None, setting: str, owner: str) -> Iterator[None]
         If another holds it, or it cannot be held.
     """
     if folder is None:
-        yield
+        yield Hold(None, setting)
         return
     path = folder / f"{owner}.lock"
     with contextlib.ExitStack() as stack:
@@ -40,4 +97,4 @@ def folder_held(folder: Path | None, setting: str, owner: str) -> Iterator[None]
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise ConfigError(f"{setting}: {folder}: another {owner} works here") from error
-        yield
+        yield Hold(file, f"{setting}: {folder}")

@@ -28,7 +28,7 @@ from wetwell.services.historian.store.newest import LEAST_SAMPLES, MOST_LOOKED_A
 from wetwell.services.historian.store.upkeep import Upkeep
 from wetwell.services.historian.summary import MINUTE_NS, TEN_NS, Summary, fuller, joined
 from wetwell.services.runtime.clock import now_ns
-from wetwell.services.runtime.folder_lock import folder_held
+from wetwell.services.runtime.folder_lock import Hold, folder_held
 from wetwell.services.security.audit import audit_in
 
 log = logging.getLogger(__name__)
@@ -68,7 +68,7 @@ class FolderStore:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be used: {error.strerror or error}") from error
-        self._is_at_work = False
+        self._hold: Hold | None = None  # at work it is held
         self.file = LiveFile(folder / "live.sqlite", self.alone)
         self.live = LiveDatabase(self.file)
         if self.file.replaced is not None:
@@ -84,6 +84,14 @@ class FolderStore:
         """How often something damaged was put aside."""
         return self.file.damages + self._refused_files
 
+    def check_place(self) -> None:
+        """See whether the folder that is held is still the one in its place."""
+        try:
+            if self._hold is not None:
+                self._hold.check()
+        except ConfigError as error:
+            raise StoreError(str(error)) from error
+
     def close(self) -> None:
         """Close the database."""
         self.file.close()
@@ -98,12 +106,18 @@ class FolderStore:
             If another holds it, or it cannot be held.
         """
         with contextlib.ExitStack() as stack:
-            if not self._is_at_work:
-                try:
-                    stack.enter_context(folder_held(self._folder, "historian.folder", "historian"))
-                except ConfigError as error:
-                    raise StoreError(str(error)) from error
+            if self._hold is None:
+                stack.enter_context(self._held())
             yield
+
+    @contextlib.contextmanager
+    def _held(self) -> Iterator[Hold]:
+        with contextlib.ExitStack() as stack:
+            try:
+                hold = stack.enter_context(folder_held(self._folder, "historian.folder", "historian"))
+            except ConfigError as error:
+                raise StoreError(str(error)) from error
+            yield hold
 
     @contextlib.contextmanager
     def at_work(self) -> Iterator[None]:
@@ -112,18 +126,20 @@ class FolderStore:
         Raises
         ------
         StoreError
-            As `alone`.
+            If another holds it, or it cannot be held.
         """
-        with self.alone():
-            self._is_at_work = True
+        with self._held() as hold:
+            self._hold = hold
             try:
                 yield
             finally:
-                self.file.mark_end()
-                self._is_at_work = False
+                if not hold.is_lost:
+                    self.file.mark_end()
+                self._hold = None
 
     def write(self, batch: Batch) -> int:
         """Keep a batch in the database."""
+        self.check_place()
         new = self.live.write(batch)
         self._upkeep.note(span_of(batch.samples))
         return new

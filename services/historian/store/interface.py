@@ -77,6 +77,9 @@ class Store(Protocol):
     def damages(self) -> int:
         """How often something that was not what was written has been put aside."""
 
+    def check_place(self) -> None:
+        """See whether what is written is where it is read, and not in a folder that has been replaced."""
+
     def write(self, batch: Batch) -> int:
         """Keep a batch, and return how many samples, verdicts and alarms of it were new.
 

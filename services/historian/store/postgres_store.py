@@ -73,6 +73,9 @@ class PostgresStore:
         """None: pages are checked by the database, if its `data_checksums` are on."""
         return 0
 
+    def check_place(self) -> None:
+        """Nothing: the database is where it is."""
+
     def hang_up(self) -> None:
         """End what waits for the database, which may be cut off."""
         self._connection.hang_up()
