@@ -156,13 +156,16 @@ class Historian:
         return answer(self._store, station, payload).encode()
 
     def maintain(self, now_ns: int) -> bool:
-        """One step of the store's maintenance; whether there may be more to do. A failure is told, and no end."""
+        """One step of the store's maintenance; whether there may be more to do. A failure is told, and no end.
+
+        Where nothing can be done, what is kept is looked through all the same: damage that is found is mended.
+        """
         try:
             done = self._store.maintain(now_ns)
         except StoreError as error:
             self._counts["failed_maintenance"] += 1
             log.warning("%s", error)
-            return False
+            done = None
         if done is None:
             self._scrub()
             return False

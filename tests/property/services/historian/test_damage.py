@@ -10,6 +10,7 @@ from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.rows import pack, pack_arrays
 from wetwell.services.historian.samples import Samples
+from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import Batch, EventRow, StoreError
 from wetwell.services.historian.store.live.salvage import damage_of
@@ -400,3 +401,26 @@ def test_a_station_whose_name_was_changed_keeps_its_own(content, tmp_path, place
         store.write(Batch())
         assert [span.station for span in store.stations()] == ["alpha", "beta"]
         assert len(store.samples("beta", 0, 2**62)) == TIMES
+
+
+def test_a_head_whose_count_is_gone_is_mended_though_maintenance_cannot_write(tmp_path):
+    """No commit is counted any more, that of a day that is to become a file neither."""
+    path = tmp_path / "live.sqlite"
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        historian = Historian(store)
+        store.write(batch("alpha", 0, TIMES))
+        store.write(batch("alpha", 40_000, 41_000))  # the first day is complete
+        store.file._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        (name,) = store.file._writer.execute("SELECT name FROM head").fetchone()
+        counted, not_counted = (bytes((3, *types)) + name.encode() for types in ((45, 1), (47, 0)))
+        content = path.read_bytes()
+        assert content.count(counted) == 1
+        path.write_bytes(content.replace(counted, not_counted))  # now the number is a letter of the name
+        store.file._writer.execute("PRAGMA shrink_memory")
+        with pytest.raises(StoreError, match=r"head\.commits"):
+            store.write(Batch())
+        assert not historian.maintain(10 * 86_400 * NS_PER_S)
+        assert historian.figures(0)["failed_maintenance"] == 1.0
+        store.write(Batch())
+        assert len(store.samples("alpha", 0, 2**62)) == TIMES + 1_000
+    assert path.with_name("live.sqlite.refused-1").exists()
