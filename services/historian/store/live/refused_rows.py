@@ -3,10 +3,12 @@
 import logging
 import sqlite3
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
 from wetwell.services.historian.store.live.connection import of_key
+from wetwell.services.historian.store.live.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
 
 log = logging.getLogger(__name__)
 
@@ -18,6 +20,12 @@ _ROW_OF: dict[Table, str] = {
     "hour": of_key("station", "hour_ns"),
 }
 _CONTENT: dict[Table, str] = {"sample": "data", "event": "payload", "hour": "data"}
+_CHECK: dict[Table, tuple[str, Callable[..., bool]]] = {
+    "sample": ("station, time_ns, seq, quality, size, data, last_ns, crc", is_sample_intact),
+    "event": ("kind, station, time_ns, digest, payload, crc", is_event_intact),
+    "hour": ("station, hour_ns, data, crc", is_hour_intact),
+}
+"""Columns of a row, and what says of them whether they are what was written."""
 
 
 class RefusedRows:
@@ -46,22 +54,32 @@ class RefusedRows:
     def put_aside(self, database: sqlite3.Connection) -> tuple[int, bool]:
         """Move what was found into the table of refused rows, in a transaction of the caller.
 
+        A row that has its key and is what was written is another one, such as that of a file begun anew, and stays.
+
         Returns
         -------
         count, is_damaged : int, bool
-            How many rows; and whether one is read again and again that is not where its key says: then the order of
+            How many rows; and whether one is read again and again that is not found by its key: then the order of
             the file is damaged.
         """
         with self._lock:
             found, self._found = self._found, {}
         count, is_damaged = 0, False
         for table, key in found:
-            row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
-            put_aside = f"INSERT INTO refused SELECT '{table}', ?{len(key) + 1}, {content} {row}"
-            database.execute(put_aside, (*key, str(key)))
-            deleted = database.execute(f"DELETE {row}", key).rowcount
-            count += deleted
-            if not deleted:
+            moved = _put_aside(database, table, key)
+            count += moved
+            if not moved:
                 is_damaged = is_damaged or (table, key) in self._not_there
                 self._not_there.add((table, key))
         return count, is_damaged
+
+
+def _put_aside(database: sqlite3.Connection, table: Table, key: tuple[int, ...]) -> int:
+    """Move the row of a key if it is not what was written; how many were moved."""
+    row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
+    columns, is_intact = _CHECK[table]
+    if any(is_intact(*its) for its in database.execute(f"SELECT {columns} {row}", key).fetchall()):
+        return 0
+    put_aside = f"INSERT INTO refused SELECT '{table}', ?{len(key) + 1}, {content} {row}"
+    database.execute(put_aside, (*key, str(key)))
+    return database.execute(f"DELETE {row}", key).rowcount

@@ -254,6 +254,40 @@ def test_a_row_that_was_put_aside_meanwhile_is_no_damage_of_the_file(content, tm
         assert not store.file.is_damaged
 
 
+@pytest.mark.parametrize("copied", [-1, 1])
+def test_a_damaged_copy_of_a_row_costs_no_intact_one(content, tmp_path, copied):
+    """A page in the place of the next or last one has its rows a second time, and a bit of one of those flips."""
+    places = [content.index(pack("alpha", sample("alpha", number)).data) for number in range(1_000, 1_300)]
+    leaves = list(dict.fromkeys(at // PAGE * PAGE for at in places if content[at // PAGE * PAGE] != INTERIOR))
+    source, target = leaves[2], leaves[2 + copied]
+    number = next(number for number, at in enumerate(places) if at // PAGE * PAGE == source)
+    changed = bytearray(content)
+    changed[target : target + PAGE] = content[source : source + PAGE]
+    changed[target + places[number] - source + 3] ^= 1
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        for _ in range(3):
+            store.live.put_aside_damaged("alpha", 0, 2**62)
+        with contextlib.suppress(StoreError):
+            list(store.scrub())
+        store.write(Batch())
+        kept = store.samples("alpha", 0, 2**62).seq.tolist()
+        assert 1_000 + number in kept
+        assert kept == sorted(set(kept))
+    assert damage_of(tmp_path / "live.sqlite") == []
+
+
+def test_what_was_found_damaged_of_a_file_costs_nothing_of_the_one_begun_anew(content, tmp_path):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.file.refused.note("sample", 1, sample("alpha", 7).time, 7)
+        store.file.refused.note("event", 3)
+        store.file.is_damaged = True
+        store.write(Batch())
+        assert len(store.samples("alpha", 0, 2**62)) == TIMES
+        assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == TIMES // 10
+
+
 def test_a_row_whose_station_was_changed_costs_no_row_behind_it(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
