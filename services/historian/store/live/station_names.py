@@ -15,21 +15,18 @@ def station_rows(database: sqlite3.Connection) -> list[StationRow]:
     """Rows of the stations whose names are certain, as far as they can be read.
 
     SQLite keeps each name twice, in the table and in its index. Where they differ, messages of the station say which
-    one it is.
+    one it is. No two stations have one name: an index where it stands of several is another one, such as by a page in
+    the place of its own, and says nothing.
 
     Parameters
     ----------
     database : sqlite3.Connection
         Its `station` may be a view that knows the columns by places; then `main.station` is the table.
     """
-    names: dict[object, set[object]] = {}
     rows: list[StationRow] = []
     with contextlib.suppress(*UNREADABLE):
         rows.extend(database.execute("SELECT id, name, first_ns, last_ns FROM station"))
-    with contextlib.suppress(*UNREADABLE):
-        of_index = "SELECT id, name FROM main.station INDEXED BY sqlite_autoindex_station_1"
-        for number, name in database.execute(of_index):
-            names.setdefault(number, set()).add(name)
+    names = _names_in_index(database)
     certain = []
     for number, name, first_ns, last_ns in rows:
         others = names.get(number, set()) - {name}
@@ -37,6 +34,18 @@ def station_rows(database: sqlite3.Connection) -> list[StationRow]:
         if isinstance(number, int) and isinstance(told, str) and told in {name, *others}:
             certain.append((number, told, first_ns, last_ns))
     return certain
+
+
+def _names_in_index(database: sqlite3.Connection) -> dict[object, set[object]]:
+    """Names of each number, as far as the index can be read; none if it is not one of names."""
+    found: set[tuple[object, object]] = set()
+    with contextlib.suppress(*UNREADABLE):
+        found.update(database.execute("SELECT id, name FROM main.station INDEXED BY sqlite_autoindex_station_1"))
+    names: dict[object, set[object]] = {}
+    if len({name for _, name in found}) == len(found):
+        for number, name in found:
+            names.setdefault(number, set()).add(name)
+    return names
 
 
 def _name_in_messages(database: sqlite3.Connection, number: int) -> object:

@@ -20,6 +20,8 @@ ROWS_OF_A_PAGE = 60
 """Of samples that came alone, at the most."""
 INTERIOR = 2
 """First byte of a page of SQLite whose rows stand between those of other pages."""
+INDEX_LEAF = 10
+"""That of a page of an index."""
 SECTOR = 512
 STATIONS = ("alpha", "beta")
 TIMES = 3_000
@@ -458,3 +460,21 @@ def test_a_head_whose_count_is_gone_is_mended_though_maintenance_cannot_write(tm
         store.write(Batch())
         assert len(store.samples("alpha", 0, 2**62)) == TIMES + 1_000
     assert path.with_name("live.sqlite.refused-1").exists()
+
+
+def test_another_index_in_the_place_of_the_names_costs_no_station_though_no_message_can_be_read(content, tmp_path):
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        pages = dict(store.file._writer.execute("SELECT name, rootpage FROM sqlite_master WHERE rootpage"))
+    names, messages = ((pages[name] - 1) * PAGE for name in ("sqlite_autoindex_station_1", "event"))
+    leaves = [content[at : at + PAGE] for at in range(0, len(content), PAGE) if content[at] == INDEX_LEAF]
+    changed = bytearray(content)
+    changed[names : names + PAGE] = next(page for page in leaves if b"verdicts" in page)
+    changed[messages : messages + PAGE] = bytes(PAGE)
+    path.write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.file.is_damaged = True
+        store.write(Batch())
+        assert [span.station for span in store.stations()] == ["alpha", "beta"]
+        assert [len(store.samples(station, 0, 2**62)) for station in STATIONS] == [TIMES, TIMES]
