@@ -21,7 +21,7 @@ from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.folder_lock import LOOK_S
+from wetwell.services.runtime.folder_lock import CHECK_S
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 
@@ -175,7 +175,7 @@ async def _watch(historian: Historian) -> None:
     """Look for ever whether the history is still in its place."""
     while True:
         historian.check_place()
-        await asyncio.sleep(LOOK_S)
+        await asyncio.sleep(CHECK_S)
 
 
 async def _commit(historian: Historian, period_s: float) -> None:

@@ -10,7 +10,7 @@ from typing import IO
 
 from wetwell.protocols.errors import ConfigError
 
-LOOK_S = 10.0
+CHECK_S = 10.0
 """Between two looks whether the folder that is held is still the one in its place. [s]"""
 
 
@@ -62,7 +62,7 @@ class Hold:
         """
         while True:
             self.check()
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(CHECK_S)
 
 
 @contextlib.contextmanager

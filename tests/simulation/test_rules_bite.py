@@ -18,6 +18,7 @@ from wetwell.services.alarms.service import AlarmService
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.spool import Spool
+from wetwell.services.runtime.folder_lock import Hold
 
 pytestmark = pytest.mark.check
 
@@ -25,8 +26,8 @@ NOON_S = 43_200.0
 EVERY_H = [NOON_S + 3_600.0 * hour for hour in range(8)]
 
 
-def no_lock(*_: object) -> contextlib.AbstractContextManager[None]:
-    return contextlib.nullcontext()
+def no_lock(*_: object) -> contextlib.AbstractContextManager[Hold]:
+    return contextlib.nullcontext(Hold(None, ""))
 
 
 def always(*_: object) -> bool:

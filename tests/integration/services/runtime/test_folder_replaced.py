@@ -16,7 +16,7 @@ from wetwell.services.alarms.daemon import keep_alone
 from wetwell.services.detector.daemon import judge_alone
 from wetwell.services.historian import daemon as historian_daemon
 from wetwell.services.historian.store.interface import StoreError
-from wetwell.services.runtime.folder_lock import LOOK_S
+from wetwell.services.runtime.folder_lock import CHECK_S
 from wetwell.services.runtime.settings import AlarmSettings, DetectorSettings, HistorianSettings, Settings
 
 SETTINGS = {
@@ -52,13 +52,13 @@ def test_a_daemon_whose_folder_is_replaced_ends_and_saves_nothing_over_the_new_o
         publisher = bus.publisher(sample_key("alpha"), history=10)
         running = asyncio.create_task(work(name, SETTINGS[name](folder), bus, alpha))
         publisher.put(Sample(station="alpha", seq=0, time=0, pumps=()).encode())
-        await asyncio.sleep(LOOK_S / 2)
+        await asyncio.sleep(CHECK_S / 2)
         shutil.copytree(folder, backup, ignore=shutil.ignore_patterns("*-shm"))
         shutil.rmtree(folder)
         shutil.copytree(backup, folder)
         before = content()
         publisher.put(Sample(station="alpha", seq=1, time=10**9, pumps=()).encode())
-        await asyncio.wait([running], timeout=2 * LOOK_S)
+        await asyncio.wait([running], timeout=2 * CHECK_S)
         assert running.done()
         assert content() == before
         await running

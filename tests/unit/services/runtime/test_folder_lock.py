@@ -45,7 +45,7 @@ def test_without_a_folder_nothing_is_held():
 
 
 def test_whose_folder_another_one_takes_the_place_of_has_lost_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(folder_lock, "LOOK_S", 0.01)
+    monkeypatch.setattr(folder_lock, "CHECK_S", 0.01)
     folder, backup = tmp_path / "state", tmp_path / "backup"
 
     async def replaced(hold: Hold) -> None:
