@@ -22,10 +22,10 @@ _ROW_OF: dict[Table, str] = {
 _CONTENT: dict[Table, str] = {"sample": "data", "event": "payload", "hour": "data"}
 _CHECK: dict[Table, tuple[str, Callable[..., bool]]] = {
     "sample": ("station, time_ns, seq, quality, size, data, last_ns, crc", is_sample_intact),
-    "event": ("kind, station, time_ns, digest, payload, crc", is_event_intact),
+    "event": ("id, kind, station, time_ns, digest, payload, crc", lambda _, *row: is_event_intact(*row)),
     "hour": ("station, hour_ns, data, crc", is_hour_intact),
 }
-"""Columns of a row, and what says of them whether they are what was written."""
+"""All columns of a row, and what says of them whether they are what was written."""
 
 
 class RefusedRows:
@@ -54,7 +54,8 @@ class RefusedRows:
     def put_aside(self, database: sqlite3.Connection) -> tuple[int, bool]:
         """Move what was found into the table of refused rows, in a transaction of the caller.
 
-        A row that has its key and is what was written is another one, such as that of a file begun anew, and stays.
+        A row that has its key and is what was written is another one, such as that of a file begun anew, or what the
+        writer remembers of a page that the disk has changed: it is written once more.
 
         Returns
         -------
@@ -75,11 +76,15 @@ class RefusedRows:
 
 
 def _put_aside(database: sqlite3.Connection, table: Table, key: tuple[int, ...]) -> int:
-    """Move the row of a key if it is not what was written; how many were moved."""
+    """Move the row of a key, or write it once more if it is what was written; how many were moved."""
     row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
     columns, is_intact = _CHECK[table]
-    if any(is_intact(*its) for its in database.execute(f"SELECT {columns} {row}", key).fetchall()):
-        return 0
-    put_aside = f"INSERT INTO refused SELECT '{table}', ?{len(key) + 1}, {content} {row}"
-    database.execute(put_aside, (*key, str(key)))
-    return database.execute(f"DELETE {row}", key).rowcount
+    found = database.execute(f"SELECT {columns} {row}", key).fetchall()
+    intact = [its for its in found if is_intact(*its)]
+    if not intact:
+        put_aside = f"INSERT INTO refused SELECT '{table}', ?{len(key) + 1}, {content} {row}"
+        database.execute(put_aside, (*key, str(key)))
+    database.execute(f"DELETE {row}", key)
+    places = ", ".join("?" * len(columns.split(", ")))
+    database.executemany(f"REPLACE INTO {table} ({columns}) VALUES ({places})", intact)  # noqa: S608 - names of above
+    return len(found) - len(intact)

@@ -290,6 +290,25 @@ def test_what_was_found_damaged_of_a_file_costs_nothing_of_the_one_begun_anew(co
         assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == TIMES // 10
 
 
+@pytest.mark.parametrize("is_message", [True, False])
+def test_what_the_writer_remembers_of_a_row_that_the_disk_has_changed_mends_it(tmp_path, is_message):
+    row = payload("alpha", 10) if is_message else pack("alpha", sample("alpha", 10)).data
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(batch("alpha", 0, 30))
+        store.file._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        store.write(batch("alpha", 0, 30))  # it has all pages in its memory
+        content = (tmp_path / "live.sqlite").read_bytes()
+        place = content.index(row) + 3
+        with (tmp_path / "live.sqlite").open("r+b") as file:
+            file.seek(place)
+            file.write(bytes([content[place] ^ 1]))
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
+        assert len(store.samples("alpha", 0, 2**62)) == 30
+        assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == 3
+        store.file.check()
+        assert store.damages == 0
+
+
 def test_a_row_whose_station_was_changed_costs_no_row_behind_it(content, tmp_path):
     (tmp_path / "live.sqlite").write_bytes(content)
     with contextlib.closing(FolderStore(tmp_path)) as store:
