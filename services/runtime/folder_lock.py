@@ -27,15 +27,16 @@ class Hold:
 
     def __init__(self, file: IO[str] | None, place: str) -> None:
         self._file = file
+        self._path = None if file is None else Path(file.name)
         self._place = place
 
     @property
     def is_lost(self) -> bool:
         """Whether the lock is no longer in its place: whoever comes next holds another one."""
-        if self._file is None:
+        if self._file is None or self._path is None:
             return False
         try:
-            return not os.path.samestat(os.fstat(self._file.fileno()), Path(self._file.name).stat())
+            return not os.path.samestat(os.fstat(self._file.fileno()), self._path.stat())
         except FileNotFoundError:
             return True
         except OSError:
