@@ -13,7 +13,7 @@ from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import are_sized, informed, intervals_of, sharpened
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
-from wetwell.sim2real.attribution.search import MOST_CHANGED, Search, changed, in_order
+from wetwell.sim2real.attribution.search import MOST_CHANGED, Search, changed, completed, in_order
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.attribution.unnamed import unnamed_beside
@@ -47,9 +47,10 @@ class Attribution:
     plain : (bins,) array
         Residuals without any effect, as `asinh_loss` makes them; so are all others.
     accepted : Fit or None
-        The most probable set where effects are the verdict; the effect first without which most is left.
-    equivalent : tuple of tuple of str
-        Effects that may be in the place of each accepted one.
+        The most probable set where effects are the verdict; the effect first without which most is left. What each
+        real station has, and is too small to be told, comes after those that are told.
+    equivalent : dict of tuple of str
+        Effects that may be in the place of each one that is told.
     ends : (parameters, 2) array
         Of the 95 % intervals of the accepted points, in the order of the candidates.
     own, own_ends : Fit or None, (parameters, 2) array
@@ -70,7 +71,7 @@ class Attribution:
 
     plain: Floats
     accepted: Fit | None
-    equivalent: tuple[tuple[str, ...], ...]
+    equivalent: dict[str, tuple[str, ...]]
     ends: Floats
     own: Fit | None
     own_ends: Floats
@@ -141,21 +142,24 @@ def attribute(
         told = best_set(posterior)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
         if are_sized(telling.fit, its_ends := ends_of(telling), told):
-            own, own_ends = in_order(fitter, likely.fit, its_ends if telling is likely else ends_of(likely))
+            likely_ends = its_ends if telling is likely else ends_of(likely)
+            fit, whole = likely.fit, completed(fitter, likely.fit, tested)
+            if whole is not fit and are_sized(whole, whole_ends := ends_of(hypotheses.weigh(whole)), told):
+                fit, likely_ends = whole, whole_ends
+            own, own_ends = in_order(fitter, fit, likely_ends, told)
             ends, accepted = own_ends, informed(fitter, own, priors)
             break
         hypotheses.rule_out(told)
     else:
-        accepted, own, own_ends, ends = None, None, np.zeros((0, 2)), np.zeros((0, 2))
+        told, accepted, own, own_ends, ends = (), None, None, np.zeros((0, 2)), np.zeros((0, 2))
     posterior = shared(posterior, hypotheses.alike)
-    equal = {} if accepted is None else equivalents(posterior, accepted.names)
     progress(1.0)
     if accepted is not None and accepted is not own:
         ends = intervals_of(fitter, accepted, residuals.bins, priors)
     return Attribution(
         plain=plain,
         accepted=accepted,
-        equivalent=() if accepted is None else tuple(equal[name] for name in accepted.names),
+        equivalent=equivalents(posterior, told),
         ends=ends,
         own=own,
         own_ends=own_ends,

@@ -158,7 +158,7 @@ class Hypotheses:
         """
         hopeful = self._hopeful(fits)
         while hopeful:
-            found = list(self._each(self._weighed, hopeful))
+            found = list(self._each(self.weigh, hopeful))
             for one in found:
                 known = self._best.get(one.effects)
                 if known is None or (one.is_possible, one.evidence.log) > (known.is_possible, known.evidence.log):
@@ -189,7 +189,7 @@ class Hypotheses:
         hopeful = [
             fit for fit in self._hopeful([best, *fits]) if fit is not best and not self._is_known(self._means(fit))
         ]
-        found = self._each(self._weighed, list(self._each(self._fitter.refine, hopeful)))
+        found = self._each(self.weigh, list(self._each(self._fitter.refine, hopeful)))
         self._unnamed += [one for one in found if one.is_there and one.fit.names[-1] in one.told]
 
     def _is_known(self, residuals: Floats) -> bool:
@@ -283,7 +283,7 @@ class Hypotheses:
 
     def _beside(self, fit: Fit) -> Beside:
         known = self._best.get(tuple(sorted(fit.names)))
-        one = known if known is not None and known.fit is fit else self._weighed(fit)
+        one = known if known is not None and known.fit is fit else self.weigh(fit)
         return Beside(
             weights=cell_weights(one.evidence, one.form),
             residuals=self._means(fit),
@@ -312,7 +312,7 @@ class Hypotheses:
             position = one.fit.position + part * one.evidence.step
             moved = self._fitter.at(one.fit.candidates, one.fit.split(position))
             if moved is not None:
-                yield self._weighed(moved)
+                yield self.weigh(moved)
 
     def _flexible(self, one: Hypothesis) -> float:
         return flexible_factor(one.evidence, one.form, self._named)
@@ -338,7 +338,8 @@ class Hypotheses:
             may_each_lack=None not in fewer,
         )
 
-    def _weighed(self, fit: Fit) -> Hypothesis:
+    def weigh(self, fit: Fit) -> Hypothesis:
+        """A fit with its evidence."""
         shown = self._shown(fit)
         of_member = np.repeat(np.arange(len(fit.points)), [point.size for point in fit.points])
         members = [

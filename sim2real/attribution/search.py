@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from wetwell.protocols.arrays import Floats
+from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.trials import Each, Trials
@@ -111,10 +112,13 @@ def _untried(fits: Iterable[Fit], tried: set[frozenset[str]]) -> list[Fit]:
     return found
 
 
-def in_order(fitter: Fitter, fit: Fit, ends: Floats) -> tuple[Fit, Floats]:
-    """The fit with its effects in order, the one without which most is left first, and the ends of its intervals."""
+def in_order(fitter: Fitter, fit: Fit, ends: Floats, told: Sequence[str]) -> tuple[Fit, Floats]:
+    """The fit with its effects in order, and the ends of its intervals.
+
+    Those that are told come first; of them, as of the others, the one without which most is left.
+    """
     left = [fitter.cost(fitter.without(fit, member)) for member in range(len(fit.names))]
-    order = sorted(range(len(fit.names)), key=lambda member: -left[member])
+    order = sorted(range(len(fit.names)), key=lambda member: (fit.names[member] not in told, -left[member]))
     parts = fit.split(ends)
     ordered = Fit(
         candidates=tuple(fit.candidates[k] for k in order),
@@ -122,6 +126,17 @@ def in_order(fitter: Fitter, fit: Fit, ends: Floats) -> tuple[Fit, Floats]:
         residuals=fit.residuals,
     )
     return ordered, np.concatenate([parts[k] for k in order])
+
+
+def completed(fitter: Fitter, fit: Fit, tested: Iterable[Candidate]) -> Fit:
+    """The fit with what each real station has, where that comes closer to cycles that were not fitted."""
+    for candidate in tested:
+        is_of_all = all(value == 0 for _, value in candidate.fixed)
+        if EFFECTS[candidate.name].is_everywhere and is_of_all and candidate.name not in fit.names:
+            started = min([fit, *fitter.along(candidate, candidate.start_grids({}), fit)], key=fitter.cost)
+            whole = fit if started is fit else fitter.refine(started)
+            fit = min(fit, whole, key=lambda one: float(np.sum(one.residuals[~fitter.rows] ** 2)))
+    return fit
 
 
 def changed(fitter: Fitter, fits: Sequence[Fit], each: Each) -> list[Fit]:

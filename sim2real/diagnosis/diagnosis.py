@@ -56,7 +56,8 @@ class Diagnosis:
 
     `remarks` are on the correction and on columns; `attribution` and what follows are for drawings.
 
-    `own_effects` are the effects with their sizes by this recording alone, without what other stations say.
+    `companions` act beside the effects, and are too small to matter. `own_effects` are the effects with their sizes
+    by this recording alone, without what other stations say.
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
     is in a component, whether an effect of the library or something unknown. `seed` is that of all that is drawn.
     """
@@ -64,6 +65,7 @@ class Diagnosis:
     verdict: Verdict
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
+    companions: tuple[FoundEffect, ...]
     own_effects: tuple[FoundEffect, ...]
     candidates: tuple[RankedCandidate, ...]
     gap: Gap
@@ -116,6 +118,7 @@ class Diagnosis:
             verdict=self.verdict,
             where=self.where,
             effects=self.effects,
+            companions=self.companions,
             posterior=tuple(
                 AnswerProbability(effects=one.effects, verdict=one.verdict, probability=one.probability)
                 for one in self.posterior
@@ -203,8 +206,9 @@ def diagnose(
     by_component = component_probability(found.posterior, found.unknown, pattern)
     unknown_at = place_of_unknown(found.unknown, pattern)
     blamed = unknown_at if found.accepted is None else found.accepted.candidates[0].component
-    effects = () if found.accepted is None else found.accepted.effects
-    tables = [EffectTable.model_validate(effect.model_dump()) for effect in effects]
+    accepted = () if found.accepted is None else found.accepted.effects
+    tables = [EffectTable.model_validate(effect.model_dump()) for effect in accepted]
+    effects, told = found_effects(found.accepted, found.ends, found.equivalent), len(found.equivalent)
     correction: Correction | None = None
     columns = list(dict.fromkeys(name for one in recordings for name in one.covariates))
     remarks = [
@@ -218,8 +222,9 @@ def diagnose(
     return Diagnosis(
         verdict=verdict,
         where=() if verdict == "none" else where_it_lies(found, bins, excess, blamed, rng),
-        effects=found_effects(found.accepted, found.ends, found.equivalent),
-        own_effects=found_effects(found.own, found.own_ends, found.equivalent),
+        effects=effects[:told],
+        companions=effects[told:],
+        own_effects=found_effects(found.own, found.own_ends, found.equivalent)[:told],
         candidates=ranking(found, bins, rng),
         correction=correction,
         remarks=tuple(remarks),

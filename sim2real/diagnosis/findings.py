@@ -1,6 +1,6 @@
 """What an attribution comes to in a report: accepted effects, the ranking of single ones, the cells of the gap."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from wetwell.sim2real.residuals.bins import SIGNALS, Bins
 from wetwell.simulator.effects.effect import Component
 
 
-def found_effects(fit: Fit | None, ends: Floats, equivalents: Sequence[tuple[str, ...]]) -> tuple[FoundEffect, ...]:
-    """Effects of a fit with their parameters.
+def found_effects(fit: Fit | None, ends: Floats, like: Mapping[str, tuple[str, ...]]) -> tuple[FoundEffect, ...]:
+    """Effects of a fit with their parameters, those that are told first.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ def found_effects(fit: Fit | None, ends: Floats, equivalents: Sequence[tuple[str
         None has no effects.
     ends : (parameters, 2) array
         Of the intervals of its points.
-    equivalents : sequence of tuple of str
-        What may be in the place of each effect.
+    like : mapping of tuple of str
+        What may be in the place of each effect that is told.
     """
     if fit is None:
         return ()
@@ -37,13 +37,11 @@ def found_effects(fit: Fit | None, ends: Floats, equivalents: Sequence[tuple[str
         FoundEffect(
             name=candidate.name,
             component=candidate.component,
-            equivalent=equivalent,
+            equivalent=like.get(candidate.name, ()),
             differs=tuple(dict.fromkeys(free.name.partition("@")[0] for free in candidate.free if "@" in free.name)),
             parameters=_parameters(candidate, point, interval),
         )
-        for candidate, point, interval, equivalent in zip(
-            fit.candidates, fit.points, parted, equivalents, strict=True
-        )
+        for candidate, point, interval in zip(fit.candidates, fit.points, parted, strict=True)
     )
 
 

@@ -293,6 +293,8 @@ class GapReport(ReportPart):
         Where the gap lies, by share, the largest first; the first names the component that is held responsible.
     effects : list of FoundEffect
         Accepted effects, the strongest first; none for `none` and `unknown`.
+    companions : list of FoundEffect
+        What acts beside them and is too small to matter: no part of the answer, but of the station that is written.
     posterior : list of AnswerProbability
         Each answer that is still possible, the most probable first.
     component_probability : dict
@@ -339,6 +341,7 @@ class GapReport(ReportPart):
     verdict: Literal["effect", "none", "unknown"]
     where: tuple[Where, ...]
     effects: tuple[FoundEffect, ...]
+    companions: tuple[FoundEffect, ...] = ()
     posterior: tuple[AnswerProbability, ...] = ()
     component_probability: dict[str, Short] = Field(default_factory=dict)
     noise_check: tuple[NoiseCheck, ...] = ()

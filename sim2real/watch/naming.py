@@ -122,6 +122,6 @@ def _called(
 
     if found.verdict == "unknown":
         return (called(found.where[0].component if found.where else next(iter(found.component_probability))),)
-    tables = found.station.effect[len(found.station.effect) - len(found.effects) :]
+    tables = found.station.effect[len(found.own_station.effect) :][: len(found.effects)]
     parts = zip(found.effects, found.own_effects, tables, strict=True)
     return tuple(called(effect.component, effect, own, table) for effect, own, table in parts)

@@ -70,7 +70,7 @@ def _parameters(report: GapReport) -> str:
             "–" if one.ci is None else f"{one.ci[0]:.4g} to {one.ci[1]:.4g}",
             "–" if one.unit in {"", "1"} else one.unit,
         ]
-        for effect in report.effects
+        for effect in (*report.effects, *report.companions)
         for name, one in effect.parameters.items()
     ]
     equivalent = [
@@ -78,7 +78,14 @@ def _parameters(report: GapReport) -> str:
         for effect in report.effects
         if effect.equivalent
     ]
-    return table(["effect", "parameter", "value", "95 % interval", "unit"], rows) + "".join(equivalent)
+    beside = [
+        paragraph(
+            f"The {effect_words(one.name)} is too small to matter. It makes the recording likelier, so that "
+            "station.toml holds it."
+        )
+        for one in report.companions
+    ]
+    return table(["effect", "parameter", "value", "95 % interval", "unit"], rows) + "".join((*equivalent, *beside))
 
 
 def _listed(names: Iterable[str]) -> str:

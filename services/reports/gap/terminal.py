@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from wetwell.services.reports.text_table import folded
-from wetwell.sim2real.diagnosis.report import GapReport
+from wetwell.sim2real.diagnosis.report import FoundEffect, GapReport
 
 PLACES = 4
 PRINTED_CANDIDATES = 5
@@ -42,15 +42,10 @@ def gap_lines(report: GapReport, out: Path) -> str:
         for p in report.where[:PLACES]
     ]
     for effect in report.effects:
-        values = ", ".join(
-            f"{name} = {one.value if isinstance(one.value, str) else format(one.value, '.4g')}"
-            + ("" if one.ci is None else f" ({one.ci[0]:.4g} to {one.ci[1]:.4g})")
-            + (f" {one.unit}" if one.unit not in {"", "1"} else "")
-            for name, one in effect.parameters.items()
-        )
-        lines.append(f"  effect  {effect.name}: {values}")
+        lines.append(f"  effect  {effect.name}: {_values(effect)}")
         if effect.equivalent:
             lines.append(f"          not to be told from {', '.join(effect.equivalent)}")
+    lines += [f"  beside  {one.name}: {_values(one)}; too small to matter" for one in report.companions]
     if (learnt := report.correction) is not None:
         low, high = learnt.shrinkage_ci
         lines += [f"  correction {learnt.equation}", f"  {learnt.sentence}"]
@@ -77,3 +72,13 @@ def gap_lines(report: GapReport, out: Path) -> str:
     lines += [f"note: {note}" for note in report.notes]
     lines += [f"next: {report.next_experiment}", f"{out}: report.json, report.html, station.toml"]
     return folded("\n".join(lines))
+
+
+def _values(effect: FoundEffect) -> str:
+    """Parameters of an effect, with their intervals and units."""
+    return ", ".join(
+        f"{name} = {one.value if isinstance(one.value, str) else format(one.value, '.4g')}"
+        + ("" if one.ci is None else f" ({one.ci[0]:.4g} to {one.ci[1]:.4g})")
+        + (f" {one.unit}" if one.unit not in {"", "1"} else "")
+        for name, one in effect.parameters.items()
+    )

@@ -37,6 +37,7 @@ class WaterInertia(Effect):
 
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"inertia_s2_m2": 0.0}
+    is_everywhere: ClassVar[bool] = True
     forms: ClassVar[dict[str, tuple[float, ...]]] = {"wave_s": (0.0, 1.0, 3.0, 8.0)}
 
     name: Literal["water_inertia"] = "water_inertia"

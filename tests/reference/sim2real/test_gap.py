@@ -61,6 +61,19 @@ def test_a_single_effect_is_named_with_its_size(alpha, name):
     assert GapReport.model_validate_json(report.model_dump_json(by_alias=True)) == report
 
 
+def test_water_that_is_too_slow_to_matter_is_no_answer_but_in_the_station(alpha):
+    """Each main has some inertia: what so little of it does in a start is less than what is allowed there."""
+    friction, inertia = {"name": "friction_bias", "factor": 1.25}, {"name": "water_inertia", "inertia_s2_m2": 150.0}
+    told = diagnose(record(alpha, [friction, inertia]), alpha)
+    assert [effect.name for effect in told.effects] == ["friction_bias"]
+    assert [effect.name for effect in told.report().companions] == ["water_inertia"]
+    assert told.companions[0].parameters["inertia_s2_m2"].value == pytest.approx(150.0, rel=0.1)
+    assert [effect.name for effect in told.station.effect] == ["friction_bias", "water_inertia"]
+    assert told.gap.after == pytest.approx(1.0, abs=0.02)
+    alone = diagnose(record(alpha, [friction, inertia]), alpha, without=["water_inertia"])
+    assert (alone.companions, alone.gap.after > 1.03) == ((), True)
+
+
 @pytest.mark.long
 def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
     ragging = {"name": "ragging", "speed_loss": 0.1, "growth_s": 200.0}

@@ -45,6 +45,16 @@ def test_the_first_sentence_says_what_where_how_large_and_how_sure(rough_main):
     )
 
 
+def test_what_is_too_small_to_matter_is_no_answer_and_told_with_its_size():
+    effects = [{"name": "friction_bias", "factor": 1.3}, {"name": "water_inertia", "inertia_s2_m2": 150.0}]
+    tables = tuple(map(EffectTable.model_validate, effects))
+    report, text = page_of(STATION.model_copy(update={"effect": tables}), [*TRIED, "water_inertia"])
+    assert [one.name for one in report.companions] == ["water_inertia"]
+    assert "The water inertia is too small to matter." in text
+    assert "inertia" not in text[: text.index("How sure that is")]
+    assert re.search(r"water inertia inertia s2 m2 1\d\d\.\d+ [\d.]+ to \d+\.?\d* s²/m²", text)
+
+
 def test_then_come_probabilities_pictures_and_what_was_not_tested_and_statistics_last(rough_main):
     report, text = rough_main
     places = [
