@@ -141,12 +141,13 @@ def attribute(
     while verdict_of(posterior := weighed()) == "effect":
         told = best_set(posterior)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
-        if are_sized(telling.fit, its_ends := ends_of(telling), told):
-            likely_ends = its_ends if telling is likely else ends_of(likely)
-            fit, whole = likely.fit, completed(fitter, likely.fit, tested)
-            if whole is not fit and are_sized(whole, whole_ends := ends_of(hypotheses.weigh(whole)), told):
-                fit, likely_ends = whole, whole_ends
-            own, own_ends = in_order(fitter, fit, likely_ends, told)
+        fit = completed(fitter, likely.fit, tested)
+        whole = likely if fit is likely.fit else hypotheses.weigh(fit)
+        if {*told} <= {*whole.told} and are_sized(telling.fit, its_ends := ends_of(telling), told):
+            own_ends = its_ends if whole is telling else ends_of(whole)
+            if not are_sized(whole.fit, own_ends, told):
+                whole, own_ends = likely, its_ends if likely is telling else ends_of(likely)
+            own, own_ends = in_order(fitter, whole.fit, own_ends, told)
             ends, accepted = own_ends, informed(fitter, own, priors)
             break
         hypotheses.rule_out(told)

@@ -74,6 +74,13 @@ def test_water_that_is_too_slow_to_matter_is_no_answer_but_in_the_station(alpha)
     assert (alone.companions, alone.gap.after > 1.03) == ((), True)
 
 
+def test_what_does_not_matter_beside_the_inertia_is_not_told(alpha):
+    """Alone a lag of two fifths of a second has to be .6 s long, to do what the water does as well."""
+    late = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.4}
+    told = diagnose(record(alpha, [late, {"name": "water_inertia", "inertia_s2_m2": 150.0}]), alpha)
+    assert not {effect.name for effect in told.effects} & {"channel_delay", "flow_meter_lag"}
+
+
 @pytest.mark.long
 def test_a_weak_effect_beside_a_strong_one_is_named_too(alpha):
     ragging = {"name": "ragging", "speed_loss": 0.1, "growth_s": 200.0}
