@@ -53,6 +53,17 @@ class Alone:
             most[far] = np.maximum(MOST_SCALED, ends[far])
         return most
 
+    def like(self, other: "Alone", weights: Weights) -> float:
+        r"""Share of what a candidate does that another one does too, at the points where they are most alike.
+
+        $$\max_{i, j} \frac{(d_i^T C^{-1} e_j)^2}{d_i^T C^{-1} d_i \; e_j^T C^{-1} e_j}$$
+        """
+        products = weights.products(np.vstack([self.changes, other.changes]).T)
+        squares, own = np.diag(products), len(self.changes)
+        both = np.outer(squares[:own], squares[own:])
+        share = np.divide(products[:own, own:] ** 2, both, out=np.zeros_like(both), where=both > 0.0)
+        return float(share.max(initial=0.0))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Promise:

@@ -42,6 +42,7 @@ class Search:
         self._tried: set[frozenset[str]] = {frozenset()}
         self._tried_anew: set[frozenset[str]] = set()
         self._tried_in_pairs: set[frozenset[str]] = set()
+        self._tried_exchanged: set[frozenset[str]] = set()
 
     def run(self) -> None:
         """Try one more effect beside the most probable set, and of each size beside the likeliest and the closest.
@@ -54,7 +55,9 @@ class Search:
             of_size = self._of_sizes()
             likely = [fit for its in of_size for fit in its[:MOST_EXTENDED]]
             closest = [min(its, key=self._fitter.cost) for its in of_size]
-            if not (self._extended([*likely, *closest]) or self._extended_anew() or self._paired()):
+            if not (
+                self._extended([*likely, *closest]) or self._extended_anew() or self._paired() or self._exchanged()
+            ):
                 return
 
     def _of_sizes(self) -> list[list[Fit]]:
@@ -102,6 +105,18 @@ class Search:
         pairs = self._trials.of_pairs(bases, besides, self._hypotheses.known)
         self._hypotheses.add(pairs)
         return bool(pairs)
+
+    def _exchanged(self) -> bool:
+        """Weigh the best set with an effect exchanged for one that does the like, and say whether there was such.
+
+        It was extended without that effect, but the others may have stood where nothing shows what comes beside them.
+        """
+        found: list[Fit] = []
+        for best in _untried([self._hypotheses.weighed[0].fit], self._tried_exchanged):
+            (beside,) = self._hypotheses.beside([best])
+            found += self._trials.exchanged(best, beside.weights, self._hypotheses.known)
+        self._hypotheses.add(found)
+        return bool(found)
 
 
 def _untried(fits: Iterable[Fit], tried: set[frozenset[str]]) -> list[Fit]:

@@ -12,6 +12,7 @@ from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.promise import Alone, Beside, Promise
 from wetwell.sim2real.likelihood.cells import Cells
+from wetwell.sim2real.likelihood.evidence import Weights
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
@@ -30,6 +31,8 @@ PART_OF_MOST = 0.5
 """Part of what the most promising effect promises with which another one is tried, where that is."""
 MOST_PAIRED = 2
 """Pairs of effects that are far off alone which are tried: each costs as much as a single effect does."""
+LIKE = 0.5
+"""Share of what an effect does alone that another one has to do alone, to be tried in its place."""
 PROMISING = 0.02
 """Share of the best gain before refinement under which a candidate is not refined."""
 
@@ -167,6 +170,38 @@ class Trials:
             if (fit := self._at(base, promise)) is not None
         ]
         return list(self._each(lambda one: self._refined(*one), firsts))
+
+    def exchanged(self, best: Fit, weights: Weights, known: Collection[frozenset[str]]) -> list[Fit]:
+        """A set with one effect exchanged for another that does the like alone, where such a set is not known yet.
+
+        Parameters
+        ----------
+        best : Fit
+        weights : Weights
+            Of the cells by what it leaves.
+        known : collection of frozenset of str
+            Sets that were weighed.
+        """
+        alones, names = self._alones(best), frozenset(best.names)
+        found = [
+            (like, member, other)
+            for member, candidate in enumerate(best.candidates)
+            for other, alone in alones.items()
+            if candidate in alones
+            and other.name not in names
+            and names - {candidate.name} | {other.name} not in known
+            and (like := alones[candidate].like(alone, weights)) > LIKE
+        ]
+        of_set: dict[tuple[int, str], tuple[int, Candidate]] = {}
+        for _, member, other in sorted(found, key=lambda one: -one[0]):
+            of_set.setdefault((member, other.name), (member, other))
+
+        def refined(one: tuple[int, Candidate]) -> Fit | None:
+            base = self._fitter.without(best, one[0])
+            starts = [] if base is None else self._tried(one[1], base)
+            return self._fitter.refine(min(starts, key=self._fitter.cost)) if starts else None
+
+        return [fit for fit in self._each(refined, list(of_set.values())[:MOST_PAIRED]) if fit is not None]
 
     def _pairs(self, base: Fit, beside: Beside, known: Collection[frozenset[str]]) -> list[tuple[Alone, Promise]]:
         """What may come beside an effect in a pair that is not known and could be as likely as the best set."""

@@ -8,10 +8,11 @@ from wetwell.sim2real.attribution.search import MOST_EXTENDED, Search
 class Given:
     """Effects are letters; how probable each set of them is stands in a table."""
 
-    def __init__(self, logs, losses, masked, apart):
+    def __init__(self, logs, losses, masked, apart, alike):
         self._logs, self._known, self.tried = logs, {names for names in logs if len(names) == 1}, []
         self._losses, self._masked, self.tried_anew = losses, masked, []
         self._apart, self.paired = apart, []
+        self._alike, self.exchanges = dict(alike), []
         self._hypotheses = {names: SimpleNamespace(fit=made(names), effects=names) for names in logs}
 
     def cost(self, fit):
@@ -21,7 +22,7 @@ class Given:
         return made(name for k, name in enumerate(fit.names) if k != member)
 
     def beside(self, bases):
-        return [None for _ in bases]
+        return [SimpleNamespace(weights=None) for _ in bases]
 
     def with_one_more(self, bases, _):
         self.tried += [base.names for base in bases]
@@ -44,6 +45,11 @@ class Given:
             if set(base.names) < set(self._apart) and frozenset(self._apart) not in known
         ]
 
+    def exchanged(self, best, _, known):
+        self.exchanges.append(best.names)
+        sets = [(set(best.names) - {one}) | {other} for one, other in self._alike.items() if one in best.names]
+        return [made(names) for names in sets if frozenset(names) not in known]
+
     @property
     def known(self):
         return {frozenset(names) for names in self._known}
@@ -62,9 +68,9 @@ def made(names):
     return SimpleNamespace(names=tuple(sorted(names)))
 
 
-def searched(logs, losses=(), masked="", apart=""):
+def searched(logs, losses=(), masked="", apart="", alike=()):
     tables = ({tuple(sorted(names)): one for names, one in dict(its).items()} for its in (logs, losses))
-    given = Given(*tables, masked, apart)
+    given = Given(*tables, masked, apart, alike)
     return given, Search(given, given, given)
 
 
@@ -151,3 +157,11 @@ def test_a_pair_is_tried_of_which_neither_part_is_near_and_extended():
     assert given.weighed[0].fit.names == ("h", "i", "j")
     assert len(given.paired) == len(set(given.paired))
     assert not {("a",), ("b",)} & set(given.paired), "what was tried beside those is known"
+
+
+def test_an_effect_is_exchanged_for_one_that_does_the_like_though_nothing_promised_it():
+    """Beside another inflow the friction was tried, and the lift was not."""
+    given, search = searched({"a": 5.0, "b": 3.0, "ab": 8.0, "ah": 12.0}, masked="h", alike={"b": "h"})
+    search.run()
+    assert given.weighed[0].fit.names == ("a", "h")
+    assert given.exchanges == [("a", "b"), ("a", "h")], "once for each set that was the best"

@@ -231,3 +231,18 @@ def test_the_most_promising_pair_is_tried_from_either_part_once(alpha):
     assert pair not in [set(fit.names) for fit in others]
     known = hypotheses.known | {frozenset(pair)}
     assert pair not in [set(fit.names) for fit in trials.of_pairs(bases, besides, known)]
+
+
+def test_what_does_the_like_alone_takes_the_place_of_an_effect_in_a_set(alpha):
+    """A friction does nearly what a lift does; a meter does neither's work."""
+    lift, gain, friction = (of_all(alpha, name) for name in ("static_head_bias", "flow_meter_gain", "friction_bias"))
+    traces = recorded(alpha, [EFFECTS["static_head_bias"](offset_m=2.0), EFFECTS["flow_meter_gain"](factor=1.1)])
+    fitter, _, hypotheses, trials = searched(traces, alpha, [lift, gain, friction])
+    hypotheses.add(trials.singles())
+    rough = friction.start_grids({"factor": 1.3})[0][0]
+    best = fitter.refine(fitter.at([friction, gain], [rough, gain.start_grids({"factor": 1.1})[0][0]]))
+    (beside,) = hypotheses.beside([best])
+    (found,) = trials.exchanged(best, beside.weights, {frozenset(best.names)})
+    assert found.names == ("flow_meter_gain", "static_head_bias")
+    assert found.effects[1].offset_m == pytest.approx(2.0, abs=0.05)
+    assert trials.exchanged(best, beside.weights, {frozenset(best.names), frozenset(found.names)}) == []
