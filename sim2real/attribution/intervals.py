@@ -74,8 +74,10 @@ def intervals_of(fitter: Fitter, fit: Fit, bins: Bins, priors: Priors = EVEN) ->
     ends = np.clip(np.column_stack([x - spread, x + spread]), 0.0, 1.0)
     for flat in np.flatnonzero(~np.any(slopes, axis=0)):
         ends[flat] = _profile(fitter, fit, x, int(flat))
-    for open_ in np.flatnonzero(np.all(ends == (0.0, 1.0), axis=1) & np.any(slopes, axis=0)):
-        ends = _with_others(fitter, fit, ends, covariance, slopes, int(open_))
+    is_open = np.all(ends == (0.0, 1.0), axis=1) & np.any(slopes, axis=0)
+    beside = [_beside_open(fitter, fit, covariance, slopes, int(k)) for k in np.flatnonzero(is_open)]
+    if found := [its for its in beside if its is not None]:
+        ends = np.column_stack([np.min(found, axis=0)[:, 0], np.max(found, axis=0)[:, 1]])
     frees = [(free, candidate) for candidate in fit.candidates for free in candidate.free]
     for k, (free, candidate) in enumerate(frees):
         form = FORM[0] if EFFECTS[candidate.name].has_one_form else FORM[1]
@@ -191,17 +193,22 @@ def _hold(candidate: Candidate, ends: Floats, values: Mapping[str, float | None]
     ]
 
 
-def _with_others(
-    fitter: Fitter, fit: Fit, ends: Floats, covariance: Floats, slopes: Floats, parameter: int
-) -> Floats:
-    """Ends that hold what the others would be at the ends of the range of one that may have any value."""
+def _beside_open(fitter: Fitter, fit: Fit, covariance: Floats, slopes: Floats, parameter: int) -> Floats | None:
+    """(parameters, 2) ends of what the others may be while one has any value of its range; None where it may not.
+
+    At the fit, and fitted again near the ends of that range, each as far as it may be off with the one held. What
+    the slopes say of all at once goes far beyond the range: a friction at one duty is known, its exponent is not.
+    """
     variance = covariance[parameter, parameter]
     alone = np.diag(covariance) - covariance[parameter] ** 2 / variance
     spread = TWO_SIDED * np.sqrt(np.maximum(alone, 0.0))
     rise = TWO_SIDED**2 * variance / np.linalg.pinv(slopes.T @ slopes)[parameter, parameter]
     points = _elsewhere(fitter, fit, parameter, float(rise))
-    low, high = ([ends[:, side], *(x + sign * spread for x in points)] for side, sign in ((0, -1.0), (1, 1.0)))
-    ends = np.column_stack([np.min(low, axis=0), np.max(high, axis=0)])
+    if not points:
+        return None
+    points.append(fit.position)
+    ends = np.column_stack([np.min(points, axis=0) - spread, np.max(points, axis=0) + spread])
+    ends[parameter] = 0.0, 1.0
     return np.asarray(np.clip(ends, 0.0, 1.0), dtype=np.float64)
 
 

@@ -37,7 +37,8 @@ class Effect(Table):
 
     A subclass is one file: the equation and its source, parameters with range and unit, and `modify` or `force`.
     `neutral` names the parameters that are its strength, with the values at which it changes nothing, bit for bit.
-    `another_at` names those with an end of their range at which it is another effect: rags that are there at once.
+    `another_at` names those with an end of their range at which it is another effect, as rags that are there at once,
+    or another station.
     `may_change` says that its strength may be another one weeks later: what wears, grows or drifts, and no geometry.
     `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_limit`
     says that readings pass its strength one by one: what it does has no slope. `forms` has values of a parameter

@@ -10,7 +10,9 @@ from wetwell.simulator.parameters import PlantParameters
 class StaticHeadBias(Effect):
     r"""The receiving water stands higher or lower than the station file says; constant in time.
 
-    $$H = H_s + \Delta H_s + k Q^2$$
+    $$H = H_s + \Delta H_s + k Q^2, \qquad H_s + \Delta H_s \ge 0$$
+
+    A main that has nothing to lift is no rising main: the low end of the range is another station.
 
     Parameters
     ----------
@@ -27,6 +29,7 @@ class StaticHeadBias(Effect):
     component: ClassVar[Component] = "rising_main"
     has_one_form: ClassVar[bool] = True
     neutral: ClassVar[dict[str, float]] = {"offset_m": 0.0}
+    another_at: ClassVar[dict[str, Literal["low", "high"]]] = {"offset_m": "low"}
 
     name: Literal["static_head_bias"] = "static_head_bias"
     offset_m: Annotated[float, limits(-10.0, 20.0, "m")]
