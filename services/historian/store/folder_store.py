@@ -72,7 +72,7 @@ class FolderStore:
         self.file = LiveFile(folder / "live.sqlite", self.alone)
         self.live = LiveDatabase(self.file)
         if self.file.replaced is not None:
-            act = "found another database than the last one"
+            act = "found a database that is not known as the last one"
             audit_in(folder, "history").note(now_ns(), act=act, reason=self.file.replaced)
         self.archive = Archive(folder)
         self._upkeep = Upkeep(self, (self._roll, self._sum_up, self._downsample, self._delete_old))

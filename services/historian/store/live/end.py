@@ -68,6 +68,22 @@ def read_end(path: Path) -> End | None:
         return None
 
 
+def lost_of(path: Path, database: sqlite3.Connection) -> str | None:
+    """What is wrong with a database by the file beside it; None if nothing is.
+
+    A file that is there and says nothing is not one that nobody has written: what it said is not known.
+
+    Raises
+    ------
+    sqlite3.DatabaseError
+        If the database does not say how far it has come.
+    """
+    known, end = read_end(path), End.of(database)  # in this order: the database only goes on
+    if known is None and end_file_of(path).exists():
+        return f"{end_file_of(path).name} cannot be read: nobody knows whether the database is of an earlier time"
+    return end.lost_since(known)
+
+
 def write_end(path: Path, end: End) -> None:
     """Say how far a database has come, after its commits are on the disk; a disk that refuses is told."""
     try:

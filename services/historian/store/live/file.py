@@ -13,7 +13,7 @@ from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.store.live.connection import UNREADABLE, connect, is_for_reading_only
-from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, read_end, write_end
+from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, lost_of, read_end, write_end
 from wetwell.services.historian.store.live.refused_rows import RefusedRows
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
 from wetwell.services.historian.store.live.salvage import salvage
@@ -51,7 +51,7 @@ class LiveFile:
     damages : int
         How often something was put aside or found missing.
     replaced : str, optional
-        Why the file is not the one that was here last, such as that of a backup.
+        Why the file is not known as the one that was here last, such as that of a backup.
     """
 
     def __init__(self, path: Path, alone: Callable[[], contextlib.AbstractContextManager[None]]) -> None:
@@ -65,7 +65,7 @@ class LiveFile:
         self.replaced: str | None = None
         try:
             self._writer = self._open()
-            self.replaced = End.of(self._writer).lost_since(read_end(path))
+            self.replaced = lost_of(path, self._writer)
         except sqlite3.OperationalError as error:
             raise StoreError(f"{path}: {error}") from error
         except UNREADABLE as error:

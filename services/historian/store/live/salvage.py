@@ -8,7 +8,7 @@ from typing import Any
 
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.store.live.connection import UNREADABLE, connect
-from wetwell.services.historian.store.live.end import End, read_end
+from wetwell.services.historian.store.live.end import lost_of
 from wetwell.services.historian.store.live.row_checksum import (
     is_event_intact,
     is_hour_intact,
@@ -58,8 +58,8 @@ def damage_of(path: Path) -> list[str]:
                 counts["hours"] = sum(not is_hour_intact(*row) for row in hours)
             if version >= COUNTED_VERSION:
                 told += map(str, miscounts(database))
-                known = read_end(path)  # after the database: it only goes on
-                told += [] if (lost := End.of(database).lost_since(known)) is None else [lost]
+                lost = lost_of(path, database)
+                told += [] if lost is None else [lost]
     except (sqlite3.Error, UnicodeDecodeError) as error:
         told.append(str(error))
     return [*told, *(f"{count} {what} are not what was written" for what, count in counts.items() if count)]

@@ -167,8 +167,26 @@ def test_a_backup_that_is_brought_back_and_another_database_are_told_once(path, 
     with contextlib.closing(FolderStore(path.parent)) as store:
         assert "it is not the one that was here before" in caplog.text
     lines = [json.loads(line) for line in (path.parent / "history-audit.jsonl").read_text().splitlines()]
-    assert [line["act"] for line in lines] == ["found another database than the last one"] * 2
+    assert [line["act"] for line in lines] == ["found a database that is not known as the last one"] * 2
     assert [line["reason"] for line in lines] == [told, "it is not the one that was here before"]
+
+
+@pytest.mark.parametrize("content", [b"", b'{"name": "a"}', None])
+def test_a_database_of_an_earlier_time_beside_a_damaged_end_is_told_once(path, caplog, content):
+    backup = path.read_bytes()
+    with contextlib.closing(FolderStore(path.parent)) as store, store.at_work():
+        store.write(batch(120, 130))
+    path.write_bytes(backup)
+    end = path.with_suffix(".end")
+    end.write_bytes(end.read_bytes()[:-1] if content is None else content)  # torn by a disk that lies
+    (told,) = damage_of(path)
+    assert told == "live.end cannot be read: nobody knows whether the database is of an earlier time"
+    with contextlib.closing(FolderStore(path.parent)) as store:
+        assert told in caplog.text
+        assert store.damages == 1
+    assert damage_of(path) == []
+    (line,) = (path.parent / "history-audit.jsonl").read_text().splitlines()
+    assert json.loads(line)["reason"] == told
 
 
 def test_only_the_one_historian_says_how_far_a_database_has_come(path):
