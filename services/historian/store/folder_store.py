@@ -77,6 +77,7 @@ class FolderStore:
         self.archive = Archive(folder)
         self._upkeep = Upkeep(self, (self._roll, self._sum_up, self._downsample, self._delete_old))
         self._refused_files = 0
+        self._checked_ns = -(2**63)
         self._adopt()
 
     @property
@@ -293,15 +294,27 @@ class FolderStore:
                 raise
             self.live.adopt(spans)  # into the new one
 
-    def _roll(self, station: str, newest_ns: int) -> str | None:
-        """Write the files of the oldest day in the database that is complete, then delete its rows.
-
-        A crash between leaves both; they are read once, and the step is done again.
-        """
+    def _complete_day_ns(self, station: str, newest_ns: int) -> int | None:
+        """Oldest day in the database, if it is complete. [ns]."""
         first_ns = self.live.next_time_ns(station, -(2**63))
         if first_ns is None or day_of(first_ns) >= newest_ns - self._keep_live_days * DAY_NS:
             return None
-        day_ns = day_of(first_ns)
+        return day_of(first_ns)
+
+    def _roll(self, station: str, newest_ns: int) -> str | None:
+        """Write the files of the oldest day in the database that is complete, then delete its rows.
+
+        A crash between leaves both; they are read once, and the step is done again. The first step of a day looks
+        through the database before: SQLite trusts what a page says of its free space. Where a disk has changed that,
+        all can be read, but to delete joins pages, and writes over rows that stay.
+        """
+        day_ns = self._complete_day_ns(station, newest_ns)
+        if day_ns is not None and newest_ns > self._checked_ns:
+            self.file.check()
+            self._checked_ns = newest_ns
+            day_ns = self._complete_day_ns(station, newest_ns)  # of what was found damaged nothing may be left
+        if day_ns is None:
+            return None
         if self.live.put_aside_damaged(station, day_ns, day_ns + DAY_NS):
             return f"station '{station}': damaged rows put aside"
         live = self.live.samples(station, day_ns, day_ns + DAY_NS)
