@@ -242,7 +242,7 @@ class Archive:
         Raises
         ------
         DamagedDayError
-            If the file cannot be read, is not what was written, or is that of another form, station or day.
+            If the file cannot be read, holds nothing, or is that of another form, station or day.
         """
         path, place = self.path(form, station, day_ns), (form, station, day_ns)
         try:
@@ -255,6 +255,8 @@ class Archive:
             raise DamagedDayError(f"{path}: cannot be read: {error}", *place) from error
         if not names.issuperset(_columns(form, names)):
             raise DamagedDayError(f"{path}: holds no {form}", *place)
+        if not table.num_rows:
+            raise DamagedDayError(f"{path}: holds no row", *place)
         time_ns = _stamps(table)
         if said not in (station, None) or not np.all((time_ns >= day_ns) & (time_ns < day_ns + DAY_NS)):
             raise DamagedDayError(f"{path}: is of station '{said}' or of another day", *place)

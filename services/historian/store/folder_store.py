@@ -318,6 +318,9 @@ class FolderStore:
         if self.live.put_aside_damaged(station, day_ns, day_ns + DAY_NS):
             return f"station '{station}': damaged rows put aside"
         live = self.live.samples(station, day_ns, day_ns + DAY_NS)
+        if not len(live):  # it lists rows that it does not find: it contradicts itself
+            self.file.check()
+            return None
         filed = self.archive.samples(station, day_ns)
         samples = live if filed is None else merged([filed, live])
         end_ns = day_ns + DAY_NS

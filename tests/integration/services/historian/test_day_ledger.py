@@ -9,6 +9,7 @@ import pytest
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.timestamps import NS_PER_S
 from wetwell.services.historian.rows import pack
+from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.store import archive
 from wetwell.services.historian.store.archive import Archive
 from wetwell.services.historian.store.day_ledger import DayLedger
@@ -188,3 +189,21 @@ def test_a_disk_that_spoils_what_is_just_written_is_asked_again_in_the_next_paus
                 write(store, [6])
         write(store, [])
         assert len(store.archive.samples("alpha", START_NS + 4 * DAY_NS)) == 100
+
+
+@pytest.mark.parametrize("form", ["samples", "tens"])
+def test_a_day_without_rows_is_damaged(folder, form):
+    path = sorted((folder / form / "station=alpha").iterdir())[1]
+    pyarrow.parquet.write_table(pyarrow.parquet.read_table(path).slice(0, 0), path)
+    assert f"{path}: holds no row" in Archive(folder).damage()
+
+
+def test_a_day_that_is_listed_and_not_found_becomes_no_file(tmp_path, monkeypatch):
+    """As where a disk has changed what the database finds rows by."""
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        checks: list[int] = []
+        monkeypatch.setattr(store.live, "samples", lambda *_: Samples.of_rows([]))
+        monkeypatch.setattr(store.file, "check", lambda: checks.append(1))
+        write(store, range(6))
+        assert len(checks) > 1, "before the first day, and where nothing is found"
+    assert Archive(tmp_path).days_ns("samples", "alpha") == []
