@@ -166,8 +166,9 @@ def is_stepped(site: Site) -> bool:
 def _alarms(site: Site) -> Iterator[str]:
     """An alarm is raised once each time that its condition comes; every pump fault that is told raises one.
 
-    Files of the alarms that were harmed may have it raised again. A detector that learns anew, or a clock that was
-    set, may have it raised for what has returned, and for what was before that.
+    Files of the alarms that were harmed may have it raised again, and so may a clock that was set while a full disk
+    kept nothing of it: nobody knows then that it stands, and since when has another time. A detector that learns
+    anew, or a clock that was set, may have it raised for what has returned, and for what was before that.
     """
     step_ns = round(len(site.accidents) * CLOCK_STEP_S * NS_PER_S) if is_stepped(site) else 0
     is_harmed = any(harm.name == "alarms" for harm in site.harms)
@@ -181,11 +182,12 @@ def _alarms(site: Site) -> Iterator[str]:
         if any(later < earlier - step_ns for earlier, later in pairwise(raised)):
             yield f"{station}: alarm {name} goes back in time"
         for (before, before_s), (after, after_s) in pairwise(zip(changes, said_s, strict=True)):
-            if before.is_active and after.is_active and after.raised != before.raised and not is_harmed:
+            is_kept = all(end_s < before_s or begin_s > after_s for begin_s, end_s in full)
+            is_known = not is_harmed and (is_kept or not is_stepped(site))
+            if before.is_active and after.is_active and after.raised != before.raised and is_known:
                 yield f"{station}: alarm {name} is raised twice"
             if not is_raised_anew(before, after):
                 continue
-            is_kept = all(end_s < before_s or begin_s > after_s for begin_s, end_s in full)
             if is_kept and after_s < min(odd_s, default=site.seconds):
                 yield f"{station}: alarm {name} is raised anew for what has returned"
     way = Way(site, "detector", "alarms", MARGIN_S)
