@@ -145,7 +145,7 @@ def attribute(
         whole = likely if fit is likely.fit else hypotheses.weigh(fit)
         if {*told} <= {*whole.told} and are_sized(telling.fit, its_ends := ends_of(telling), told):
             own_ends = its_ends if whole is telling else ends_of(whole)
-            if not are_sized(whole.fit, own_ends, told):
+            if {*whole.told} != {*told} or not are_sized(whole.fit, own_ends, told):
                 whole, own_ends = likely, its_ends if likely is telling else ends_of(likely)
             own, own_ends = in_order(fitter, whole.fit, own_ends, told)
             ends, accepted = own_ends, informed(fitter, own, priors)

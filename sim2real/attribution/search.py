@@ -130,7 +130,7 @@ def _untried(fits: Iterable[Fit], tried: set[frozenset[str]]) -> list[Fit]:
 def in_order(fitter: Fitter, fit: Fit, ends: Floats, told: Sequence[str]) -> tuple[Fit, Floats]:
     """The fit with its effects in order, and the ends of its intervals.
 
-    Those that are told come first; of them, as of the others, the one without which most is left.
+    Those that are told come before the others, and in each part the one first without which most is left.
     """
     left = [fitter.cost(fitter.without(fit, member)) for member in range(len(fit.names))]
     order = sorted(range(len(fit.names)), key=lambda member: (fit.names[member] not in told, -left[member]))

@@ -80,8 +80,8 @@ def _parameters(report: GapReport) -> str:
     ]
     beside = [
         paragraph(
-            f"The {effect_words(one.name)} is too small to matter. It makes the recording likelier, so that "
-            "station.toml holds it."
+            f"The {effect_words(one.name)} is too small to matter. With it the simulator comes closer to cycles that "
+            "it was not fitted to, so station.toml holds it."
         )
         for one in report.companions
     ]
