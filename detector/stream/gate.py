@@ -116,7 +116,10 @@ def _is_in_order(state: Any, steps: Floats, time_ns: int, seq: int, is_confirmed
         return True
     gap_s = seconds_between(state["time_ns"], time_ns)
     since_other_s = seconds_between(state["other_ns"], time_ns)
-    if state["other_count"] > 0 and since_other_s >= MIN_GAP_S:
+    may_be_resent = gap_s < 0.0 and seq <= state["seq"]
+    is_other_ahead = seconds_between(state["time_ns"], state["other_ns"]) > 0.0
+    is_step = is_other_ahead or (gap_s < 0.0 and not may_be_resent)  # of what is sent again nothing is learnt
+    if state["other_count"] > 0 and since_other_s >= MIN_GAP_S and is_step:
         note_step(steps, since_other_s)
     max_jump_s = max(MAX_JUMP_S, MAX_JUMP_STEPS * steps[USUAL]) if steps[USUAL] > 0.0 else SLOWEST_STEP_S
     if MIN_GAP_S <= gap_s <= max_jump_s:
@@ -135,7 +138,6 @@ def _is_in_order(state: Any, steps: Floats, time_ns: int, seq: int, is_confirmed
     follows = state["other_count"] > 0 and 0.0 < since_other_s <= max_jump_s
     state["other_count"] = state["other_count"] + 1 if follows else 1
     state["other_ns"] = time_ns
-    may_be_resent = gap_s < 0.0 and seq <= state["seq"]
     if state["other_count"] < (RESENT_SAMPLES if may_be_resent else CONFIRMATIONS):
         return False
     state["clock_steps"] += 1

@@ -19,7 +19,7 @@ from wetwell.detector.stream.gate import (
     let_through,
     new_gate,
 )
-from wetwell.detector.stream.sampling_steps import new_sampling_steps
+from wetwell.detector.stream.sampling_steps import NEWEST, USUAL, new_sampling_steps
 from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.quantities import FIRST_PUMP, PUMP_VALUES
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
@@ -165,6 +165,19 @@ def test_old_samples_that_a_bus_sends_again_are_dropped_however_many(gate):
     assert [gate.update(sample(second)) for second in range(1400, 2000)] == [None] * 600
     assert gate.update(sample(2000)).gap_s == 1.0
     assert gate.counts == {"samples": 2601, "late": 599, "doubled": 1}
+
+
+@pytest.mark.parametrize("is_ahead", [False, True])
+def test_samples_that_a_bus_sends_again_teach_no_step(gate, is_ahead):
+    """Neither one of their own, if only some of them come, nor that from the last of them to the next new one."""
+    period_s = 300
+    for k in range(20):
+        gate.update(sample(k * period_s, seq=k))
+    usual_s = gate.steps[USUAL]
+    for k in (*range(0, 16, 3), *((20, 21) if is_ahead else ())):
+        gate.update(sample(k * period_s, seq=k))
+    assert gate.steps[USUAL] == usual_s == period_s
+    assert gate.steps[NEWEST:].max() == period_s
 
 
 def test_a_source_that_begins_anew_with_an_old_clock_is_followed_in_the_end(gate):
