@@ -93,6 +93,7 @@ EFFECTS = {
     "ramp_shape": "power = 2.0\nlag_s = 3.0",
     "report_by_exception": 'channel = "level_m"\ndeadband = 0.04',
     "static_head_bias": "offset_m = 1.2",
+    "sticking_check_valve": "opening_m = 8.0",
     "sump_area_profile": "bottom_factor = 0.6\nheight_m = 1.0",
     "supply_voltage_variation": "daily_amplitude = 0.05",
     "threshold_shift": "start_m = 0.15",

@@ -36,7 +36,7 @@ class PumpParameters:
     run at the rated flow with time constant `ragging_s`: all of them cost `ragging_speed_loss` of the speed, and
     `ragging_h2_m5` Q² of head. `slip` is the loss of speed at rated torque, and `slip_power_exponent` the power of
     that speed with which the electrical power falls. While the pump stands, `valve_leak_m3h` flows back through its
-    check valve at 1 m of head.
+    check valve at 1 m of head. What first opens that valve is `valve_opening_m` over the head behind it.
     """
 
     c0: float
@@ -53,6 +53,7 @@ class PumpParameters:
     slip: float = 0.0
     slip_power_exponent: float = 0.0
     valve_leak_m3h: float = 0.0
+    valve_opening_m: float = 0.0
     is_automatic: bool
 
 

@@ -75,14 +75,14 @@ class ChannelState:
 class PlantState(NamedTuple):
     """State of a plant; of the station there is one record.
 
-    The hydraulics works on arrays of one value a pump: (pumps, 3) curves, the speed that the water sees, the flows
-    now and before a step, and their means over the second. `back_m3h` (mains,) runs back at the inlet of each main
-    whose water is accelerated as a whole. `water` (pumps, 2, nodes + 1) is that in the main of each,
-    where waves run; that of a header is its first pump's. `correction` (terms, pumps) is what learnt corrections add
-    to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past` (channels, m) and
-    `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the order of their
-    starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first. `place` is that in
-    the orders of an operator.
+    The hydraulics works on arrays of one value a pump: (pumps, 3) curves, its speed, the same where its check valve
+    is open and else 0, the flows now and before a step, and their means over the second. `back_m3h` (mains,) runs
+    back at the inlet of each main whose water is accelerated as a whole. `water` (pumps, 2, nodes + 1) is that in the
+    main of each, where waves run; that of a header is its first pump's. `correction` (terms, pumps) is what learnt
+    corrections add to each term, 0 without any, and `covariates` (covariates,) what the one at hand goes by. `past`
+    (channels, m) and `level_history` (m,) are rings of the last seconds. `started` holds the commanded pumps in the
+    order of their starts; `recent_starts` (pumps, k) the seconds of the last starts of each, the newest first.
+    `place` is that in the orders of an operator.
     """
 
     station: Records[StationState]
@@ -90,6 +90,7 @@ class PlantState(NamedTuple):
     channels: Records[ChannelState]
     curves: Floats
     speed_ratio: Floats
+    open_ratio: Floats
     flow_m3h: Floats
     flow_before_m3h: Floats
     mean_flow_m3h: Floats
@@ -126,6 +127,7 @@ def first_state(parameters: PlantParameters, level_m: float) -> PlantState:
         channels=records_of([ChannelState()] * channels(pumps)),
         curves=np.zeros((pumps, 3)),
         speed_ratio=np.zeros(pumps),
+        open_ratio=np.zeros(pumps),
         flow_m3h=np.zeros(pumps),
         flow_before_m3h=np.zeros(pumps),
         mean_flow_m3h=np.zeros(pumps),

@@ -114,17 +114,19 @@ class Fitter:
         """A candidate at several starts, alone or beside others.
 
         Of a grid of rising strength those are left out that are far from what the one before makes likely, as if all
-        were linear; a grid that leads away is left.
+        were linear; a grid that leads away is left. A limit is not: readings pass it one by one, so each is tried.
         """
         found, beside = [], beside or self.plain
         for grid in start_grids:
             place, away = 0, 0
             while place < len(grid) and away < MOST_AWAY:
                 tried = self.at((*beside.candidates, candidate), (*beside.points, grid[place]))
-                scale = np.inf if tried is None else self._best_scale(beside, tried)
-                found += [] if tried is None else [tried]
+                if tried is None:
+                    break
+                scale = self._best_scale(beside, tried)
+                found.append(tried)
                 away = away + 1 if scale <= 0.0 else 0
-                place = place + 1 if away else _next_place(place, scale, len(grid))
+                place = place + 1 if away or candidate.is_limit else _next_place(place, scale, len(grid))
         return found
 
     def _best_scale(self, before: Fit, tried: Fit) -> float:

@@ -213,7 +213,7 @@ def _move(spec: Spec, pump: Floats, well: Floats, loss_factor: float, extra_lift
         own_m, own_slope = pipe_loss(pump[FLOW, i], spec)
         loss = spec.own_loss * loss_factor
         push_m = lifted_m - lift_m - loss * own_m - shared_m
-        barrier_m = 0.0 if pump[_OPEN, i] > 0.0 else spec.flap_opening_m
+        barrier_m = 0.0 if pump[_OPEN, i] > 0.0 else spec.flap_opening_m[i]
         is_open = pump[FLOW, i] > 0.0 or push_m > barrier_m
         pump[_OPEN, i] = 1.0 if is_open else 0.0
         pump[_PUSH, i] = push_m

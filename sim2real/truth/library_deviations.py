@@ -100,6 +100,11 @@ def _check_valve_leak(truth: Truth, p: Mapping[str, Any]) -> None:
     truth.change(flap_leak=p["leak_m3h"] / HOUR_S)
 
 
+def _sticking_check_valve(truth: Truth, p: Mapping[str, Any]) -> None:
+    """The flap stays shut until the pump exceeds the main's head by a good deal; then it swings open."""
+    truth.change(flap_opening_m=_chosen(truth.spec.flap_opening_m, p["pump"], p["opening_m"]))
+
+
 def _motor_slip(truth: Truth, p: Mapping[str, Any]) -> None:
     """Slip by torque, a little more than in proportion, as towards breakdown."""
     truth.change(slip=p["slip"])
@@ -287,6 +292,17 @@ LIBRARY_KINDS: dict[str, Kind] = {
             )
         },
         _check_valve_leak,
+    ),
+    "sticking_check_valve": Kind(
+        "pump",
+        ("flow_m3h", "head_m"),
+        lambda d: {
+            "opening_m": rounded(
+                d.over(0.2, 0.7) * (d.station.pump[0].coefficients[0] - d.station.mains[0].lift_at_zero_m)
+            ),
+            "pump": d.pump,
+        },
+        _sticking_check_valve,
     ),
     "motor_slip": Kind(
         "drive", ("flow_m3h", "head_m", "level_m"), lambda d: {"slip": d.over(0.02, 0.09)}, _motor_slip

@@ -33,11 +33,6 @@ def _breaking_siphon(truth: Truth, p: Mapping[str, Any]) -> None:
     )
 
 
-def _sticking_check_valve(truth: Truth, p: Mapping[str, Any]) -> None:
-    """The flap stays shut until the pump exceeds the main's head by a good deal; then it swings open."""
-    truth.change(flap_opening_m=p["opening_m"])
-
-
 def _head_sensor_scale(truth: Truth, p: Mapping[str, Any]) -> None:
     """A bent scale, and a zero that goes with the temperature of the day."""
     channel = truth.telemetry.of("head_m")
@@ -112,16 +107,6 @@ OPEN_KINDS: dict[str, Kind] = {
             "prime_s": d.over(20.0, 80.0),
         },
         _breaking_siphon,
-    ),
-    "sticking_check_valve": Kind(
-        "pump",
-        ("flow_m3h", "head_m"),
-        lambda d: {
-            "opening_m": rounded(
-                d.between(0.35, 0.7) * (d.station.pump[0].coefficients[0] - d.station.mains[0].lift_at_zero_m)
-            )
-        },
-        _sticking_check_valve,
     ),
     "head_sensor_scale": Kind(
         "head_sensor",

@@ -29,7 +29,7 @@ class Spec(NamedTuple):
         Loss of speed that a volume pumped since the start brings: limit V / (V + V_half). [1, m³]
     vortex_m, vortex_level_m : float
         Head lost at zero level, falling as a square to none at a level. [m, m]
-    flap_leak, flap_opening_m : float
+    flap_leak, flap_opening_m : float and (pumps,) array
         Check valve: back flow K sqrt(H) when shut; head over the main's that first opens it. [m^2.5/s, m]
     lift_m, lift_slope, lift_reference_m : float
         Static lift at the reference level and its fall per metre of level. [m, 1, m]
@@ -65,6 +65,7 @@ class Spec(NamedTuple):
     ring_leak: Floats
     rag_limit: Floats
     rag_half_m3: Floats
+    flap_opening_m: Floats
     lift_m: float
     own_loss: float
     shared_loss: float
@@ -78,7 +79,6 @@ class Spec(NamedTuple):
     vortex_m: float = 0.0
     vortex_level_m: float = 1.0
     flap_leak: float = 0.0
-    flap_opening_m: float = 0.0
     lift_slope: float = 0.0
     lift_reference_m: float = 0.0
     smoothness: float = 0.0
@@ -162,6 +162,7 @@ def spec_of(station: Station) -> Spec:
         ring_leak=np.zeros(pumps),
         rag_limit=np.zeros(pumps),
         rag_half_m3=np.ones(pumps),
+        flap_opening_m=np.zeros(pumps),
         lift_m=main.lift_at_zero_m,
         own_loss=0.0 if is_common else loss,
         shared_loss=loss if is_common else 0.0,

@@ -17,6 +17,7 @@ from wetwell.simulator.effects.effect import Effect
 from wetwell.simulator.effects.pump.check_valve_leak import CheckValveLeak
 from wetwell.simulator.effects.pump.pump_wear import PumpWear
 from wetwell.simulator.effects.pump.ragging import Ragging
+from wetwell.simulator.effects.pump.sticking_check_valve import StickingCheckValve
 from wetwell.simulator.effects.rising_main.air_pocket import AirPocket
 from wetwell.simulator.effects.rising_main.common_header import CommonHeader
 from wetwell.simulator.effects.rising_main.friction_bias import FrictionBias
@@ -58,6 +59,7 @@ AnyEffect = Annotated[
     | RampShape
     | ReportByException
     | StaticHeadBias
+    | StickingCheckValve
     | SumpAreaProfile
     | SupplyVoltageVariation
     | ThresholdShift

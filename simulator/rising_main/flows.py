@@ -31,6 +31,8 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     leak_m3h = _standing_leak_m3h(plant, state, forcing, second, pumps) if plant.mains[m].is_common_header else 0.0
     flow_m3h, mean_m3h = state.flow_m3h, state.mean_flow_m3h
+    for i in pumps:
+        state.open_ratio[i] = _open_ratio(plant, state, m, i, static_head_m, friction_h2_m5)
     if plant.mains[m].inertia_s2_m2 <= 0.0:
         _solve_flows(plant, state, m, static_head_m, friction_h2_m5, 0.0, leak_m3h, 0.0)
         for i in pumps:
@@ -39,7 +41,7 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
     is_moving = was_moving = False
     for i in pumps:
         was_moving = was_moving or mean_m3h[i] > 0.0 or flow_m3h[i] > 0.0
-        is_moving = is_moving or state.speed_ratio[i] > 0.0 or flow_m3h[i] > 0.0
+        is_moving = is_moving or state.open_ratio[i] > 0.0 or flow_m3h[i] > 0.0
         mean_m3h[i] = 0.0
     if not is_moving:
         return
@@ -47,6 +49,23 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         _move_waves(plant, state, m, static_head_m, friction_h2_m5, was_moving, leak_m3h)
         return
     _move_column(plant, state, m, static_head_m, friction_h2_m5, leak_m3h)
+
+
+@inlined
+def _open_ratio(
+    plant: PlantRecords, state: PlantState, m: int, i: int, static_head_m: float, friction_h2_m5: float
+) -> float:
+    """Speed of a pump of main m, 0 behind a check valve that its head does not open. [1]."""
+    ratio: float = state.speed_ratio[i]
+    if plant.pumps[i].valve_opening_m <= 0.0 or state.flow_m3h[i] > 0.0:
+        return ratio
+    main = plant.mains[m]
+    head_m = lift_at_m(state, i, static_head_m)
+    if main.is_common_header:
+        total_m3h = sum_of(state.flow_m3h, plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]])
+        shared_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i]) * main.shared_friction
+        head_m += shared_h2_m5 * total_m3h * (total_m3h + main.linear_flow_m3h)
+    return ratio if state.curves[i, 0] * ratio**2 > head_m + plant.pumps[i].valve_opening_m else 0.0
 
 
 @inlined
@@ -104,7 +123,7 @@ def _move_waves(
                 common_flows(
                     pumps,
                     state.curves,
-                    state.speed_ratio,
+                    state.open_ratio,
                     came_m + steepness * sum_of(flow_m3h, pumps),  # it takes off what flowed before
                     loss_h2_m5 * (1.0 - share),
                     0.0,
@@ -119,7 +138,7 @@ def _move_waves(
                     total_m3h -= let_back_m3h(leak_m3h, came_m, steepness, total_m3h)
             else:
                 total_m3h = flow_m3h[at] = individual_flow_m3h(
-                    state.curves[at], state.speed_ratio[at], came_m, 0.0, 0.0, steepness, 0.0
+                    state.curves[at], state.open_ratio[at], came_m, 0.0, 0.0, steepness, 0.0
                 )
             head_m = came_m + steepness * total_m3h
             pass_on(water, way, b, main_h2_m5, s_m3h, lift_m, head_m, total_m3h)
@@ -155,7 +174,7 @@ def _solve_flows(
         back_m3h: float = common_flows(
             pumps,
             curves,
-            state.speed_ratio,
+            state.open_ratio,
             lift_m,
             friction_h2_m5 * (1.0 - main.shared_friction),
             friction_h2_m5 * main.shared_friction,
@@ -170,7 +189,7 @@ def _solve_flows(
         lift_m = lift_at_m(state, i, static_head_m)
         own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
         flow_m3h[i] = individual_flow_m3h(
-            curves[i], state.speed_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
+            curves[i], state.open_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
         )
     return 0.0
 

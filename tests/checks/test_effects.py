@@ -25,7 +25,7 @@ EXPECTED = {
         "air_pocket",
     },
     "sump": {"sump_area_profile", "unmetered_inflow"},
-    "pump": {"pump_wear", "ragging", "check_valve_leak"},
+    "pump": {"pump_wear", "ragging", "check_valve_leak", "sticking_check_valve"},
     "drive": {"motor_slip", "ramp_shape", "load_dependent_power", "supply_voltage_variation"},
     "controller": {"control_delay", "threshold_shift"},
     "level_sensor": {"level_sensor_lag", "level_quantisation"},

@@ -335,7 +335,7 @@ def _branch(
 def _move_valve(spec: ElasticSpec, pump: Floats, terms: Floats, i: int, top_m: float) -> None:
     """Open a check valve under a head over the main's, shut it when water has come back for its time."""
     if pump[_OPEN, i] <= 0.0:
-        if pump[_RATIO, i] > 0.0 and terms[0, i] > top_m + spec.valve_barrier_m:
+        if pump[_RATIO, i] > 0.0 and terms[0, i] > top_m + spec.valve_barrier_m[i]:
             pump[_OPEN, i] = 1.0
         pump[_BACK_S, i] = 0.0
         return

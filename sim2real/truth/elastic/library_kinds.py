@@ -101,6 +101,11 @@ def _check_valve_leak(truth: ElasticTruth, p: Given) -> None:
     truth.change(valve_leak=p["leak_m3h"] / HOUR_S)
 
 
+def _sticking_check_valve(truth: ElasticTruth, p: Given) -> None:
+    """The flap hangs, and needs more than the head of the main to come off its seat."""
+    truth.change(valve_barrier_m=truth.of_pump(truth.spec.valve_barrier_m, p["pump"], p["opening_m"]))
+
+
 def _motor_slip(truth: ElasticTruth, p: Given) -> None:
     """The file tells the curve at synchronous speed, and the motor slips after Kloss."""
     truth.spec = with_slip(truth.spec, p["slip"])
@@ -282,6 +287,17 @@ LIBRARY_FORMS: dict[str, ElasticKind] = {
             )
         },
         _check_valve_leak,
+    ),
+    "sticking_check_valve": ElasticKind(
+        "pump",
+        ("flow_m3h", "head_m"),
+        lambda d: {
+            "opening_m": digits(
+                d.size(0.2, 0.7) * (d.station.pump[0].coefficients[0] - d.station.mains[0].lift_at_zero_m)
+            ),
+            "pump": d.pump(),
+        },
+        _sticking_check_valve,
     ),
     "motor_slip": ElasticKind(
         "drive", ("flow_m3h", "head_m", "level_m"), lambda d: {"slip": d.size(0.02, 0.09)}, _motor_slip

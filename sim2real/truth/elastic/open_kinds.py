@@ -46,11 +46,6 @@ def _cavitation(truth: ElasticTruth, p: Given) -> None:
     truth.change(suction_m=p["suction_m"], suction_level_m=p["needed_level_m"])
 
 
-def _late_check_valve(truth: ElasticTruth, p: Given) -> None:
-    """The flap hangs, and needs more than the head of the main to come off its seat."""
-    truth.change(valve_barrier_m=p["barrier_m"])
-
-
 def _warming_power_meter(truth: ElasticTruth, p: Given) -> None:
     """The zero of the transducer follows the temperature of its room, up in the afternoon, and creeps."""
     warmth = np.sin(2.0 * np.pi * (truth.time_s / DAY_S - p["phase"])) + truth.time_s / truth.time_s.size
@@ -131,16 +126,6 @@ OPEN_FORMS: dict[str, ElasticKind] = {
             "needed_level_m": digits(d.station.control.stop_levels_m[0] + d.even(0.4, 0.8) * d.depth_m),
         },
         _cavitation,
-    ),
-    "late_check_valve": ElasticKind(
-        "pump",
-        ("flow_m3h", "head_m"),
-        lambda d: {
-            "barrier_m": digits(
-                d.even(0.35, 0.7) * (d.station.pump[0].coefficients[0] - d.station.mains[0].lift_at_zero_m)
-            )
-        },
-        _late_check_valve,
     ),
     "warming_power_meter": ElasticKind(
         "power_meter",

@@ -70,7 +70,7 @@ class ElasticSpec(NamedTuple):
         Worn vanes: head lost at the duty, over the rated; worn ring: inner flow K sqrt(H). Rags: head lost in the
         throttle that they make at the rated flow, and the time of running in which they are all there.
         [1, m^2.5/s, m, s]
-    valve_leak, valve_barrier_m, valve_s : float
+    valve_leak, valve_barrier_m, valve_s : float and (pumps,) array
         Back flow K sqrt(H) of a shut valve; head over the main's that first opens it; time in which it falls shut
         against water that flows back. [m^2.5/s, m, s]
     lift_slope, lift_reference_m : float
@@ -122,6 +122,7 @@ class ElasticSpec(NamedTuple):
     ring_leak: Floats
     rag_limit_m: Floats
     rag_s: Floats
+    valve_barrier_m: Floats
     area_m2: float
     crest_m: float
     slip: float
@@ -141,7 +142,6 @@ class ElasticSpec(NamedTuple):
     scan_first: int
     flow_filter_s: float
     valve_leak: float = 0.0
-    valve_barrier_m: float = 0.0
     valve_s: float = 0.0
     lift_slope: float = 0.0
     lift_reference_m: float = 0.0
@@ -217,6 +217,7 @@ def spec_of(station: Station, machinery: Machinery) -> ElasticSpec:
         ring_leak=np.zeros(pumps),
         rag_limit_m=np.zeros(pumps),
         rag_s=np.ones(pumps),
+        valve_barrier_m=np.zeros(pumps),
         area_m2=station.sump.area_m2,
         crest_m=control.start_levels_m[-1] + 3.0,
         slip=machinery.rated_slip,

@@ -78,6 +78,7 @@ EFFECTS = [
     {"name": "check_valve_leak", "leak_m3h": 3.0},
     {"name": "friction_bias", "factor": 1.3},
     {"name": "static_head_bias", "offset_m": 0.7},
+    {"name": "sticking_check_valve", "opening_m": 6.0},
     {"name": "common_header", "shared_fraction": 0.6},
 ]
 

@@ -4,7 +4,7 @@ import pytest
 
 from wetwell.services.trial.material_case import material_case
 from wetwell.sim2real.diagnosis.diagnosis import diagnose
-from wetwell.sim2real.trial.cases import StoragePlan, trial_case
+from wetwell.sim2real.trial.cases import StoragePlan, TrialCase, trial_case
 
 SECONDS = 43_200
 
@@ -27,29 +27,32 @@ def test_a_single_effect_is_told(seed, effect, metered_share):
     assert [one.name for one in diagnose(recording, truth.station).effects] == [effect]
 
 
-def hidden(what, kind, seed, plant, *names, marks=pytest.mark.long):
-    return pytest.param(kind, seed, plant, names, id=what, marks=marks)
+def hidden(what, kind, seed, plant, *names, has_meter=False, marks=pytest.mark.long):
+    absent = () if has_meter else ("inflow_m3h",)
+    case = TrialCase(seed=seed, number=0, kind=kind, plant=plant, names=names, seconds=SECONDS, absent=absent)
+    return pytest.param(case, id=what, marks=marks)
 
 
 @pytest.mark.parametrize(
-    ("kind", "seed", "plant", "names"),
+    "case",
     [
         hidden("a lag behind steps of a centimetre", "pair", 8204, "fine", "air_pocket", "level_sensor_lag"),
-        hidden("steps of 16 mm", "pair", 8207, "elastic", "level_dependent_static_head", "level_quantisation"),
-        hidden("rags of two kinds beside a lift", "pair", 8206, "elastic", "ragging", "static_head_bias"),
+        hidden("steps of 16 mm", "pair", 8207, "elastic", "level_quantisation", "level_dependent_static_head"),
+        hidden(
+            *("rags of two kinds beside a lift", "pair", 8206, "elastic", "static_head_bias", "ragging"),
+            has_meter=True,
+        ),
         hidden(
             *("a supply whose swing is no sine", "triple", 8648, "elastic"),
-            *("flow_meter_gain", "level_sensor_lag", "supply_voltage_variation"),
+            *("level_sensor_lag", "supply_voltage_variation", "flow_meter_gain"),
         ),
         hidden(
             *("a friction that a meter hides, whose start leads away alone", "triple", 8661, "fine"),
-            *("flow_meter_gain", "friction_bias", "threshold_shift"),
+            *("friction_bias", "flow_meter_gain", "threshold_shift"),
             marks=(),
         ),
     ],
 )
-def test_all_effects_are_told(kind, seed, plant, names):
-    storage = StoragePlan(rates_s=(1,), metered_share=0.5)
-    case = trial_case(seed, 0, kinds=(kind,), plants=(plant,), seconds=SECONDS, storage=storage)
+def test_all_effects_are_told(case):
     _, truth, recording = material_case(case)
-    assert tuple(sorted(one.name for one in diagnose(recording, truth.station).effects)) == names
+    assert {one.name for one in diagnose(recording, truth.station).effects} == {*case.names}

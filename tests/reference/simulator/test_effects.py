@@ -309,6 +309,49 @@ def test_check_valve_leak_behind_a_common_header(quiet_alpha):
         np.testing.assert_allclose(fall_m, (91.0 + back_of(header_m) - flow_m3h) / 3600.0 / AREA_M2, atol=1e-7)
 
 
+def test_sticking_check_valve_holds_the_shut_off_head_until_it_opens(quiet_alpha):
+    """No flow until c0 N² exceeds the static head by what it takes; then the duty of the moment, and no sticking."""
+    opening_m = 9.0
+    rows, plain = run(quiet_alpha, {"name": "sticking_check_valve", "opening_m": opening_m}), run(quiet_alpha)
+    start = first_run(plain).start
+    ramp = slice(start, start + 30)
+    ratio = rows["pump1_frequency_hz"][ramp] / NOMINAL_HZ
+    is_shut = C0 * ratio**2 <= STATIC_M + opening_m
+    assert 0 < is_shut.sum() < 30
+    assert (plain["pump1_flow_m3h"][ramp][is_shut] > 0.0).any()
+    expected_m3h = np.where(is_shut, 0.0, plain["pump1_flow_m3h"][ramp])
+    np.testing.assert_array_equal(rows["pump1_flow_m3h"][ramp], expected_m3h)
+    np.testing.assert_allclose(rows["pump1_head_m"][ramp][is_shut], C0 * ratio[is_shut] ** 2, rtol=1e-12)
+    run_down = slice(ramp.stop, first_run(rows).stop)  # an open flap stays open while water flows
+    ratio = rows["pump1_frequency_hz"][run_down] / NOMINAL_HZ
+    is_low = (C0 * ratio**2 > STATIC_M + 0.5) & (C0 * ratio**2 < STATIC_M + opening_m)
+    assert is_low.any()
+    assert (rows["pump1_flow_m3h"][run_down][is_low] > 0.0).all()
+
+
+def test_sticking_check_valve_of_one_pump_opens_against_what_another_one_pumps(quiet_alpha):
+    """On a header the head behind it is that of the running pumps; the valves of the others do not stick."""
+    sticking = {"name": "sticking_check_valve", "opening_m": 4.0, "pump": 2}
+    header = {"name": "common_header"}
+    rows, plain = (run(quiet_alpha, *effects, inflow_m3h=300.0) for effects in ([sticking, header], [header]))
+    second = int(np.argmax(rows["pump2_frequency_hz"] > 0.0))
+    np.testing.assert_array_equal(rows["pump1_flow_m3h"][:second], plain["pump1_flow_m3h"][:second])
+    behind_m = STATIC_M + FRICTION * rows["pump1_flow_m3h"][second - 1] ** 2
+    ratio = rows["pump2_frequency_hz"][second : second + 60] / NOMINAL_HZ
+    opens = int(np.argmax(C0 * ratio**2 > behind_m + 4.0))
+    assert opens > int(np.argmax(C0 * ratio**2 > behind_m))
+    flow_m3h = rows["pump2_flow_m3h"][second : second + 60]
+    assert (flow_m3h[:opens] == 0.0).all()
+    assert (flow_m3h[opens:] > 0.0).all()
+
+
+def test_sticking_check_valve_that_a_pump_cannot_open_moves_no_water(quiet_alpha):
+    column = {"name": "water_inertia", "inertia_s2_m2": 300.0}
+    rows = run(quiet_alpha, {"name": "sticking_check_valve", "opening_m": 50.0}, column)
+    assert (rows["pump1_flow_m3h"] == 0.0).all()
+    assert rows["pump1_head_m"].max() == pytest.approx(C0)
+
+
 @pytest.mark.parametrize("inertia_s2_m2", [100.0, 1000.0])
 def test_the_water_of_a_header_starts_from_what_runs_back_through_it(quiet_alpha, inertia_s2_m2):
     """Its pump lifts what runs back at once, and has to turn the water of the main round."""

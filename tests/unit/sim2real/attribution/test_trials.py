@@ -22,7 +22,7 @@ from wetwell.sim2real.recording.traces import traces_of
 from wetwell.sim2real.replay.replay import Replay
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.station import StationResiduals
-from wetwell.sim2real.trial.cases import trial_case
+from wetwell.sim2real.trial.cases import TrialCase
 from wetwell.sim2real.truth import truth_plant
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.parameters import plant_parameters
@@ -139,9 +139,8 @@ def test_a_limit_that_leads_astray_beside_a_header_is_tried_from_another_start()
 
     As if all were linear, a limit of 60 m³/h and no header would do; it leaves more than the header alone.
     """
-    case = trial_case(1_003_001, 1, kinds=("single", "pair"), plants=("fine",), seconds=86_400)
-    truth = case.truth()
-    assert case.names == ("common_header", "flow_low_cutoff")
+    names = ("common_header", "flow_low_cutoff")
+    truth = TrialCase(seed=1_003_001, number=1, kind="pair", plant="fine", names=names, seconds=86_400).truth()
     traces = traces_of(truth_plant.run(truth), truth.station)
     header, cutoff = (
         candidates_of(traces.pumps, len(truth.station.mains), only=[name])[0]

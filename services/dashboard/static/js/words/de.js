@@ -430,6 +430,7 @@ export default {
   "ramp shape": "Form der Rampe",
   "report by exception": "Meldung nur bei Änderung",
   "static head bias": "statische Höhe anders als angegeben",
+  "sticking check valve": "klemmende Rückschlagklappe",
   "sump area profile": "Querschnitt des Pumpensumpfs",
   "supply voltage variation": "schwankende Netzspannung",
   "threshold shift": "verschobene Schaltpegel",
