@@ -18,7 +18,7 @@ from wetwell.simulator.power import loaded_power_kw
 LONGEST_DELAY_S = 100
 """The longest delay that the library knows. [s]"""
 DAY_S = 86_400.0
-LONGEST_S = 14_400.0
+LONGEST_S = 50_000.0
 SHORTEST_S = 45.0
 GRID_S = 20.0
 FULL = 0.98

@@ -26,7 +26,8 @@ class SupplyVoltageVariation(Effect):
     fast_amplitude : float
         a_f, share by which it swings beside that, faster; 0 is none. [1]
     fast_period_s : float
-        T_f, time from one high of the faster swing to the next. [s]
+        T_f, time from one high of the faster swing to the next; half a day where a grid is loaded in the morning and
+        in the evening. [s]
     fast_phase_s : float
         t_f, from the start to the first rise through the mean. [s]
 
@@ -42,8 +43,8 @@ class SupplyVoltageVariation(Effect):
     daily_amplitude: Annotated[float, limits(0.0, 0.2, "1")] = 0.0
     daily_phase_h: Annotated[float, limits(0.0, 24.0, "h")] = 0.0
     fast_amplitude: Annotated[float, limits(0.0, 0.2, "1")] = 0.0
-    fast_period_s: Annotated[float, limits(4.0, 2.0e4, "s")] = 300.0
-    fast_phase_s: Annotated[float, limits(0.0, 2.0e4, "s")] = 0.0
+    fast_period_s: Annotated[float, limits(4.0, 5.0e4, "s")] = 300.0
+    fast_phase_s: Annotated[float, limits(0.0, 5.0e4, "s")] = 0.0
 
     def force(self, forcing: Forcing, time_s: Floats) -> None:
         """Scale the voltage."""
