@@ -18,6 +18,7 @@ from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.attribution.unnamed import unnamed_beside
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
+from wetwell.sim2real.likelihood.falls import Falls, falls_at_rest
 from wetwell.sim2real.likelihood.jumps import with_jumps
 from wetwell.sim2real.likelihood.posterior import (
     SetProbability,
@@ -67,6 +68,8 @@ class Attribution:
         Sets that may be the truth, as they were fitted.
     not_tested : tuple of NotTested
         Candidates that the recording cannot show.
+    falls : Falls or None
+        Of the level at rest.
     """
 
     plain: Floats
@@ -82,6 +85,7 @@ class Attribution:
     unknown: tuple[UnknownShare, ...]
     possible: tuple[PossibleSet, ...]
     not_tested: tuple[NotTested, ...] = ()
+    falls: Falls | None = None
 
     @property
     def after(self) -> Floats:
@@ -122,7 +126,9 @@ def attribute(
     trials = Trials(fitter, cells, guesses, progress, each)
     singles = trials.singles()
     names = {candidate.name for candidate in tested}
-    hypotheses = Hypotheses(fitter, cells, each, (TELEMETRY,) if residuals.telemetry.effects <= names else ())
+    named = (TELEMETRY,) if residuals.telemetry.effects <= names else ()
+    falls = falls_at_rest(replay.traces, replay.station, regimes, residuals.telemetry.patterns)
+    hypotheses = Hypotheses(fitter, cells, each, named, falls)
     hypotheses.add(singles)
     hypotheses.add(changed(fitter, singles[:MOST_CHANGED], each))
     Search(fitter, trials, hypotheses).run()
@@ -171,6 +177,7 @@ def attribute(
         unknown=unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed),
         possible=possible_sets(hypotheses, posterior),
         not_tested=not_tested,
+        falls=falls,
     )
 
 

@@ -23,6 +23,7 @@ from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.likelihood.cells import Cells
 from wetwell.sim2real.likelihood.covariance import GOOD, LATE, OFFSET, POOR_FORM, Form, no_form
 from wetwell.sim2real.likelihood.evidence import Evidence, Member, cell_weights, evidence, evidence_of_none
+from wetwell.sim2real.likelihood.falls import Falls
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import UnnamedWeight, Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
@@ -109,10 +110,19 @@ class Hypotheses:
         Weighs fits, perhaps side by side.
     named : collection of int
         Signals in which nothing unknown can be.
+    falls : Falls, optional
+        Of the level at rest, which only something unknown makes.
     """
 
-    def __init__(self, fitter: Fitter, cells: Cells, each: Each, named: Collection[int] = ()) -> None:
-        self._fitter, self._cells, self._each, self._named = fitter, cells, each, named
+    def __init__(
+        self,
+        fitter: Fitter,
+        cells: Cells,
+        each: Each,
+        named: Collection[int] = (),
+        falls: Falls | None = None,
+    ) -> None:
+        self._fitter, self._cells, self._each, self._named, self._falls = fitter, cells, each, named, falls
         self._plain = self._means(fitter.plain)
         none = evidence_of_none(cells, self._plain)
         self._none = Hypothesis(
@@ -315,7 +325,7 @@ class Hypotheses:
                 yield self.weigh(moved)
 
     def _flexible(self, one: Hypothesis) -> float:
-        return flexible_factor(one.evidence, one.form, self._named)
+        return flexible_factor(one.evidence, one.form, self._named, self._falls)
 
     def _means(self, fit: Fit) -> Floats:
         return self._cells.means(residuals_of(fit.residuals))

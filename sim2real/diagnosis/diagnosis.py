@@ -49,6 +49,11 @@ from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
 from wetwell.simulator.effects.effect import Component
 
+FALLS = (
+    "the level falls by up to {:.0f} cm while no pump runs: no inflow does that, so its sensor reads high now and "
+    "then, or water leaves that nobody measures"
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
@@ -202,6 +207,9 @@ def diagnose(
     excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
     likeliest = max(found.unknown, key=lambda way: way.share, default=None)
     patterns = residuals.telemetry.components(() if likeliest is None else likeliest.acting)
+    fall_m = 0.0 if found.falls is None else found.falls.far_m
+    if fall_m > 0.0:
+        patterns |= {"level_m": "level_sensor"}
     pattern = localise(excess, found.plain, bins, plain.plant, patterns)
     by_component = component_probability(found.posterior, found.unknown, pattern)
     unknown_at = place_of_unknown(found.unknown, pattern)
@@ -216,6 +224,7 @@ def diagnose(
         for name, why in columns_of_no_use(replay, bins, columns)
     ]
     if verdict == "unknown":
+        remarks += [FALLS.format(100.0 * fall_m)] if fall_m > 0.0 else []
         correction, why = weighed(learn(replay, residuals), bins, plain.plant, rng)
         tables += [] if correction is None else [correction.table]
         remarks += [] if why is None else [why]

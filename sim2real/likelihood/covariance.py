@@ -96,7 +96,12 @@ class Form:
 
 def no_form(cells: Cells) -> Form:
     """Where there are no effects."""
-    nothing = np.zeros(cells.group.size)
+    return form_of_nothing(cells.group.size)
+
+
+def form_of_nothing(cells: int) -> Form:
+    """Of as many cells in which no effect does anything."""
+    nothing = np.zeros(cells)
     return Form(signature=nothing, fixed=nothing, swinging=nothing, late=nothing)
 
 

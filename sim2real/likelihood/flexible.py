@@ -6,8 +6,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from wetwell.sim2real.likelihood.cells import TIMES
-from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form
+from wetwell.sim2real.likelihood.covariance import DIFFERING, POOR, Errors, Form, form_of_nothing
 from wetwell.sim2real.likelihood.evidence import Evidence, Stirred, under
+from wetwell.sim2real.likelihood.falls import Falls
 from wetwell.sim2real.likelihood.ways import Seen, Way, Ways, right_ways
 
 SCALES = TIMES[1:]
@@ -30,7 +31,7 @@ UNKNOWN_WAYS = (
 """What something unknown may be: alike for all pumps or in each, changing, or both; each as likely."""
 
 
-def flexible_factor(found: Evidence, form: Form, named: Collection[int] = ()) -> float:
+def flexible_factor(found: Evidence, form: Form, named: Collection[int] = (), falls: Falls | None = None) -> float:
     r"""Logarithm of how much more probable the residuals are if something unknown may be in them.
 
     $$F = \int_0^1 \prod_b \frac{(1 - s)\,p(r_b) + s \sum_k p_k\, p(r_b \mid \lambda_k, \mu_k)}{p(r_b)}\,
@@ -38,7 +39,8 @@ def flexible_factor(found: Evidence, form: Form, named: Collection[int] = ()) ->
 
     over blocks b and the share s of them in which it acts, of which nobody knows anything, with λ times what is
     allowed of offsets that all cycles share, and μ of what changes between them: one of them, or both alike. Readings
-    without noise that are what was expected, as those of a pump that stands, say nothing of what else there is.
+    without noise that are what was expected, as those of a pump that stands, say nothing of what else there is. Falls
+    of the level at rest are a block of their own: nothing of the library makes any.
 
     Parameters
     ----------
@@ -47,17 +49,19 @@ def flexible_factor(found: Evidence, form: Form, named: Collection[int] = ()) ->
         Of the effects beside which it acts.
     named : collection of int
         Signals in which nothing unknown can be: only effects that are known make values lie on a lattice.
+    falls : Falls, optional
     """
     total = np.zeros(ACTING.size)
-    for one in found.stirred:
-        if one.block.signal in named:
-            continue
+    parts = [(one, found.residuals, form) for one in found.stirred if one.block.signal not in named]
+    if falls is not None:
+        parts.append((Stirred(block=falls.block), falls.left_m, form_of_nothing(falls.left_m.size)))
+    for one, residuals, forms in parts:
         nothing = (SILENT * one.block.allowed) ** 2
-        says = np.maximum(found.residuals[one.block.rows] ** 2, one.block.variance) > nothing
+        says = np.maximum(residuals[one.block.rows] ** 2, one.block.variance) > nothing
         if not says.any():
             continue
         block = one.block.only(says)
-        left, its = found.residuals[block.rows], form.chosen(block.rows)
+        left, its = residuals[block.rows], forms.chosen(block.rows)
         wet = Seen(block, left, its, one.swing)
         dry = None if one.dry is None else Seen(one.dry.only(says), left, its, one.swing)
         known, *unknown = (_log(one, wet, dry, ways) for ways in (right_ways(block), *UNKNOWN_WAYS))

@@ -56,3 +56,16 @@ def hidden(what, kind, seed, plant, *names, has_meter=False, marks=pytest.mark.l
 def test_all_effects_are_told(case):
     _, truth, recording = material_case(case)
     assert {one.name for one in diagnose(recording, truth.station).effects} == {*case.names}
+
+
+@pytest.mark.parametrize("seed", [11300, 11306])
+def test_foam_is_something_unknown_at_the_level_sensor(seed):
+    """Without an inflow meter an inflow may do all that foam does, but for letting the level fall at rest."""
+    case = TrialCase(
+        seed=seed, number=0, kind="open", plant="fine", names=("foam",), seconds=SECONDS, absent=("inflow_m3h",)
+    )
+    _, truth, recording = material_case(case)
+    told = diagnose(recording, truth.station)
+    assert told.verdict == "unknown"
+    assert told.where[0].component == "level_sensor"
+    assert any("while no pump runs" in remark for remark in told.remarks)
