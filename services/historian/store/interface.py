@@ -75,7 +75,7 @@ class Store(Protocol):
 
     @property
     def damages(self) -> int:
-        """How often something that was not what was written has been put aside."""
+        """How often something that was not what was written has been put aside, or written once more."""
 
     def check_place(self) -> None:
         """See whether what is written is where it is read, and not in a folder that has been replaced."""

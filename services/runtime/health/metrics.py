@@ -12,7 +12,7 @@ METRICS: Mapping[str, str] = {
     "behind_days": "Days that are over and were not looked at yet, of the station that is furthest behind. [d]",
     "chattering": "Alarms that come and go too often.",
     "clock_steps": "Times that the clock of the source was set.",
-    "damages": "Times that something was put aside or missed because it was not what was written.",
+    "damages": "Times that something was put aside, missed or written once more because it was not what was written.",
     "diagnoses": "Full diagnoses of stations whose gap had changed.",
     "disk_errors": "Writes to disk that failed in a row; 0 after one that did not.",
     "doubled": "Samples and messages that came twice.",

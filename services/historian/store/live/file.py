@@ -49,7 +49,7 @@ class LiveFile:
     is_damaged : bool
         Whether the file was found damaged, and not yet put aside.
     damages : int
-        How often something was put aside or found missing.
+        How often something was put aside, found missing, or written once more.
     replaced : str, optional
         Why the file is not known as the one that was here last, such as that of a backup.
     """

@@ -55,7 +55,8 @@ class RefusedRows:
         """Move what was found into the table of refused rows, in a transaction of the caller.
 
         A row that has its key and is what was written is another one, such as that of a file begun anew, or what the
-        writer remembers of a page that the disk has changed: it is written once more.
+        writer remembers of a page that the disk has changed: it is written once more, and counts. Where the disk has
+        changed one row it may have changed others, which nobody has read yet.
 
         Returns
         -------
@@ -67,16 +68,16 @@ class RefusedRows:
             found, self._found = self._found, {}
         count, is_damaged = 0, False
         for table, key in found:
-            moved = _put_aside(database, table, key)
-            count += moved
-            if not moved:
+            there, intact = _put_aside(database, table, key)
+            count += there
+            if there == intact:
                 is_damaged = is_damaged or (table, key) in self._not_there
                 self._not_there.add((table, key))
         return count, is_damaged
 
 
-def _put_aside(database: sqlite3.Connection, table: Table, key: tuple[int, ...]) -> int:
-    """Move the row of a key, or write it once more if it is what was written; how many were moved."""
+def _put_aside(database: sqlite3.Connection, table: Table, key: tuple[int, ...]) -> tuple[int, int]:
+    """Move the row of a key, or write it once more if it is what was written; how many have it, and are that."""
     row, content = f"FROM {table} WHERE {_ROW_OF[table]}", _CONTENT[table]
     columns, is_intact = _CHECK[table]
     found = database.execute(f"SELECT {columns} {row}", key).fetchall()
@@ -87,4 +88,4 @@ def _put_aside(database: sqlite3.Connection, table: Table, key: tuple[int, ...])
     database.execute(f"DELETE {row}", key)
     places = ", ".join("?" * len(columns.split(", ")))
     database.executemany(f"REPLACE INTO {table} ({columns}) VALUES ({places})", intact)  # noqa: S608 - names of above
-    return len(found) - len(intact)
+    return len(found), len(intact)

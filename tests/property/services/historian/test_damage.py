@@ -302,11 +302,12 @@ def test_what_the_writer_remembers_of_a_row_that_the_disk_has_changed_mends_it(t
         with (tmp_path / "live.sqlite").open("r+b") as file:
             file.seek(place)
             file.write(bytes([content[place] ^ 1]))
+        assert store.live.put_aside_damaged("alpha", 0, 2**62) == 1
         assert store.live.put_aside_damaged("alpha", 0, 2**62) == 0
         assert len(store.samples("alpha", 0, 2**62)) == 30
         assert len(store.events("verdicts", "alpha", 0, 2**62, 10_000)) == 3
         store.file.check()
-        assert store.damages == 0
+        assert store.damages == 1  # others may have been changed, too
 
 
 def test_a_row_whose_station_was_changed_costs_no_row_behind_it(content, tmp_path):
