@@ -15,7 +15,7 @@ from wetwell.services.historian.store.live.row_checksum import (
     is_sample_intact,
     last_ns_of,
 )
-from wetwell.services.historian.store.live.schema import schema_damages
+from wetwell.services.historian.store.live.schema import schema_damages, version_damages
 from wetwell.services.historian.store.live.station_names import station_rows
 from wetwell.services.historian.store.live.tally import miscounts
 
@@ -47,7 +47,7 @@ def damage_of(path: Path) -> list[str]:
         with _reading(path) as database:
             told += [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
             version = int(database.execute("PRAGMA user_version").fetchone()[0])
-            told += schema_damages(database) if version >= COUNTED_VERSION else []
+            told += schema_damages(database) if version >= COUNTED_VERSION else version_damages(database)
             crc = "crc" if version >= CHECKED_VERSION else "NULL"
             messages = database.execute(f"SELECT kind, station, time_ns, digest, payload, {crc} FROM event")  # noqa: S608
             counts["messages"] = sum(not is_event_intact(*row) for row in messages)

@@ -16,6 +16,7 @@ from wetwell.services.historian.store.live.tally import TALLY_TABLES
 log = logging.getLogger(__name__)
 
 VERSION = 4
+"""Two versions never have the same tables, indices and triggers: by these a version that a disk has changed shows."""
 
 _REFUSED = """
 CREATE TABLE refused (origin TEXT NOT NULL, key TEXT NOT NULL, content BLOB);
@@ -86,7 +87,11 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
     ------
     StoreError
         If the file is of a later version, or a historian works on one that must be upgraded.
+    sqlite3.DatabaseError
+        If a disk has changed its version.
     """
+    if damages := version_damages(database):
+        raise sqlite3.DatabaseError(damages[0])
     version = _version(database)
     if version > VERSION:
         raise StoreError(f"{path}: version {version} is newer than {VERSION}, which this program knows")
@@ -105,12 +110,24 @@ def prepare(database: sqlite3.Connection, path: Path, alone: Callable[[], Abstra
 
 
 def schema_damages(database: sqlite3.Connection) -> list[str]:
-    """Say which tables and triggers of a database of this version are not as they were made; empty if none.
+    """Say which tables and triggers of a database of this version are not as they were made, or its version.
 
     SQLite itself takes a word of its schema that a disk has changed for another name.
     """
     made, there = _made(), _parts(database)
-    return [f"schema: {name} is not as it was made" for name in sorted(made) if there.get(name) != made[name]]
+    damages = [f"schema: {name} is not as it was made" for name in sorted(made) if there.get(name) != made[name]]
+    return damages or version_damages(database)
+
+
+def version_damages(database: sqlite3.Connection) -> list[str]:
+    """Say that a disk has changed the version of a database; empty if not.
+
+    Its parts are exactly those of this version, or no program has such a version.
+    """
+    is_of_this = _parts(database) == _made()
+    version = _version(database)  # after the parts: another may have made or upgraded them meanwhile
+    is_changed = version < 0 or (is_of_this and version != VERSION)
+    return [f"schema: version {version} is not that of its tables"] if is_changed else []
 
 
 @cache
@@ -121,13 +138,14 @@ def _made() -> dict[str, object]:
 
 
 def _parts(database: sqlite3.Connection) -> dict[str, object]:
-    """Of each table its columns, whose texts differ after an upgrade, and of each trigger its text."""
+    """Of each table its columns, whose texts differ after an upgrade, and of each other part its text."""
     columns = database.execute(
         'SELECT m.name, c.name, c.type, c."notnull", c.dflt_value, c.pk FROM sqlite_master AS m, '
         "pragma_table_info(m.name) AS c WHERE m.type = 'table' ORDER BY m.name, c.cid"
     ).fetchall()
     tables = {name: [column[1:] for column in of] for name, of in groupby(columns, lambda column: column[0])}
-    return tables | dict(database.execute("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'"))
+    others = database.execute("SELECT name, sql FROM sqlite_master WHERE type IN ('index', 'trigger', 'view')")
+    return tables | dict(others)
 
 
 def _version(database: sqlite3.Connection) -> int:

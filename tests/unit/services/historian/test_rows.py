@@ -23,6 +23,7 @@ from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, DIGEST_BYTES, Batch, StoreError
 from wetwell.services.historian.store.live.database import LiveDatabase
 from wetwell.services.historian.store.live.file import LiveFile
+from wetwell.services.historian.store.live.salvage import damage_of
 
 VERSION_1 = """
 CREATE TABLE station (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, first_ns INTEGER, last_ns INTEGER);
@@ -248,7 +249,22 @@ def test_who_may_not_write_the_lock_cannot_upgrade_a_database_of_version_1(tmp_p
 
 
 def test_a_database_of_a_later_version_is_refused(tmp_path: Path) -> None:
+    FolderStore(tmp_path).close()
     with contextlib.closing(sqlite3.connect(tmp_path / "live.sqlite")) as database:
-        database.execute("PRAGMA user_version = 5")
+        database.executescript("CREATE TABLE later (id INTEGER PRIMARY KEY); PRAGMA user_version = 5")
     with pytest.raises(StoreError, match="version 5 is newer than 4"):
         FolderStore(tmp_path)
+
+
+@pytest.mark.parametrize("version", [12, 0, 3, 4 - 2**31])
+def test_a_version_that_a_disk_has_changed_is_damage(tmp_path: Path, version: int) -> None:
+    path = tmp_path / "live.sqlite"
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        store.write(Batch(samples=[pack("alpha", sample(1))]))
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute(f"PRAGMA user_version = {version}")
+    assert damage_of(path) == [f"schema: version {version} is not that of its tables"]
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert len(store.samples("alpha", 0, DAY_NS)) == store.damages == 1
+    assert path.with_name("live.sqlite.refused-1").exists()
+    assert damage_of(path) == []
