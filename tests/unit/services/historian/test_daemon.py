@@ -29,31 +29,42 @@ def damage(path: Path) -> None:
     path.write_bytes(content)
 
 
+def sample(number: int) -> bytes:
+    """The sample of a second, as it is sent."""
+    return Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode()
+
+
+def on_bus(bus: MemoryBus) -> contextlib.AbstractContextManager[object]:
+    """Have the daemon connect to a bus in this process."""
+
+    async def connected(_settings: Settings) -> contextlib.AbstractContextManager[MemoryBus]:
+        return contextlib.nullcontext(bus)
+
+    return mock.patch.object(daemon, "connect", connected)
+
+
 def test_what_was_lost_comes_again_from_the_publishers(tmp_path, caplog):
     caplog.set_level(logging.WARNING)
     settings = Settings(historian=HistorianSettings(folder=tmp_path))
     path = tmp_path / "live.sqlite"
 
-    async def connected(_settings: Settings) -> contextlib.AbstractContextManager[MemoryBus]:
-        return contextlib.nullcontext(bus)
-
     async def live() -> None:
         publisher = bus.publisher(sample_key("alpha"), history=600)
         running = asyncio.create_task(daemon._run(settings))
         for number in range(SAMPLES):
-            publisher.put(Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode())
+            publisher.put(sample(number))
         await asyncio.sleep(5.0)
         with contextlib.closing(FolderStore(tmp_path)) as store:
             store.file._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         damage(path)
         await asyncio.sleep(60.0)  # looks through what it has kept
         for number in range(SAMPLES, SAMPLES + 2):
-            publisher.put(Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode())
+            publisher.put(sample(number))
             await asyncio.sleep(60.0)
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
 
-    with MemoryBus() as bus, mock.patch.object(daemon, "connect", connected):
+    with MemoryBus() as bus, on_bus(bus):
         run_virtual(live())
     with contextlib.closing(FolderStore(tmp_path)) as store:
         assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES + 2))
@@ -65,25 +76,22 @@ def test_where_the_writer_mends_a_row_what_publishers_keep_comes_again(tmp_path)
     """The disk has changed another row too, which the writer does not remember, and nobody looks for an hour."""
     settings = Settings(historian=HistorianSettings(folder=tmp_path, maintain_s=3_600.0))
 
-    async def connected(_settings: Settings) -> contextlib.AbstractContextManager[MemoryBus]:
-        return contextlib.nullcontext(bus)
-
     async def live() -> None:
         publisher = bus.publisher(sample_key("alpha"), history=600)
         running = asyncio.create_task(daemon._run(settings))
         for number in range(SAMPLES):
-            publisher.put(Sample(station="alpha", seq=number, time=number * NS_PER_S, pumps=()).encode())
+            publisher.put(sample(number))
         await asyncio.sleep(5.0)
         store.file._writer.execute("UPDATE sample SET quality = quality + 1 WHERE seq = 300")
         store.file.refused.note("sample", 1, 7 * NS_PER_S, 7)  # it was another one on the disk
-        publisher.put(Sample(station="alpha", seq=SAMPLES, time=SAMPLES * NS_PER_S, pumps=()).encode())
+        publisher.put(sample(SAMPLES))
         await asyncio.sleep(60.0)
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
 
     with contextlib.closing(FolderStore(tmp_path)) as store, MemoryBus() as bus:
         opened = mock.patch.object(daemon, "open_store", return_value=contextlib.nullcontext(store))
-        with opened, mock.patch.object(daemon, "connect", connected):
+        with opened, on_bus(bus):
             run_virtual(live())
         assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES + 1))
 
