@@ -30,7 +30,8 @@ from wetwell.protocols.messages.verdict import AssetFault, Verdict
 from wetwell.protocols.station.limits import Limits
 from wetwell.protocols.timestamps import NS_PER_DAY, NS_PER_S
 from wetwell.services.alarms.registry import AlarmRegistry
-from wetwell.services.alarms.station_watch import Now, StationWatch
+from wetwell.services.alarms.station_clock import Now
+from wetwell.services.alarms.station_watch import StationWatch
 from wetwell.services.stations import find_scenario, find_station
 from wetwell.simulator.faults import Fault
 from wetwell.simulator.faults.pump.blockage import Blockage
@@ -147,7 +148,7 @@ def months(seed: int, period_s: int) -> dict[str, Any]:
         else:
             fault = ImpellerWear(pump=1, head_loss=0.08, start_s=start_s, end_s=start_s + slow_s, after="clear")
         faults.append(fault)
-    registry, watch = AlarmRegistry(), StationWatch("alpha", heard_s=0.0, missed_s=0.0, start_s=-1e9)
+    registry, watch = AlarmRegistry(), StationWatch("alpha", missed_s=0.0, start_s=-1e9)
     raised: dict[str, int] = {}
     is_up: dict[str, bool] = {}
     for _, verdict in verdicts_on(scenario_with(*faults), seed, period_s):

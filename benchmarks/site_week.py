@@ -17,7 +17,7 @@ from site_processes import cpu_and_memory
 from wetwell.protocols.bus.interface import Subscription
 from wetwell.protocols.bus.keys import alarm_key, sample_key, verdict_key
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.detector.checkpoint import checkpoint_in
 from wetwell.services.detector.intake import Intake
 from wetwell.services.detector.station_detector import StationDetector

@@ -21,7 +21,7 @@ from wetwell.protocols.bus.keys import (
 from wetwell.protocols.station.station_file import Station
 from wetwell.services.alarms.service import SOURCES, AlarmService, Kept
 from wetwell.services.alarms.state_file import KeptSite
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.folder_lock import folder_held

@@ -31,7 +31,8 @@ from wetwell.services.alarms.record import AlarmRecord
 from wetwell.services.alarms.registry import SHELF, AlarmRegistry
 from wetwell.services.alarms.rules import MAX_PUMPS, changed_rules
 from wetwell.services.alarms.state_file import KeptSite, SiteState, StationState, site_in
-from wetwell.services.alarms.station_watch import Limits, Now, PumpVerdicts, StationWatch
+from wetwell.services.alarms.station_clock import Now, went_on
+from wetwell.services.alarms.station_watch import Limits, PumpVerdicts, StationWatch
 from wetwell.services.alarms.status import ActRefusedError, AlarmStatus
 from wetwell.services.runtime.settings import AlarmSettings
 from wetwell.services.security.audit import AuditTrail, audit_in
@@ -249,10 +250,11 @@ class AlarmService:
 
     def save(self) -> None:
         """Write the state to disk."""
-        begun_s = self._now().steady_s
+        begun = self._now()
         stations = {
             name: StationState(
                 time_ns=watch.time_ns,
+                ahead_ns=watch.clock_ns(begun) - begun.wall_ns,
                 seq=watch.seq,
                 last_verdicts_ns={
                     pump: known.times_ns[-1] for pump, known in watch.verdicts.items() if known.times_ns
@@ -263,7 +265,7 @@ class AlarmService:
         }
         self._file.save(SiteState(book=self.registry.state(), stations=stations))
         ended_s = self._now().steady_s
-        self._rests_until_s = ended_s + (ended_s - begun_s) / SAVING_SHARE
+        self._rests_until_s = ended_s + (ended_s - begun.steady_s) / SAVING_SHARE
 
     def report(self) -> AlarmReport:
         """Rates, chattering and stale alarms."""
@@ -341,19 +343,21 @@ class AlarmService:
         return self.stations[station].clock_ns(now) if station in self.stations else now.wall_ns
 
     def _restore(self, state: SiteState) -> None:
-        now_s = self._now().steady_s
+        now = self._now()
         self.registry.restore(state.registry)
         for name, kept in state.stations.items():
             watch = self._watch(name)
-            watch.time_ns, watch.seq = kept.time_ns, kept.seq
+            if kept.time_ns is not None:
+                watch.clock = went_on(kept.time_ns, kept.ahead_ns, now)
+            watch.seq = kept.seq
             watch.verdicts = {pump: PumpVerdicts([last_ns]) for pump, last_ns in kept.last_verdicts_ns.items()}
             watch.has_samples = kept.time_ns is not None
-            watch.gone_s = dict.fromkeys(kept.services, now_s)  # missed until seen
+            watch.gone_s = dict.fromkeys(kept.services, now.steady_s)  # missed until seen
 
     def _watch(self, station: str) -> StationWatch:
         if station not in self.stations:
             now_s = self._now().steady_s
-            self.stations[station] = StationWatch(station, heard_s=now_s, missed_s=now_s, start_s=now_s)
+            self.stations[station] = StationWatch(station, missed_s=now_s, start_s=now_s)
         return self.stations[station]
 
 

@@ -17,11 +17,12 @@ STATE_NAME = "alarms.json"
 
 
 class StationState(BaseModel):
-    """What is kept of one station over a restart."""
+    """What is kept of one station over a restart; `ahead_ns`: how far its clock is ahead of the time of day."""
 
     model_config = ConfigDict(extra="forbid")
 
     time_ns: int | None
+    ahead_ns: int | None = None
     seq: int
     last_verdicts_ns: dict[int, int]
     services: list[str]

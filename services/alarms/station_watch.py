@@ -9,10 +9,10 @@ from wetwell.protocols.messages.gap_watch import GapWatch
 from wetwell.protocols.messages.sample import LevelSample
 from wetwell.protocols.messages.status import Status
 from wetwell.protocols.messages.verdict import Verdict
-from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.record import AlarmRecord
 from wetwell.services.alarms.registry import AlarmRegistry
 from wetwell.services.alarms.rules import VERDICT_RULES, fault_text, rule_of, verdict_advice, verdict_text
+from wetwell.services.alarms.station_clock import Now, StationClock, set_by
 
 KNOWN_VERDICTS = 200
 """Times of verdicts of a pump that are remembered, more than a publisher keeps for late joiners."""
@@ -26,14 +26,6 @@ FOLLOW_SAMPLES = 1_000
 STATION_SERVICES: dict[str, RuleName] = {"detector": "detector_silent"}
 SITE_SERVICES: dict[str, RuleName] = {"gateway": "gateway_silent", "historian": "historian_silent"}
 """Services that are missed, of each station and of the whole site."""
-
-
-@dataclass(frozen=True)
-class Now:
-    """The time of day, for stamps, and a clock that nobody sets, for silence."""
-
-    wall_ns: int
-    steady_s: float
 
 
 @dataclass(frozen=True)
@@ -77,16 +69,15 @@ class PumpVerdicts:
 
 @dataclass
 class StationWatch:
-    """What was last heard of a station: `time_ns` and `seq` of its last sample, and when it and its services came."""
+    """What was last heard of a station: its clock, `seq` of its last sample, and when it and its services came."""
 
     name: str
-    heard_s: float
-    """When the last sample came."""
     missed_s: float
     """Since when its absence counts."""
     start_s: float = 0.0
     """When the daemon began to know it."""
-    time_ns: int | None = None
+    clock: StationClock | None = None
+    """None before the first sample."""
     seq: int = -1
     older: int = 0
     has_samples: bool = False
@@ -97,11 +88,14 @@ class StationWatch:
     verdicts: dict[int, PumpVerdicts] = field(default_factory=dict)
     gone_s: dict[str, float | None] = field(default_factory=dict)
 
+    @property
+    def time_ns(self) -> int | None:
+        """Time of the last sample."""
+        return None if self.clock is None else self.clock.sample_ns
+
     def clock_ns(self, now: Now) -> int:
-        """Time of the station: that of its last sample, running on at the pace of the wall."""
-        if self.time_ns is None:
-            return now.wall_ns
-        return min(self.time_ns + round((now.steady_s - self.heard_s) * NS_PER_S), MAX_STAMP_NS)
+        """Time of the station; the time of day before the first sample."""
+        return now.wall_ns if self.clock is None else self.clock.now_ns(now)
 
     def handle_sample(self, sample: LevelSample, now: Now, registry: AlarmRegistry, limits: Limits) -> bool:
         """Look at a sample; whether it was new."""
@@ -109,8 +103,8 @@ class StationWatch:
             self.older += 1
             if self.older < FOLLOW_SAMPLES:
                 return False
-        self.time_ns, self.seq, self.older = sample.time, sample.seq, 0
-        self.heard_s = self.missed_s = now.steady_s
+        self.clock = set_by(sample.time, now) if self.clock is None else self.clock.after(sample.time, now)
+        self.seq, self.older, self.missed_s = sample.seq, 0, now.steady_s
         self.has_samples = self.is_heard = True
         level_m = sample.level_m
         if level_m is not None and math.isfinite(level_m) and sample.quality != "bad":

@@ -8,7 +8,7 @@ import pytest
 from wetwell.detector.stream.gate import COUNTS
 from wetwell.services.alarms.rules import RULES
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.alarms.tables import TARGETS
 from wetwell.services.runtime.health.metrics import METRICS
 from wetwell.services.runtime.settings import AlarmSettings

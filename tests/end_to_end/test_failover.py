@@ -16,7 +16,7 @@ from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S, from_iso
 from wetwell.services.alarms.client import send_act
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.historian.store.postgres_store import PostgresStore
 from wetwell.services.runtime.settings import AlarmSettings
 from wetwell.services.security.audit_chain import broken_among

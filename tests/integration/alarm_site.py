@@ -9,7 +9,7 @@ from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.timestamps import NS_PER_S, from_iso
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.runtime.settings import AlarmSettings
 
 START_NS = from_iso("2026-01-01T00:00:00Z")

@@ -166,15 +166,16 @@ def is_stepped(site: Site) -> bool:
 def _alarms(site: Site) -> Iterator[str]:
     """An alarm is raised once each time that its condition comes; every pump fault that is told raises one.
 
-    Files of the alarms that were harmed may have it raised again, and so may a clock that was set while a full disk
-    kept nothing of it: nobody knows then that it stands, and since when has another time. A detector that learns
-    anew, or a clock that was set, may have it raised for what has returned, and for what was before that.
+    Files of the alarms that were harmed may have it raised again, and so may a restart of the alarms where a full
+    disk kept nothing of it: nobody knows then that it stands, nor since when. A detector that learns anew, or a clock
+    that was set, may have it raised for what has returned, and for what was before that.
     """
     step_ns = round(len(site.accidents) * CLOCK_STEP_S * NS_PER_S) if is_stepped(site) else 0
     is_harmed = any(harm.name == "alarms" for harm in site.harms)
     harmed_s = [harm.at_s for harm in site.harms if harm.name in {"alarms", "detector"}]
     odd_s = harmed_s + [accident.at_s for accident in site.plan if accident.kind.startswith("clock")]
     full = blocked(site.spans, ["machine"], ["full"])
+    began_s = [span.end_s for span in site.spans if (span.what, span.name) == ("away", "alarms")]
     for (station, name), changes in site.alarms.items():
         said_s = _said_s(site, changes)
         whole = [change for change, at_s in zip(changes, said_s, strict=True) if at_s < min(harmed_s, default=EVER_S)]
@@ -183,7 +184,7 @@ def _alarms(site: Site) -> Iterator[str]:
             yield f"{station}: alarm {name} goes back in time"
         for (before, before_s), (after, after_s) in pairwise(zip(changes, said_s, strict=True)):
             is_kept = all(end_s < before_s or begin_s > after_s for begin_s, end_s in full)
-            is_known = not is_harmed and (is_kept or not is_stepped(site))
+            is_known = not is_harmed and (is_kept or not any(before_s <= at_s <= after_s for at_s in began_s))
             if before.is_active and after.is_active and after.raised != before.raised and is_known:
                 yield f"{station}: alarm {name} is raised twice"
             if not is_raised_anew(before, after):

@@ -12,7 +12,7 @@ from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import MOST_SAMPLES, SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.dashboard.view.site_view import SiteView
 from wetwell.services.detector.follower import Room, Waiting
 from wetwell.services.detector.intake import Intake

@@ -10,7 +10,7 @@ from memory_bus import MemoryBus
 from wetwell.protocols.messages.alarm import AlarmAct
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.detector.checkpoint import checkpoint_in
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.doctor.finding import Finding

@@ -21,7 +21,7 @@ from wetwell.protocols.messages.sample import PumpReading, Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore

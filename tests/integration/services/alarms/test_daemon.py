@@ -19,7 +19,7 @@ from wetwell.protocols.timestamps import MAX_STAMP_NS, NS_PER_S
 from wetwell.services.alarms.client import list_alarms, new_act, report, send_act
 from wetwell.services.alarms.daemon import keep
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.runtime.settings import AlarmSettings
 
 
@@ -286,6 +286,18 @@ def test_a_restart_raises_nothing_again_and_forgets_no_act(tmp_path):
     assert [site.sample(2.5, at_s, seq=at_s + 1) for at_s in range(100)] == [[]] * 100
     assert site.act("acknowledge", id="one") == done
     assert site.verdict("normal", 80) == [("pump2.pump_fault", "normal")]
+
+
+def test_what_comes_after_a_restart_is_raised_at_its_time(tmp_path):
+    site = Site(tmp_path)
+    site.sample(at_s=0)
+    site.service.save()
+    site.wall_s = 3600.0  # the machine had no power, and samples of that hour come late
+    site.start()
+    for at_s in range(1, 5):
+        site.sample(at_s=at_s)
+    assert ("samples_stale", "unacknowledged") in site.look(120)
+    assert site.told[0].raised == START_NS + 3720 * NS_PER_S
 
 
 def test_a_detector_that_does_not_come_back_with_us_is_missed(tmp_path):

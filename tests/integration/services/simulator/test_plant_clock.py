@@ -13,7 +13,7 @@ from wetwell.protocols.messages.plant_clock import PlantClockOrder
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.status import Status
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.dashboard.past.client import plant_clock_order, set_plant_clock
 from wetwell.services.dashboard.refusal import RefusalError
 from wetwell.services.runtime.settings import AlarmSettings, Settings

@@ -10,7 +10,7 @@ from wetwell.protocols.bus.interface import Presence
 from wetwell.protocols.bus.keys import alarm_act_key, alarm_key
 from wetwell.protocols.messages.alarm import Alarm, AlarmAnswer
 from wetwell.services.alarms.service import AlarmService
-from wetwell.services.alarms.station_watch import Now
+from wetwell.services.alarms.station_clock import Now
 from wetwell.services.runtime.settings import AlarmSettings
 
 SCALARS = st.none() | st.booleans() | st.floats() | st.integers(-(10**400), 10**400) | st.text(max_size=8)
