@@ -132,7 +132,10 @@ class Intake:
                 return judged or set()
             pages: deque[set[Stamp]] = deque(maxlen=PAGES_KEPT)
             until_ns = LONGEST_NS if first is None else min(first.time, LONGEST_NS)
-            async for samples in missed_samples(self._bus, judge.station, judge.detector.seen_until_ns, until_ns):
+            since_ns = judge.detector.seen_until_ns
+            if since_ns < last[0] < until_ns:
+                since_ns = last[0]  # it came, though too far ahead to be let through
+            async for samples in missed_samples(self._bus, judge.station, since_ns, until_ns):
                 waits = {stamp_of(one) for one in waiting.samples()}
                 missed = [one for one in samples if stamp_of(one) not in waits]
                 await judge.judge_in_turns(missed)

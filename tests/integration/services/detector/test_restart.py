@@ -182,24 +182,48 @@ def test_of_a_gateway_that_starts_anew_all_is_judged_once_and_in_its_order(
     """Its clock is an hour ahead, and set back after its first sample; of the one before the historian has some."""
     cut, ahead_ns = 1_000, 3_600 * NS_PER_S
     lost = samples[cut : cut + 100]
-    kept = [one.model_copy(update={"seq": number}) for number, one in enumerate(samples[cut + 100 : cut + 200])]
+    kept = numbered_anew(samples[cut + 100 : cut + 200])
     kept[0] = kept[0].model_copy(update={"time": kept[0].time + ahead_ns})
+    known_before = [*samples[:cut], *(lost if known else []), *kept[:known]]
+    given = given_after(alpha, tmp_path, monkeypatch, known_before, samples[:cut] + lost, kept)
+    assert given == [stamp_of(one) for one in (kept[1:] if known else lost + kept)]
+
+
+def test_what_was_dropped_as_too_far_ahead_is_not_judged_once_more(alpha, samples, tmp_path, monkeypatch):
+    """Nor is what a late historian tells only now of the time before that: one that never stopped had none of it."""
+    cut, anew, end = 1_000, 2_000, 2_100
+    ahead = numbered_anew(samples[anew:end])
+    kept = numbered_anew(samples[end : end + 50])
+    historian_has = samples[: cut + 100] + ahead
+    given = given_after(alpha, tmp_path, monkeypatch, [*samples[:cut], *ahead[:3]], historian_has, kept)
+    assert given == [stamp_of(one) for one in ahead[3:] + kept]
+
+
+def numbered_anew(samples: list[Sample]) -> list[Sample]:
+    """As a gateway sends them that has just begun."""
+    return [one.model_copy(update={"seq": number}) for number, one in enumerate(samples)]
+
+
+def given_after(
+    alpha, folder: Path, monkeypatch, known: list[Sample], stored: list[Sample], kept: list[Sample]
+) -> list[tuple[int, int]]:
+    """What a judge that knew some samples is given when it begins: of those stored, and those that the bus keeps."""
     given: list[tuple[int, int]] = []
 
     async def live() -> None:
         with MemoryBus() as bus:
-            store = FolderStore(tmp_path / "history", keep_live_days=1)
+            store = FolderStore(folder / "history", keep_live_days=1)
             historian = Historian(store)
             asyncio.create_task(answer(bus.answer(history_key("*")), historian))  # noqa: RUF006 - ends with the loop
-            for sample in samples[:cut] + lost:
+            for sample in stored:
                 historian.handle("samples", sample.encode())
             send = source(bus, historian, kept, 1)
             for number in range(len(kept)):
                 send(number)
-            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
-            judge.judge([*samples[:cut], *(lost if known else []), *kept[:known]])
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(folder, "alpha"))
+            judge.judge(known)
             judge.keep()
-            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(tmp_path, "alpha"))
+            judge = StationDetector(bus, alpha, checkpoint=checkpoint_in(folder, "alpha"))
             monkeypatch.setattr(judge, "_judge", lambda sample: given.append(stamp_of(sample)))
             intake = Intake(bus, [judge])
             running = asyncio.create_task(intake.run())
@@ -209,7 +233,7 @@ def test_of_a_gateway_that_starts_anew_all_is_judged_once_and_in_its_order(
             store.close()
 
     asyncio.run(live())
-    assert given == [stamp_of(one) for one in (kept[1:] if known else lost + kept)]
+    return given
 
 
 def test_messages_that_wait_share_one_bound_in_bytes():
