@@ -12,7 +12,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
-from wetwell.services.historian.store.live.connection import UNREADABLE, connect, is_for_reading_only
+from wetwell.services.historian.store.live.connection import (
+    UNKNOWN_FORMAT,
+    UNREADABLE,
+    connect,
+    is_for_reading_only,
+    mend_head,
+)
 from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, lost_of, read_end, write_end
 from wetwell.services.historian.store.live.refused_rows import RefusedRows
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
@@ -66,9 +72,9 @@ class LiveFile:
         try:
             self._writer = self._open()
             self.replaced = lost_of(path, self._writer)
-        except sqlite3.OperationalError as error:
-            raise StoreError(f"{path}: {error}") from error
         except UNREADABLE as error:
+            if isinstance(error, sqlite3.OperationalError) and not self._is_damage(error):
+                raise StoreError(f"{path}: {error}") from error
             self._begin_anew(error)
         if self.replaced is not None:
             self.damages += 1
@@ -163,9 +169,11 @@ class LiveFile:
             self.is_damaged = True
 
     def _is_damage(self, error: sqlite3.Error) -> bool:
-        """Whether an error of SQLite says that the file is damaged: one that forbids writing by its head is, too."""
+        """Whether an error of SQLite says that the file is damaged: one whose head forbids to use it is, too."""
         code = getattr(error, "sqlite_errorcode", None)
-        return code in _DAMAGE or (code == sqlite3.SQLITE_READONLY and is_for_reading_only(self._path))
+        if code in _DAMAGE or str(error) == UNKNOWN_FORMAT:
+            return True
+        return code == sqlite3.SQLITE_READONLY and is_for_reading_only(self._path)
 
     def _begin_anew(self, reason: object) -> None:
         """Put the file aside, and begin a new one with what can be read of it and is what was written.
@@ -180,6 +188,7 @@ class LiveFile:
                 aside = _put_aside(self._path)
                 self.ids.clear()
                 self._writer = self._open()
+                mend_head(aside)
                 saved, lost = salvage(aside, self._writer)
                 write_end(self._path, End.of(self._writer))
         except StoreError as error:

@@ -399,6 +399,25 @@ def test_a_head_that_forbids_writing_is_damage_and_costs_no_row(content, tmp_pat
     assert "a new one is begun" in caplog.text
 
 
+@pytest.mark.parametrize("is_open", [False, True])
+@pytest.mark.parametrize("place", [19, 21, 47, 59])
+def test_a_head_that_forbids_reading_is_damage_and_costs_no_row(content, tmp_path, caplog, is_open, place):
+    changed = bytearray(content)
+    changed[place] ^= 0x12  # format for reading, share of a page that a row may take, format of tables, code of texts
+    path = tmp_path / "live.sqlite"
+    path.write_bytes(content if is_open else changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        if is_open:
+            path.write_bytes(changed)
+            with pytest.raises(StoreError):
+                store.file.check()
+        store.write(batch("alpha", TIMES, TIMES + 1))
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(TIMES + 1))
+        assert store.samples("beta", 0, 2**62).seq.tolist() == list(range(TIMES))
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+    assert "a new one is begun" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("word", "broken", "part"),
     [
