@@ -48,14 +48,18 @@ _TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} 
 _INSERT_SAMPLE = (
     "INSERT INTO sample VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET quality = excluded.quality, "
     "data = excluded.data, size = excluded.size, last_ns = excluded.last_ns, crc = excluded.crc "
-    "WHERE NOT is_intact(station, time_ns, seq, quality, size, data, last_ns, crc)"
+    "WHERE CASE WHEN 'text' IN (typeof(quality), typeof(size), typeof(data), typeof(last_ns), typeof(crc)) THEN TRUE "
+    "ELSE NOT is_intact(station, time_ns, seq, quality, size, data, last_ns, crc) END"
 )
 _INSERT_EVENT = (
     "INSERT INTO event (kind, station, time_ns, digest, payload, crc) VALUES (?, ?, ?, ?, ?, ?) "
     "ON CONFLICT (kind, station, time_ns, digest) DO UPDATE SET payload = excluded.payload, crc = excluded.crc "
     "WHERE payload != excluded.payload OR crc != excluded.crc"
 )
-"""What comes again changes nothing, unless it was damaged meanwhile."""
+"""What comes again changes nothing, unless it was damaged meanwhile.
+
+No column of a sample is a text. What a disk has made one may be no UTF-8, which SQLite cannot give to `is_intact`.
+"""
 
 _PACKED = "time_ns, seq, size, quality, data, station, last_ns, crc, (SELECT id FROM station WHERE name = :station)"
 """A `PackedSamples`, and by what it is checked: a page that stands in the place of another has rows of elsewhere."""

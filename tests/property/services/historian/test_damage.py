@@ -171,6 +171,17 @@ def test_what_comes_again_takes_the_place_of_what_was_damaged(content, tmp_path,
         assert store.events("verdicts", "alpha", 0, 2**62, 10_000) == told
 
 
+@pytest.mark.parametrize("column", ["quality", "data", "size", "last_ns", "crc"])
+def test_what_comes_again_takes_the_place_of_a_row_that_became_a_text_that_is_no_utf8(content, tmp_path, column):
+    (tmp_path / "live.sqlite").write_bytes(content)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        change = f"UPDATE sample SET {column} = CAST(x'FF00' AS TEXT) WHERE time_ns = ?"  # noqa: S608 - of above
+        store.file._writer.execute(change, (sample("alpha", 1_234).time,))
+        for station in STATIONS:
+            store.write(batch(station, 0, TIMES))
+            assert store.samples(station, 0, 2**62).seq.tolist() == list(range(TIMES))
+
+
 def test_what_is_damaged_is_put_aside_by_the_next_writing(content, tmp_path):
     changed = bytearray(content)
     for place in (payload("alpha", 1_230), pack("alpha", sample("alpha", 1_234)).data):
