@@ -148,6 +148,8 @@ def held_each_second(moves: Moves, quantum: float) -> Held | None:
     if soon.size < MIN_MOVES:
         return Held(deadband=float(np.quantile(moves.all, SMALL)), within=IN_RAMPS)
     deadband = float(np.quantile(soon, FEW))
+    if deadband <= least:
+        return None
     low, high = SEEN_SHARES if moves.is_soon_calm.sum() >= MIN_MOVES else IN_RAMPS
     rounding = quantum / deadband
     within = (low * (1.0 - rounding), high * (1.0 + rounding))
