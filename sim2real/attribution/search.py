@@ -45,6 +45,17 @@ class Search:
         self._tried_exchanged: set[frozenset[str]] = set()
 
     def run(self) -> None:
+        """Look for sets until the most probable one stays so where the recording is likeliest.
+
+        What stands first by its fit may not do so once near sets are settled; then its neighbours are tried, too.
+        """
+        best: tuple[str, ...] | None = None
+        while best != self._hypotheses.weighed[0].effects:
+            self._look()
+            best = self._hypotheses.weighed[0].effects
+            self._hypotheses.settle()
+
+    def _look(self) -> None:
         """Try one more effect beside the most probable set, and of each size beside the likeliest and the closest.
 
         What is far off is poor under each set, however far: the likeliest part of a set may be none of the right one.

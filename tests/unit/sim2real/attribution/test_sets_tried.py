@@ -8,7 +8,8 @@ from wetwell.sim2real.attribution.search import MOST_EXTENDED, Search
 class Given:
     """Effects are letters; how probable each set of them is stands in a table."""
 
-    def __init__(self, logs, losses, masked, apart, alike):
+    def __init__(self, logs, losses, masked, apart, alike, settled):
+        self._settled = settled
         self._logs, self._known, self.tried = logs, {names for names in logs if len(names) == 1}, []
         self._losses, self._masked, self.tried_anew = losses, masked, []
         self._apart, self.paired = apart, []
@@ -57,6 +58,9 @@ class Given:
     def add(self, fits):
         self._known |= {fit.names for fit in fits if fit.names in self._logs}
 
+    def settle(self):
+        self._logs |= {names: log for names, log in self._settled.items() if names in self._known}
+
     @property
     def weighed(self):
         return [self._hypotheses[names] for names in sorted(self._known, key=lambda names: -self._logs[names])]
@@ -68,9 +72,11 @@ def made(names):
     return SimpleNamespace(names=tuple(sorted(names)))
 
 
-def searched(logs, losses=(), masked="", apart="", alike=()):
-    tables = ({tuple(sorted(names)): one for names, one in dict(its).items()} for its in (logs, losses))
-    given = Given(*tables, masked, apart, alike)
+def searched(logs, losses=(), masked="", apart="", alike=(), settled=()):
+    logs, losses, settled = (
+        {tuple(sorted(names)): one for names, one in dict(its).items()} for its in (logs, losses, settled)
+    )
+    given = Given(logs, losses, masked, apart, alike, settled)
     return given, Search(given, given, given)
 
 
@@ -165,3 +171,11 @@ def test_an_effect_is_exchanged_for_one_that_does_the_like_though_nothing_promis
     search.run()
     assert given.weighed[0].fit.names == ("a", "h")
     assert given.exchanges == [("a", "b"), ("a", "h")], "once for each set that was the best"
+
+
+def test_what_stands_first_once_near_sets_are_settled_is_extended_too():
+    """A friction stood behind another set until it was settled, and the lift beside its companion was never tried."""
+    logs = {"a": 9.0, "b": 1.0, "c": 0.9, "d": 8.0, "de": 8.9, "def": 8.8, "deg": 20.0}
+    given, search = searched(logs, masked="g", alike={"f": "g"}, settled={"a": 5.0, "def": 9.5})
+    search.run()
+    assert given.weighed[0].fit.names == ("d", "e", "g")
