@@ -68,6 +68,8 @@ class Attribution:
         Sets that may be the truth, as they were fitted.
     not_tested : tuple of NotTested
         Candidates that the recording cannot show.
+    beside : (bins,) array
+        Residuals beside the companions of the likeliest way in which something unknown acts.
     falls : Falls or None
         Of the level at rest.
     """
@@ -84,6 +86,7 @@ class Attribution:
     posterior: tuple[SetProbability, ...]
     unknown: tuple[UnknownShare, ...]
     possible: tuple[PossibleSet, ...]
+    beside: Floats
     not_tested: tuple[NotTested, ...] = ()
     falls: Falls | None = None
 
@@ -160,6 +163,7 @@ def attribute(
     else:
         told, accepted, own, own_ends, ends = (), None, None, np.zeros((0, 2)), np.zeros((0, 2))
     posterior = shared(posterior, hypotheses.alike)
+    unknown = unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed)
     progress(1.0)
     if accepted is not None and accepted is not own:
         ends = intervals_of(fitter, accepted, residuals.bins, priors)
@@ -174,8 +178,9 @@ def attribute(
         training=training,
         validation=validation,
         posterior=posterior,
-        unknown=unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed),
+        unknown=unknown,
         possible=possible_sets(hypotheses, posterior),
+        beside=hypotheses.companions(max(unknown, key=lambda way: way.share).acting).residuals,
         not_tested=not_tested,
         falls=falls,
     )

@@ -237,6 +237,11 @@ class Hypotheses:
         """The hypothesis of some effects."""
         return self._best[tuple(sorted(effects))]
 
+    def companions(self, effects: Sequence[str]) -> Fit:
+        """What acts in the hypothesis of some effects and is too small to be told, without those that are told."""
+        one = self._best.get(tuple(sorted(effects)), self._none)
+        return self._fitter.only(one.fit, set(one.effects) - set(one.told)) or self._none.fit
+
     def telling(self, effects: Sequence[str]) -> Hypothesis:
         """The likeliest hypothesis that tells some effects, perhaps beside a companion."""
         return next(one for one in self.weighed if one.told == tuple(sorted(effects)))

@@ -210,7 +210,8 @@ def diagnose(
     fall_m = 0.0 if found.falls is None else found.falls.far_m
     if fall_m > 0.0:
         patterns |= {"level_m": "level_sensor"}
-    pattern = localise(excess, found.plain, bins, plain.plant, patterns)
+    beside = np.where(found.validation, found.beside**2 - bins.floor, 0.0)
+    pattern = localise(beside, found.beside, bins, plain.plant, patterns)
     by_component = component_probability(found.posterior, found.unknown, pattern)
     unknown_at = place_of_unknown(found.unknown, pattern)
     blamed = unknown_at if found.accepted is None else found.accepted.candidates[0].component

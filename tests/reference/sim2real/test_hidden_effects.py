@@ -69,3 +69,14 @@ def test_foam_is_something_unknown_at_the_level_sensor(seed):
     assert told.verdict == "unknown"
     assert told.where[0].component == "level_sensor"
     assert any("while no pump runs" in remark for remark in told.remarks)
+
+
+def test_something_unknown_is_placed_by_what_the_inertia_of_the_water_leaves():
+    """Each main has some: it moves more of the readings than the coarse steps of the level do, and is too small."""
+    case = TrialCase(
+        seed=11498, number=0, kind="leave_one_out", plant="elastic", names=("level_quantisation",), seconds=SECONDS
+    )
+    _, truth, recording = material_case(case)
+    told = diagnose(recording, truth.station, without=case.without)
+    assert told.verdict == "unknown"
+    assert told.where[0].component == "level_sensor"
