@@ -34,7 +34,8 @@ OF_CHANNEL: dict[AnalogueQuantity, tuple[int, ...]] = {
 def is_late(by_signal: Floats, excess: Floats, residuals: Floats, bins: Bins) -> bool:
     """Whether one channel departs where it moves: it comes late, or its clock runs away, or is set at times.
 
-    What is late is too low at starts and too high at stops. A flow meter follows slowly or cuts off, but alike in
+    What is late is too low at starts and too high at stops; where a head tells nothing of stops, it is too low at
+    starts, and ever more. A flow meter follows slowly or cuts off, but alike in
     each start. How far a level is off goes by the inflow, which has one side grow while the other shrinks.
 
     Parameters
@@ -56,11 +57,24 @@ def is_late(by_signal: Floats, excess: Floats, residuals: Floats, bins: Bins) ->
                 return False
             if signal == FLOW:
                 return _wanders_slowly(_of_events(residuals, bins, rows & is_start))
+            if not (rows & is_stop).any():
+                return _grows(-_of_events(residuals, bins, rows & is_start))
             return mean_of(residuals, rows & is_start) < 0.0 < mean_of(residuals, rows & is_stop)
     if by_signal[list(OF_CHANNEL["level_m"])].sum() > ALONE * by_signal.sum():
         starts, stops = (_of_events(residuals, bins, bins.signal == one) for one in (START_LEVEL, STOP_LEVEL))
-        return _grows(-starts) and _grows(stops)
+        return (_grows(-starts) and _grows(stops)) or _is_behind(excess, residuals, bins)
     return False
+
+
+def _is_behind(excess: Floats, residuals: Floats, bins: Bins) -> bool:
+    """Whether a level reads too low where pumps start and too high where they stop, and leaves its course there.
+
+    All by more than noise: another area or a slow sensor moves no start, and another start level no level.
+    """
+    starts, stops, level = (bins.signal == one for one in (START_LEVEL, STOP_LEVEL, LEVEL))
+    parts = starts, stops, level & (bins.regime == START_RAMP), level & (bins.regime == STOP_RAMP)
+    is_off = all(mean_of(excess, rows) > 1.0 for rows in parts)
+    return is_off and mean_of(residuals, starts) < 0.0 < mean_of(residuals, stops)
 
 
 def _of_events(residuals: Floats, bins: Bins, rows: Flags) -> Floats:

@@ -122,6 +122,33 @@ def test_a_level_that_is_ever_later_is_too_low_at_starts_and_too_high_at_stops(a
     assert blamed(size * turn, bins, alpha) == component
 
 
+@pytest.mark.parametrize(("growth", "component"), [(1.0, "telemetry"), (0.0, "head_sensor")])
+def test_a_head_that_tells_nothing_of_stops_is_ever_later(alpha, growth, component):
+    """Where the flow ends with the pump, its head counts at starts alone."""
+    bins = bins_of([FLOW, HEAD], START_RAMP)
+    turn = bins.second / bins.second.max()
+    late = np.where(bins.signal == HEAD, -10.0 * (growth * turn + (1.0 - growth)), 0.0)
+    assert blamed(late, bins, alpha) == component
+
+
+@pytest.mark.parametrize(
+    ("at_starts", "in_ramps", "component"),
+    [
+        pytest.param(-5.0, 5.0, "telemetry", id="it comes late"),
+        pytest.param(0.0, 5.0, "level_sensor", id="its sensor follows slowly, and the controller goes by that"),
+        pytest.param(-5.0, 0.0, "controller", id="pumps start and stop at other levels"),
+    ],
+)
+def test_a_level_that_is_late_as_it_may_is_too_low_where_pumps_start(alpha, at_starts, in_ramps, component):
+    bins = bins_of([LEVEL, START_LEVEL, STOP_LEVEL], STEADY)
+    place, is_level = np.arange(bins.size) % BINS_PER_RUN, bins.signal == LEVEL
+    regime = np.select([is_level & (place < 5), is_level & (place >= 15)], [START_RAMP, STOP_RAMP], STEADY)
+    bins = replace(bins, regime=regime)
+    turn = np.random.default_rng(7).uniform(0.5, 1.5, bins.size)  # a clock that is set at times
+    size = np.select([bins.signal == START_LEVEL, bins.signal == STOP_LEVEL], [at_starts, -at_starts], in_ramps)
+    assert blamed(turn * np.where(is_level & (regime == STEADY), 0.0, size), bins, alpha) == component
+
+
 @pytest.mark.parametrize(("lasting", "component"), [(True, "sump"), (False, "level_sensor")])
 def test_a_level_that_wanders_is_its_sensor_and_a_balance_that_stays_open_the_sump(alpha, lasting, component):
     bins = bins_of([LEVEL], STEADY)
