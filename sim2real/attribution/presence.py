@@ -16,6 +16,9 @@ SURE = 0.95
 """Probability with which the recording must be likelier with an effect than without it."""
 GONE_ON = 3
 """Steps that others may take to do an effect's work: slopes do not hold for all of the way."""
+PART_LEFT = 0.25
+"""Share of the square of an effect's work that slopes may leave where the simulator is asked for what is left: all
+others are spared the time that it takes."""
 
 
 def are_needed(found: Evidence, strengths: Sequence[int]) -> Flags:
@@ -102,10 +105,11 @@ def could_others(
     left_of : callable
         What the simulator leaves without the effect, the others at a position; None where they cannot be there.
     """
-    left = signature
+    left, most = signature, PART_LEFT * float(np.sum((signature / allowed) ** 2))
     for _ in range(GONE_ON):
         change = _instead(left, others, allowed, (-position, 1.0 - position))
-        if not is_within(left + others @ change):
+        promised = left + others @ change
+        if not is_within(promised) and np.sum((promised / allowed) ** 2) > most:
             return False
         position = np.clip(position + change, 0.0, 1.0)
         replayed = left_of(position)

@@ -70,6 +70,21 @@ def test_the_simulator_says_whether_others_could_do_an_effects_work(power, could
     assert all(0.0 <= one <= 1.0 for one in seen)
 
 
+@pytest.mark.parametrize(("bend", "could"), [(0.4, True), (0.8, False)])
+def test_slopes_that_leave_a_good_part_of_the_work_are_followed_on(bend, could):
+    """A lift does the work of a lift at another level, but not along one straight line."""
+    allowed, form = np.full(4, 0.1), np.array([1.0, 1.0, -1.0, -1.0])
+    slopes = -10.0 * (form + bend * np.array([1.0, -1.0, 1.0, -1.0]))[:, None]
+
+    def is_within(left):
+        return bool(np.all(np.abs(left) <= allowed))
+
+    assert (
+        could_others(3.0 * form, slopes, np.zeros(1), allowed, is_within, lambda at: 3.0 * form * (at[0] < 0.2))
+        == could
+    )
+
+
 def test_others_that_cannot_be_there_do_no_work():
     form = np.ones(5)
     assert not could_others(form, -form[:, None], np.zeros(1), form, lambda left: not left.any(), lambda _: None)
