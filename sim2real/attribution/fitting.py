@@ -4,6 +4,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import lsq_linear
 
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import STRENGTHS, Candidate
@@ -15,9 +17,14 @@ from wetwell.simulator.effects.effect import Effect
 SLOPE_STEP = 1e-3
 """Of the differences that make the slopes, as a share of a parameter's range."""
 ROUNDS = 12
+KEPT = 0.01
+"""Share of what its slopes promise by which a step has to lead down; else a shorter one is tried. [1]"""
+LEAST_DAMPING = 1e-6
+"""Of a step, so that two parameters that do the same have one. [1]"""
 DAMPINGS = 5
-"""Steps of a round, each damped more, of which one has to lead down."""
-LONGEST_STEP = 0.3
+"""Steps of a round, each damped more and shorter, of which one has to lead down."""
+LONGEST_STEP, SHORTER = 0.3, 0.5
+"""Of a parameter over its range, the longest step of a round, and each further one over the last. [1]"""
 SETTLED = 1e-3
 MOST_AWAY = 2
 """Points of a grid, one after the other, that lead away, after which it is left."""
@@ -176,15 +183,21 @@ class Fitter:
     def _moved(
         self, fit: Fit, gradient: Floats, squares: Floats, is_free: Flags, damping: float
     ) -> tuple[Fit | None, float]:
-        """First of some steps, each damped more, that leads down, and the damping of the next round."""
-        inner = squares[np.ix_(is_free, is_free)]
-        for _ in range(DAMPINGS):
+        """First of some steps, each damped more and shorter, that leads down, and the damping of the next round.
+
+        No parameter goes further than a step is long, nor out of its range, and the others make the best of that.
+        """
+        inner, x = squares[np.ix_(is_free, is_free)], fit.position
+        for place in range(DAMPINGS):
+            root = np.linalg.cholesky(inner + damping * np.diag(np.diag(inner)))
+            longest = LONGEST_STEP * SHORTER**place
+            room = np.maximum(-x, -longest)[is_free], np.minimum(1.0 - x, longest)[is_free]
             step = np.zeros(is_free.size)
-            step[is_free] = -np.linalg.solve(inner + damping * np.diag(np.diag(inner)), gradient[is_free])
-            position = np.clip(fit.position + np.clip(step, -LONGEST_STEP, LONGEST_STEP), 0.0, 1.0)
-            tried = self.at(fit.candidates, fit.split(position))
-            if self.cost(tried) < self.cost(fit):
-                return tried, damping / 6.0
+            step[is_free] = lsq_linear(root.T, -solve_triangular(root, gradient[is_free], lower=True), room).x
+            promised = -float(2.0 * gradient @ step + step @ squares @ step)
+            tried = self.at(fit.candidates, fit.split(np.clip(x + step, 0.0, 1.0)))
+            if self.cost(fit) - self.cost(tried) > max(KEPT * promised, 0.0):
+                return tried, max(damping / 6.0, LEAST_DAMPING)
             damping *= 6.0
         return None, damping
 

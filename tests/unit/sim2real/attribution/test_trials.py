@@ -62,6 +62,22 @@ def recorded(station, truth):
     return traces_of(plant.advance(28_800), station)
 
 
+@pytest.mark.parametrize("start", [(0.1, 0.1, 0.1), (0.2, 0.4, 0.6), (0.5, 0.4, 0.1)])
+@pytest.mark.parametrize("truth", [(0.72, 0.4, 0.9), (0.9, 0.5, 1.1), (0.6, 0.3, 0.8)])
+def test_a_fit_ends_at_the_truth_from_afar(alpha, truth, start):
+    """One of three parameters shows next to nothing: a step that is long in it must not hold the others back."""
+    load = of_all(alpha, "load_dependent_power")
+    names = ("share", "shutoff_share", "rated_factor")
+    acting = EFFECTS["load_dependent_power"].model_validate(dict(zip(names, truth, strict=True)))
+    fitter = searched(recorded(alpha, [acting]), alpha, [load]).fitter
+    at_truth, begun = (fitter.at([load], [np.array(one)]) for one in (_places(load, truth), start))
+    assert fitter.cost(fitter.refine(begun)) < 1.01 * fitter.cost(at_truth) < 0.1 * fitter.cost(begun)
+
+
+def _places(candidate, values):
+    return [free.normalised(value) for free, value in zip(candidate.free, values, strict=True)]
+
+
 def test_a_set_is_weighed_without_what_it_does_not_need(alpha):
     """A search that took an effect first that another one does better later has tried no set without it."""
     names = ("static_head_bias", "flow_meter_gain", "friction_bias")
