@@ -142,7 +142,8 @@ def attribute(
     log_share = partial(priors.log_share, tested=[fit.names[0] for fit in singles])
 
     def weighed() -> tuple[SetProbability, ...]:
-        return posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
+        found = posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
+        return shared(found, hypotheses.alike)
 
     def ends_of(one: Hypothesis) -> Floats:
         return sharpened(one.fit, intervals_of(fitter, one.fit, residuals.bins), one.evidence)
@@ -162,7 +163,6 @@ def attribute(
         hypotheses.rule_out(told)
     else:
         told, accepted, own, own_ends, ends = (), None, None, np.zeros((0, 2)), np.zeros((0, 2))
-    posterior = shared(posterior, hypotheses.alike)
     unknown = unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed)
     progress(1.0)
     if accepted is not None and accepted is not own:

@@ -193,12 +193,12 @@ def shared(
     posterior: Sequence[SetProbability],
     alike: Callable[[tuple[str, ...], Sequence[tuple[str, ...]]], Sequence[tuple[str, ...]]],
 ) -> tuple[SetProbability, ...]:
-    r"""Probabilities once sets that nothing parts share theirs evenly, best first.
+    r"""Probabilities once sets that nothing parts share theirs as they were probable before anything was seen.
 
-    $$P'(S) = \frac{P(S)}{1 + |A(S)|} + \sum_{S' \in A(S)} \frac{P(S')}{1 + |A(S')|}$$
+    $$P'(S) = \sum_{S' \in \{S\} \cup A(S)} P(S') \frac{q^{|S|}}{\sum_{S'' \in \{S'\} \cup A(S')} q^{|S''|}}$$
 
-    with the sets A(S) that are alike S. Sets beyond `CREDIBLE` of the probability of all keep what they have: it is
-    next to nothing. Of equal ones the likelier comes first.
+    with the sets A(S) that are alike S and the price q of a further effect, best first. Sets beyond `CREDIBLE` of the
+    probability of all keep what they have: it is next to nothing. Of equal ones the likelier comes first.
 
     Parameters
     ----------
@@ -210,10 +210,10 @@ def shared(
     found = {one.effects: one.probability for one in posterior if one.verdict == "effect"}
     for one in credible(_sets_of(posterior)):
         others = alike(one.effects, [effects for effects in found if effects != one.effects])
-        share = one.probability / (1.0 + len(others))
-        for effects in others:
-            found[effects] += share
-            found[one.effects] -= share
+        priors = {effects: FURTHER_PRIOR ** len(effects) for effects in (one.effects, *others)}
+        found[one.effects] -= one.probability
+        for effects, prior in priors.items():
+            found[effects] += one.probability * prior / sum(priors.values())
     changed = [replace(one, probability=found[one.effects]) if one.verdict == "effect" else one for one in posterior]
     return tuple(sorted(changed, key=lambda one: -round(one.probability, DECIMALS)))
 

@@ -5,6 +5,7 @@ import pytest
 
 from wetwell.sim2real.likelihood.posterior import (
     CREDIBLE,
+    FURTHER_PRIOR,
     UnnamedWeight,
     Weight,
     best_set,
@@ -126,6 +127,19 @@ def test_what_differs_by_nothing_that_matters_is_equivalent_however_clear_the_li
     assert [told[lift], told[friction]] == pytest.approx([0.5 * before[lift]] * 2, rel=1e-6)
     assert best_set(after) == lift, "which is the likelier of two that share"
     assert told[wear] == before[wear]
+
+
+def test_of_sets_that_are_alike_the_one_of_fewer_effects_is_more_probable():
+    """A slip does what wear and a power that follows the load do together: nothing but the price parts them."""
+    slip, both = ("motor_slip",), ("load_dependent_power", "pump_wear")
+    posterior = posterior_of([NONE, weight(*slip, log=900.0), weight(*both, log=940.0)], 25)
+    assert best_set(posterior) == both
+    after = shared(posterior, only((slip, both)))
+    told = {one.effects: one.probability for one in after}
+    assert best_set(after) == slip
+    assert told[both] == pytest.approx(FURTHER_PRIOR * told[slip])
+    assert sum(one.probability for one in after) == pytest.approx(1.0)
+    assert best_set(shared(posterior, only())) == both
 
 
 def test_all_of_many_that_are_alike_are_equivalent():
