@@ -88,6 +88,7 @@ EFFECTS = {
     "level_sensor_lag": "lag_s = 10.0",
     "load_dependent_power": "share = 1.0",
     "motor_slip": "slip = 0.04",
+    "power_meter_gain": "factor = 0.9",
     "pump_wear": "head_loss = 0.1\npump = 2",
     "ragging": "speed_loss = 0.1\npump = 1",
     "ramp_shape": "power = 2.0\nlag_s = 3.0",

@@ -15,6 +15,7 @@ EFFECT_OF_A_CONSTANT: dict[Term, str] = {
     "speed": "motor_slip",
     "flow_reading": "flow_meter_gain",
     "head_reading": "head_sensor_offset",
+    "power": "power_meter_gain",
     "level_balance": "unmetered_inflow",
 }
 """Effect of the library that a constant correction of a term is."""

@@ -90,6 +90,7 @@ def _effects(sizes: _Sizes) -> tuple[Cause, ...]:
         "flow_meter_gain": [{"factor": 1.0 + part}],
         "head_sensor_offset": [{"offset_m": sizes.lost_m}],
         "load_dependent_power": _powers(sizes),
+        "power_meter_gain": [{"factor": 1.0 + part}],
         "sump_area_profile": [
             {"bottom_factor": 1.0 - 2.0 * part, "height_m": sizes.high_m},
             {"bottom_factor": 1.0, "top_factor": 1.0 + 2.0 * part, "height_m": sizes.low_m},

@@ -149,6 +149,10 @@ def _flow_meter_gain(truth: Truth, p: Mapping[str, Any]) -> None:
     truth.telemetry.of("flow_m3h").gain = p["factor"]
 
 
+def _power_meter_gain(truth: Truth, p: Mapping[str, Any]) -> None:
+    truth.telemetry.of("power_kw").gain = p["factor"]
+
+
 def _flow_meter_lag(truth: Truth, p: Mapping[str, Any]) -> None:
     truth.change(flow_lag_s=p["lag_s"])
 
@@ -343,6 +347,12 @@ LIBRARY_KINDS: dict[str, Kind] = {
         ("flow_m3h",),
         lambda d: {"factor": d.either(d.between(1.03, 1.15), d.between(0.85, 0.97))},
         _flow_meter_gain,
+    ),
+    "power_meter_gain": Kind(
+        "power_meter",
+        ("power_kw",),
+        lambda d: {"factor": d.either(d.between(1.03, 1.2), d.between(0.8, 0.97))},
+        _power_meter_gain,
     ),
     "flow_meter_lag": Kind("flow_meter", ("flow_m3h",), lambda d: {"lag_s": d.over(3.0, 20.0)}, _flow_meter_lag),
     "flow_low_cutoff": Kind(

@@ -30,6 +30,7 @@ SWMM_LIBRARY = (
     "flow_meter_gain",
     "flow_meter_lag",
     "head_sensor_offset",
+    "power_meter_gain",
     "channel_delay",
     "report_by_exception",
 )

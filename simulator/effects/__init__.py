@@ -32,6 +32,7 @@ from wetwell.simulator.effects.telemetry.flow_meter_lag import FlowMeterLag
 from wetwell.simulator.effects.telemetry.head_sensor_offset import HeadSensorOffset
 from wetwell.simulator.effects.telemetry.level_quantisation import LevelQuantisation
 from wetwell.simulator.effects.telemetry.level_sensor_lag import LevelSensorLag
+from wetwell.simulator.effects.telemetry.power_meter_gain import PowerMeterGain
 from wetwell.simulator.effects.telemetry.report_by_exception import ReportByException
 from wetwell.simulator.effects.wet_well.sump_area_profile import SumpAreaProfile
 from wetwell.simulator.effects.wet_well.unmetered_inflow import UnmeteredInflow
@@ -54,6 +55,7 @@ AnyEffect = Annotated[
     | LevelSensorLag
     | LoadDependentPower
     | MotorSlip
+    | PowerMeterGain
     | PumpWear
     | Ragging
     | RampShape

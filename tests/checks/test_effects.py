@@ -31,6 +31,7 @@ EXPECTED = {
     "level_sensor": {"level_sensor_lag", "level_quantisation"},
     "flow_meter": {"flow_meter_gain", "flow_meter_lag", "flow_low_cutoff"},
     "head_sensor": {"head_sensor_offset"},
+    "power_meter": {"power_meter_gain"},
     "telemetry": {"channel_delay", "report_by_exception"},
     "station": {"learnt_correction"},
 }

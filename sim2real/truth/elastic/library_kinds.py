@@ -155,6 +155,11 @@ def _flow_meter_gain(truth: ElasticTruth, p: Given) -> None:
     truth.instruments.of("flow_m3h").factor = p["factor"]
 
 
+def _power_meter_gain(truth: ElasticTruth, p: Given) -> None:
+    """Current transformers of another ratio than in the transducer."""
+    truth.instruments.of("power_kw").factor = p["factor"]
+
+
 def _flow_meter_lag(truth: ElasticTruth, p: Given) -> None:
     """Two filters in a row."""
     truth.change(flow_filter_s=p["filter_s"])
@@ -343,6 +348,12 @@ LIBRARY_FORMS: dict[str, ElasticKind] = {
         ("flow_m3h",),
         lambda d: {"factor": digits(1.0 + d.sign() * d.size(0.03, 0.15))},
         _flow_meter_gain,
+    ),
+    "power_meter_gain": ElasticKind(
+        "power_meter",
+        ("power_kw",),
+        lambda d: {"factor": digits(1.0 + d.sign() * d.size(0.03, 0.2))},
+        _power_meter_gain,
     ),
     "flow_meter_lag": ElasticKind(
         "flow_meter", ("flow_m3h",), lambda d: {"filter_s": d.size(3.0, 20.0)}, _flow_meter_lag

@@ -571,6 +571,13 @@ def test_flow_meter_gain(quiet_alpha):
         np.testing.assert_array_equal(rows[column], plain[column])
 
 
+def test_power_meter_gain(quiet_alpha):
+    rows, plain = run(quiet_alpha, {"name": "power_meter_gain", "factor": 0.88}), run(quiet_alpha)
+    np.testing.assert_allclose(rows["pump1_power_kw"], 0.88 * plain["pump1_power_kw"], rtol=1e-12)
+    for column in ("level_m", "inflow_m3h", "pump1_flow_m3h", "pump1_head_m", "truth_pump1_power_kw"):
+        np.testing.assert_array_equal(rows[column], plain[column])
+
+
 def test_flow_meter_lag(quiet_alpha):
     """Against the ODE under the true flow, which moves evenly over each second."""
     lag_s = 8.0

@@ -261,7 +261,8 @@ def test_how_a_case_is_stored_is_its_own_and_the_same_in_all_attempts():
 
 def test_a_slow_trial_is_sealed_published_and_told_by_rate(tmp_path, monkeypatch):
     storage = StoragePlan(rates_s=(10, 60), values=("mean",), absent=("head_m",))
-    plan, result = run_fake("perfect", tmp_path, monkeypatch, seed=4, storage=storage, seconds=7200)
+    shown = ("friction_bias", "flow_meter_gain", "threshold_shift", "pump_wear")
+    plan, result = run_fake("perfect", tmp_path, monkeypatch, seed=4, storage=storage, seconds=7200, effects=shown)
     assert list(result["splits"]["rate"]) == ["10 s mean", "60 s mean"]
     for name in ("rate", "inflow", "noise"):
         groups = result["splits"][name].values()

@@ -417,6 +417,7 @@ export default {
   "control delay": "verzögerte Steuerung",
   "flow low cutoff": "Schleichmengenabschaltung",
   "flow meter gain": "Faktor des Durchflussmessers",
+  "power meter gain": "Faktor des Leistungsmessers",
   "flow meter lag": "Trägheit des Durchflussmessers",
   "friction bias": "Reibung anders als angegeben",
   "head sensor offset": "Nullpunkt des Drucksensors",
