@@ -142,14 +142,13 @@ def attribute(
     log_share = partial(priors.log_share, tested=[fit.names[0] for fit in singles])
 
     def weighed() -> tuple[SetProbability, ...]:
-        found = posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
-        return shared(found, hypotheses.alike)
+        return posterior_of(hypotheses.weights(), len(singles), log_share, unnamed)
 
     def ends_of(one: Hypothesis) -> Floats:
         return sharpened(one.fit, intervals_of(fitter, one.fit, residuals.bins), one.evidence)
 
     while verdict_of(posterior := weighed()) == "effect":
-        told = best_set(posterior)
+        told = best_set(posterior, hypotheses.alike)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
         fit = completed(fitter, likely.fit, tested)
         whole = likely if fit is likely.fit else hypotheses.weigh(fit)
@@ -163,6 +162,7 @@ def attribute(
         hypotheses.rule_out(told)
     else:
         told, accepted, own, own_ends, ends = (), None, None, np.zeros((0, 2)), np.zeros((0, 2))
+    posterior = shared(posterior, hypotheses.alike)
     unknown = unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed)
     progress(1.0)
     if accepted is not None and accepted is not own:

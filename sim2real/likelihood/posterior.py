@@ -10,6 +10,8 @@ from scipy.special import expit, logsumexp, softmax
 from wetwell.simulator.effects.effect import Component
 
 Verdict = Literal["effect", "none", "unknown"]
+Alike = Callable[[tuple[str, ...], Sequence[tuple[str, ...]]], Sequence[tuple[str, ...]]]
+"""Those of some sets, in their order, that nothing parts from a set."""
 
 UNKNOWN_PRIOR = 1.0 / 3.0
 """Probability that something acts that the library does not hold: as likely as none, and as effects. [1]"""
@@ -189,10 +191,7 @@ def _logs_of_unknown(
     return [_log_prior(acting, library, log_share) + float(log) for acting, log in ways]
 
 
-def shared(
-    posterior: Sequence[SetProbability],
-    alike: Callable[[tuple[str, ...], Sequence[tuple[str, ...]]], Sequence[tuple[str, ...]]],
-) -> tuple[SetProbability, ...]:
+def shared(posterior: Sequence[SetProbability], alike: Alike) -> tuple[SetProbability, ...]:
     r"""Probabilities once sets that nothing parts share theirs as they were probable before anything was seen.
 
     $$P'(S) = \sum_{S' \in \{S\} \cup A(S)} P(S') \frac{q^{|S|}}{\sum_{S'' \in \{S'\} \cup A(S')} q^{|S''|}}$$
@@ -247,9 +246,13 @@ def verdict_of(posterior: Sequence[SetProbability]) -> Verdict:
     return max(totals, key=lambda verdict: totals[verdict])
 
 
-def best_set(posterior: Sequence[SetProbability]) -> tuple[str, ...]:
-    """The most probable set of effects; empty without any."""
-    return next((one.effects for one in posterior if one.verdict == "effect"), ())
+def best_set(posterior: Sequence[SetProbability], alike: Alike = lambda *_: ()) -> tuple[str, ...]:
+    """Of the most probable set and those that are alike it the one of fewest effects; empty without any.
+
+    Of as many effects it is the more probable one.
+    """
+    sets = [one.effects for one in posterior if one.verdict == "effect"]
+    return min((*sets[:1], *(alike(sets[0], sets[1:]) if sets else ())), key=len, default=())
 
 
 def equivalents(posterior: Sequence[SetProbability], effects: Sequence[str]) -> dict[str, tuple[str, ...]]:

@@ -136,10 +136,18 @@ def test_of_sets_that_are_alike_the_one_of_fewer_effects_is_more_probable():
     assert best_set(posterior) == both
     after = shared(posterior, only((slip, both)))
     told = {one.effects: one.probability for one in after}
-    assert best_set(after) == slip
+    assert best_set(posterior, only((slip, both))) == best_set(after) == slip
     assert told[both] == pytest.approx(FURTHER_PRIOR * told[slip])
     assert sum(one.probability for one in after) == pytest.approx(1.0)
-    assert best_set(shared(posterior, only())) == both
+    assert best_set(posterior, only()) == both
+
+
+def test_of_as_many_effects_the_likelier_of_sets_that_are_alike_is_told():
+    lift, sloped, friction = (("static_head_bias",), ("level_dependent_static_head",), ("friction_bias",))
+    sets = [weight(*lift, log=900.0), weight(*sloped, log=893.0), weight(*friction, log=800.0)]
+    posterior = posterior_of([NONE, *sets], 25)
+    assert best_set(posterior, lambda _, others: others) == lift
+    assert best_set(posterior_of([NONE], 25), lambda _, others: others) == ()
 
 
 def test_all_of_many_that_are_alike_are_equivalent():
