@@ -18,7 +18,7 @@ GONE_ON = 3
 """Steps that others may take to do an effect's work: slopes do not hold for all of the way."""
 PART_LEFT = 0.25
 """Share of the square of an effect's work that slopes may leave where the simulator is asked for what is left: all
-others are spared the time that it takes."""
+others are spared the time that it takes. [1]"""
 
 
 def are_needed(found: Evidence, strengths: Sequence[int]) -> Flags:

@@ -252,7 +252,7 @@ def best_set(posterior: Sequence[SetProbability], alike: Alike = lambda *_: ()) 
     Of as many effects it is the more probable one.
     """
     sets = [one.effects for one in posterior if one.verdict == "effect"]
-    return min((*sets[:1], *(alike(sets[0], sets[1:]) if sets else ())), key=len, default=())
+    return min((sets[0], *alike(sets[0], sets[1:])), key=len) if sets else ()
 
 
 def equivalents(posterior: Sequence[SetProbability], effects: Sequence[str]) -> dict[str, tuple[str, ...]]:

@@ -52,11 +52,20 @@ def test_a_speed_that_swings_within_a_run_is_the_drive(alpha, period_s, componen
     assert blamed(np.where(bins.signal == FLOW, swing, along * swing), bins, alpha) == component
 
 
-@pytest.mark.parametrize(("growth", "component"), [(1.0, "telemetry"), (0.0, "flow_meter")])
-def test_a_flow_that_is_ever_later_is_telemetry(alpha, growth, component):
+@pytest.mark.parametrize(
+    ("signal", "growth", "component"),
+    [
+        (FLOW, 1.0, "telemetry"),
+        (FLOW, 0.0, "flow_meter"),
+        (HEAD, 1.0, "telemetry"),
+        (HEAD, 0.0, "head_sensor"),
+    ],
+)
+def test_what_is_ever_later_at_starts_alone_is_telemetry(alpha, signal, growth, component):
+    """Where the flow ends with the pump, its head tells nothing of stops."""
     bins = bins_of([FLOW, HEAD], START_RAMP)
     turn = bins.second / bins.second.max()
-    late = np.where(bins.signal == FLOW, -20.0 * (growth * turn + (1.0 - growth)), 0.0)
+    late = np.where(bins.signal == signal, -20.0 * (growth * turn + (1.0 - growth)), 0.0)
     assert blamed(late, bins, alpha) == component
 
 
@@ -120,15 +129,6 @@ def test_a_level_that_is_ever_later_is_too_low_at_starts_and_too_high_at_stops(a
     turn = bins.second / bins.second.max()
     size = np.select([bins.signal == START_LEVEL, bins.signal == STOP_LEVEL], [sign * 10.0, 10.0], 1.0)
     assert blamed(size * turn, bins, alpha) == component
-
-
-@pytest.mark.parametrize(("growth", "component"), [(1.0, "telemetry"), (0.0, "head_sensor")])
-def test_a_head_that_tells_nothing_of_stops_is_ever_later(alpha, growth, component):
-    """Where the flow ends with the pump, its head counts at starts alone."""
-    bins = bins_of([FLOW, HEAD], START_RAMP)
-    turn = bins.second / bins.second.max()
-    late = np.where(bins.signal == HEAD, -10.0 * (growth * turn + (1.0 - growth)), 0.0)
-    assert blamed(late, bins, alpha) == component
 
 
 @pytest.mark.parametrize(
