@@ -120,8 +120,64 @@ def expected_offset(allowed: Floats) -> Floats:
     return np.asarray((2.0 + 2.0 * DIFFERING**2) * OFFSET**2 * allowed**2, dtype=np.float64)
 
 
-def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -> tuple[Floats, float]:
-    r"""Products of columns under the inverse of the covariance, and the logarithm of its determinant.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Covariance:
+    """Covariance of the k cells of a block, as far as it goes by no columns.
+
+    Attributes
+    ----------
+    weight : (k,) array
+        Inverse of the variance of each cell by itself.
+    in_cycle : (k,) array
+        Standard deviation of what the cells of a cycle share.
+    loads : (parts, k) array
+        What is allowed, the form, and what is late, on each cell.
+    group, cycle : (k,) arrays
+        Numbers from 0.
+    prior : (parts · groups, parts · groups) array
+        Precision of what is wrong in each part and group.
+    log_det : float
+        Logarithm of the determinants of the variances and of what is wrong.
+    """
+
+    weight: Floats
+    in_cycle: Floats
+    loads: Floats
+    group: Integers
+    cycle: Integers
+    prior: Floats
+    log_det: float
+
+    def projected(self, columns: Floats) -> tuple[Floats, float]:
+        """Products of (k, n) columns under the inverse, and the logarithm of the determinant.
+
+        Returns
+        -------
+        products, log_determinant : (n, n) array, float
+
+        References
+        ----------
+        .. [1] W. W. Hager, Updating the inverse of a matrix, SIAM Review 31, 1989 (Woodbury's identity).
+        """
+        unknown, count = self.prior.shape[0], columns.shape[1]
+        joint = np.zeros((unknown + count, unknown + count))
+        joint[:unknown, :unknown] = self.prior
+        by_cycle = np.zeros((int(self.cycle.max()) + 1, unknown + count + 1))
+        log_det = self.log_det + eliminated(
+            np.ascontiguousarray(columns),
+            self.weight,
+            self.in_cycle,
+            self.loads,
+            self.group,
+            self.cycle,
+            joint,
+            by_cycle,
+        )
+        return joint[unknown:, unknown:], log_det
+
+
+def covariance_of(block: Block, form: Form, allowance: Allowance) -> Covariance:
+    r"""Of a block, the form of effects on its cells, and what may be wrong.
 
     $$C = \operatorname{diag}\left(\sigma^2 + d^2 + (s_c f)^2\right) + \sum_c d_c d_c^T
     + A\left(a; o_b, o_s, o_g\right) + A\left(\bar f; s_b, s_s, s_g\right) + A\left(t; \lambda\right), \quad
@@ -132,22 +188,6 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
     with what is allowed a, the signature f and its mean in a group, what is late t with `LATE` λ, what swings $f_w$,
     the surge u of the average variance $\bar\sigma^2$, and the `Allowance` of changes c and $s_c$, spans s, groups g
     and swing w; the sum is over cycles.
-
-    Parameters
-    ----------
-    block : Block
-    columns : (k, n) array
-    form : Form
-        Of the block's cells.
-    allowance : Allowance
-
-    Returns
-    -------
-    products, log_determinant : (n, n) array, float
-
-    References
-    ----------
-    .. [1] W. W. Hager, Updating the inverse of a matrix, SIAM Review 31, 1989 (Woodbury's identity).
     """
     own = allowance.changing
     changing = 0.5 * (
@@ -164,24 +204,19 @@ def projected(block: Block, columns: Floats, form: Form, allowance: Allowance) -
         parts.append((load, GOOD_FORM, of_form(span.form, fixed), of_form(each.form, fixed)))
     if np.any(form.late):
         parts.append((form.late, *LATE))
-    groups, count = block.span.size, columns.shape[1]
-    unknown = groups * len(parts)
-    joint = np.zeros((unknown + count, unknown + count))
+    groups = block.span.size
+    prior = np.zeros((groups * len(parts), groups * len(parts)))
     log_det = float(np.sum(np.log(variance)))
     for i, (_, of_block, of_span, of_group) in enumerate(parts):
         place = slice(i * groups, (i + 1) * groups)
         own_of_span, own_of_group = (np.broadcast_to(one, block.span.shape) for one in (of_span, of_group))
-        room = np.zeros((3, groups))
-        log_det += alike(block.span, of_block, own_of_span, own_of_group, room, joint[place, place])
-    log_det += eliminated(
-        np.ascontiguousarray(columns),
-        1.0 / variance,
-        np.sqrt(changing),
-        np.array([load for load, *_ in parts]),
-        block.group,
-        block.cycle,
-        joint,
-        np.zeros((int(block.cycle.max()) + 1, unknown + count + 1)),
+        log_det += alike(block.span, of_block, own_of_span, own_of_group, np.zeros((3, groups)), prior[place, place])
+    return Covariance(
+        weight=1.0 / variance,
+        in_cycle=np.sqrt(changing),
+        loads=np.array([load for load, *_ in parts]),
+        group=block.group,
+        cycle=block.cycle,
+        prior=prior,
+        log_det=log_det,
     )
-    left = np.triu(joint[unknown:, unknown:])
-    return np.asarray(left + np.triu(left, 1).T, dtype=np.float64), log_det

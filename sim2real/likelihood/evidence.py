@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.sim2real.likelihood.cells import RAIN, Block, Cells
-from wetwell.sim2real.likelihood.covariance import SWINGS, Allowance, Form, no_form, projected
+from wetwell.sim2real.likelihood.covariance import SWINGS, Covariance, Form, covariance_of, no_form
 from wetwell.sim2real.likelihood.jumps import jumping
 from wetwell.sim2real.likelihood.rain import log_priors, rainy_cells
 from wetwell.sim2real.likelihood.ways import Seen, Ways, right_ways
@@ -215,13 +215,13 @@ def _least(inner: Floats, first: Floats, free: Sequence[int], room: Floats) -> f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
-    """How cells count beside some effects: blocks, form of the effects, and what is likeliest to be wrong in each."""
+    """How cells count beside some effects: rows of each block, and their covariance."""
 
-    blocks: tuple[tuple[Block, Form, Allowance], ...]
+    blocks: tuple[tuple[Integers, Covariance], ...]
 
     def products(self, columns: Floats) -> Floats:
         """(n, n) products of (cells, n) columns."""
-        parts = [projected(block, columns[block.rows], form, its)[0] for block, form, its in self.blocks]
+        parts = [covariance.projected(columns[rows])[0] for rows, covariance in self.blocks]
         return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
 
 
@@ -229,9 +229,9 @@ def cell_weights(found: Evidence, form: Form) -> Weights:
     """How cells count beside the effects of an evidence, of which the form is given."""
     blocks = []
     for one in found.stirred:
-        left, its = found.residuals[one.block.rows], form.chosen(one.block.rows)
-        seen = Seen(one.block, left, its, one.swing)
-        blocks.append((one.block, its, _under(seen, left[:, None], right_ways(one.block))[2]))
+        rows = one.block.rows
+        seen = Seen(one.block, found.residuals[rows], form.chosen(rows), one.swing)
+        blocks.append((rows, _under(seen, found.residuals[rows, None], right_ways(one.block))[2]))
     return Weights(blocks=tuple(blocks))
 
 
@@ -291,12 +291,13 @@ def under(seen: Seen, columns: Floats, ways: Ways) -> tuple[float, Floats]:
     return log, products
 
 
-def _under(seen: Seen, columns: Floats, ways: Ways) -> tuple[float, Floats, Allowance]:
-    """The same with what these ways allow."""
+def _under(seen: Seen, columns: Floats, ways: Ways) -> tuple[float, Floats, Covariance]:
+    """The same with the covariance under these ways."""
     found = []
     for log_prior, allowance in seen.likeliest(ways):
-        products, log_det = projected(seen.block, columns, seen.form, allowance)
-        found.append((log_prior - 0.5 * log_det, products, allowance))
+        covariance = covariance_of(seen.block, seen.form, allowance)
+        products, log_det = covariance.projected(columns)
+        found.append((log_prior - 0.5 * log_det, products, covariance))
     return max(found, key=lambda one: one[0] - 0.5 * float(one[1][0, 0]))
 
 

@@ -38,7 +38,7 @@ def eliminated(
         Numbers from 0.
     joint : (parts · groups + n, parts · groups + n) array
         P above its diagonal, the precision of the unknowns; zeros where the columns are. To hold what is left, the
-        products of the columns, in the upper triangle of its last n rows.
+        products of the columns, in its last n rows and columns.
     by_cycle : (cycles, parts · groups + n + 1) array
         To come as zeros.
 
@@ -63,6 +63,9 @@ def eliminated(
         for m in range(k + 1, size):
             if joint[k, m] != 0.0:
                 _less(joint[m, m:], joint[k, m:], joint[k, m] / pivot)
+    for k in range(size - columns.shape[1], size):
+        for m in range(k + 1, size):
+            joint[m, k] = joint[k, m]
     return log_det
 
 

@@ -18,9 +18,9 @@ from wetwell.sim2real.likelihood.covariance import (
     Allowance,
     Errors,
     Form,
+    covariance_of,
     expected_squares,
     no_form,
-    projected,
 )
 from wetwell.sim2real.likelihood.evidence import TRUSTED, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
@@ -136,7 +136,7 @@ def test_products_are_those_of_the_dense_covariance(cells, errors, has_form, sur
     for without in cells.blocks:
         block = replace(without, surge=surge)
         own, allowance = form.chosen(block.rows), everywhere(block, *errors)
-        products, log_det = projected(block, columns[block.rows], own, allowance)
+        products, log_det = covariance_of(block, own, allowance).projected(columns[block.rows])
         whole = dense(block, own, allowance)
         expected = columns[block.rows].T @ np.linalg.solve(whole, columns[block.rows])
         np.testing.assert_allclose(products, expected, rtol=1e-9)
