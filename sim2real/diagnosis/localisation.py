@@ -18,6 +18,7 @@ from wetwell.sim2real.diagnosis.lateness import (
 )
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, START_RAMP, STEADY, STOP_RAMP
 from wetwell.sim2real.replay.observer import LEVEL_TIME_S
+from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.bins import (
     FLOW,
     HEAD,
@@ -29,11 +30,17 @@ from wetwell.sim2real.residuals.bins import (
     TELEMETRY,
     Bins,
 )
+from wetwell.sim2real.residuals.groups import groups_of
+from wetwell.sim2real.residuals.phases import since_begun_s
 from wetwell.simulator.effects.effect import Component
 from wetwell.simulator.parameters import PlantParameters
 
 STRAIGHT = 0.8
 """Share of the scatter of blocks that a straight line explains; 0.6 for a sine of one period."""
+OF_ZERO = 0.5
+"""Change of an error of the power at less than half speed, over that at full speed, from which it is the zero of a
+meter that moves: that is off by as much at any power, so 1. By the affinity laws a pump draws an eighth there, and
+what a drive changes is a share of that. [1]"""
 NEAR_S = 60
 LASTING = 0.3
 """Share of the square of an imbalance that is still there a minute later; of a sensor that wanders, hardly any."""
@@ -78,7 +85,8 @@ def localise(
     if hydraulic > (1.0 - ALONE) * total:
         return _hydraulic(excess, residuals, bins, plant)
     if by_signal[POWER] > 0.5 * total:
-        return "power_meter" if _drifts(residuals, bins) else "drive"
+        is_read = _drifts(residuals, bins) or _is_of_zero(residuals, bins, plant.ramp_s)
+        return "power_meter" if is_read else "drive"
     if by_signal[START_LEVEL] + by_signal[STOP_LEVEL] > by_signal[LEVEL]:
         return "controller"
     return _of_level(excess, residuals, bins)
@@ -104,6 +112,23 @@ def _drifts(residuals: Floats, bins: Bins) -> bool:
     order = np.argsort(bins.second[rows], kind="stable")
     means = block_means(residuals[rows][order])
     return bool(np.corrcoef(means, np.arange(DRIFT_BLOCKS))[0, 1] ** 2 > STRAIGHT)
+
+
+def _is_of_zero(residuals: Floats, bins: Bins, ramp_s: float) -> bool:
+    """Whether the power is off by as much, from run to run, before half speed as once the pump runs: a zero moves."""
+    power = bins.signal == POWER
+    runs = power & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
+    slow = power & (bins.regime == START_RAMP) & (since_begun_s(bins) + 1 <= ramp_s / 2.0)
+    run = bins.cycle * 64 + bins.pump + 1
+    size = int(run.max(initial=0)) + 1
+    running, starting = groups_of(run, runs, size), groups_of(run, slow, size)
+    both = (running.counts > 0) & (starting.counts > 0)
+    if both.sum() < DRIFT_BLOCKS:
+        return False
+    error_kw = residuals_of(residuals) * bins.deviation
+    at_speed, before = (of.means(error_kw)[both] for of in (running, starting))
+    moved = at_speed - at_speed.mean()
+    return bool(moved @ before > OF_ZERO * (moved @ moved))
 
 
 def _wanders(residuals: Floats, bins: Bins, calm: Flags) -> bool:

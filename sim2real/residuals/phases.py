@@ -15,7 +15,7 @@ FOLLOWED_S = 60
 
 def phase(bins: Bins) -> Integers:
     """(bins,) number of the span of `PHASES_S` since the regime of a signal and pump began."""
-    return np.asarray(np.searchsorted(PHASES_S, _since(bins, group_of(bins))))
+    return np.asarray(np.searchsorted(PHASES_S, since_begun_s(bins)))
 
 
 def settled_at_rest(bins: Bins) -> Flags:
@@ -28,9 +28,9 @@ def group_of(bins: Bins) -> Integers:
     return (bins.signal * len(REGIMES) + bins.regime) * 64 + bins.pump + 1
 
 
-def _since(bins: Bins, group: Integers) -> Integers:
-    """Seconds since the first bin of the same group and cycle."""
-    key = group * (int(bins.cycle.max(initial=0)) + 1) + bins.cycle
+def since_begun_s(bins: Bins) -> Integers:
+    """(bins,) seconds since the first bin of the same signal, regime, pump and cycle."""
+    key = group_of(bins) * (int(bins.cycle.max(initial=0)) + 1) + bins.cycle
     _, inverse = np.unique(key, return_inverse=True)
     first = np.full(inverse.max(initial=0) + 1, np.iinfo(np.int64).max)
     np.minimum.at(first, inverse, bins.second)

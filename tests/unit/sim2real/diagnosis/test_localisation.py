@@ -7,7 +7,7 @@ import pytest
 
 from wetwell.sim2real.diagnosis.localisation import localise
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP
-from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins
+from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins, joined
 from wetwell.simulator.parameters import plant_parameters
 
 RUNS, BINS_PER_RUN = 40, 20
@@ -41,6 +41,19 @@ def test_power_that_runs_away_is_its_meter_and_power_that_swings_the_drive(alpha
     turn = np.linspace(0.0, 1.0, bins.size)
     assert blamed(10.0 * turn, bins, alpha) == "power_meter"
     assert blamed(10.0 * np.sin(2.0 * np.pi * turn), bins, alpha) == "drive"
+
+
+@pytest.mark.parametrize(
+    ("share", "component"), [(1.0, "power_meter"), (0.9, "power_meter"), (0.125, "drive"), (0.0, "drive")]
+)
+def test_a_power_that_is_as_wrong_before_half_speed_as_at_speed_is_its_meter(alpha, share, component):
+    running = bins_of([POWER], STEADY)
+    place = np.arange(running.size) % BINS_PER_RUN
+    starting = replace(running, regime=np.full(running.size, START_RAMP), second=600 * running.cycle + place)
+    swing = 10.0 * np.sin(2.0 * np.pi * running.cycle / RUNS)
+    of_start = np.where(place < alpha.control.ramp_s / 2.0, share, 0.125) * swing
+    assert blamed(np.r_[swing, of_start], joined([running, starting]), alpha) == component
+    assert blamed(swing, running, alpha) == "drive"
 
 
 @pytest.mark.parametrize(("period_s", "component"), [(60.0, "drive"), (4000.0, "pump")])
