@@ -132,7 +132,7 @@ PAST_DEFECTS = (
         "a detector that goes on does not tell its last verdicts",
         "66dd745",
         "services/detector/station_detector.py",
-        "            for verdict in told.verdicts:\n                self._publish(verdict)",
+        "            self._tell_again(told.verdicts)",
         "            pass",
     ),
     PastDefect(

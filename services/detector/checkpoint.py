@@ -5,8 +5,9 @@ import json
 import logging
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from pydantic_core import to_json
 
@@ -33,12 +34,14 @@ class Told:
     """What was told: answers to orders that were carried out, by their ids, last verdicts, acts of maintenance.
 
     `heard` is time and number of the last sample that came before that, let through by the gate or not.
+    `given_up` has times of verdicts of each pump that are kept no more, and that may have been heard or not.
     """
 
     answers: Mapping[str, Verdict]
     verdicts: Sequence[Verdict] = ()
     acts: Sequence[MaintenanceRecord] = ()
     heard: tuple[int, int] | None = None
+    given_up: Mapping[int, Sequence[int]] = field(default_factory=dict)
 
 
 class Checkpoint:
@@ -94,6 +97,7 @@ class Checkpoint:
             "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
             "acts": [record.model_dump(mode="json") for record in told.acts],
             "heard": told.heard,
+            "given_up": {str(pump): list(times_ns) for pump, times_ns in told.given_up.items()},
         }
         snapshot = detector.snapshot()
         checked = head | {_CHECKSUM: _checksum(head, snapshot)}
@@ -130,10 +134,21 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
         verdicts = [Verdict.model_validate(verdict) for verdict in header["verdicts"]]
         acts = [MaintenanceRecord.model_validate(record) for record in header.get("acts", [])]
-        heard = header.get("heard")  # earlier versions did not know it
-        return Told(answers, verdicts, acts, None if heard is None else (int(heard[0]), int(heard[1]))), rest
+        return Told(answers, verdicts, acts, _heard(header), _given_up(header)), rest
     except (ValueError, KeyError, AttributeError, TypeError, IndexError, RecursionError) as error:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
+
+
+def _heard(header: Mapping[str, Any]) -> tuple[int, int] | None:
+    """Time and number of the last sample that came; earlier versions did not keep them."""
+    heard = header.get("heard")
+    return None if heard is None else (int(heard[0]), int(heard[1]))
+
+
+def _given_up(header: Mapping[str, Any]) -> dict[int, list[int]]:
+    """Times of verdicts that are kept no more, by pump; earlier versions did not keep them."""
+    given_up = header.get("given_up", {})
+    return {int(pump): [int(time_ns) for time_ns in times_ns] for pump, times_ns in given_up.items()}
 
 
 def _checksum(head: Mapping[str, object], snapshot: bytes) -> str:

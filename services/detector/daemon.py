@@ -20,6 +20,7 @@ from wetwell.services.detector.intake import LOOK_AGAIN_S, Intake
 from wetwell.services.detector.kernels import load_kernels
 from wetwell.services.detector.quarantine import Quarantine
 from wetwell.services.detector.station_detector import StationDetector
+from wetwell.services.detector.unheard import say_unheard
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
 from wetwell.services.runtime.folder_lock import Hold, folder_held
@@ -155,6 +156,7 @@ async def judge_all(
             report_health_in_turn(bus, "detector", settings.health.period_s, figures), name=f"{name}.health"
         )
         group.create_task(keep_in_turn(judges, intake, kept.checkpoint_s), name=f"{name}.checkpoint")
+        group.create_task(say_unheard(bus, judges), name=f"{name}.unheard")
 
 
 def _keep_at_the_end(judge: StationDetector, hold: Hold | None) -> None:

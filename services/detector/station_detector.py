@@ -4,7 +4,7 @@ import asyncio
 import logging
 import time
 from collections import Counter, OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
 
 import numpy as np
@@ -19,7 +19,7 @@ from wetwell.protocols.messages.message import MessageError
 from wetwell.protocols.messages.order import Order
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.sample_block import SampleBlock
-from wetwell.protocols.messages.verdict import Verdict
+from wetwell.protocols.messages.verdict import State, Verdict
 from wetwell.protocols.station.costs import Costs
 from wetwell.protocols.station.station_file import Station
 from wetwell.protocols.timestamps import to_iso
@@ -27,6 +27,7 @@ from wetwell.services.detector.checkpoint import Checkpoint, Told
 from wetwell.services.detector.maintenance_log import MaintenanceLog
 from wetwell.services.detector.model_publisher import ModelPublisher
 from wetwell.services.detector.quarantine import Quarantine
+from wetwell.services.detector.recent_verdicts import RecentVerdicts
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.security.audit import Audit
 
@@ -50,7 +51,7 @@ class StationDetector:
     costs : Costs, optional
         For the expected cost of each act.
     checkpoint : Checkpoint, optional
-        Where the state is kept; what it holds is taken up at once, and its last verdicts are published again.
+        Where the state is kept; what it holds is taken up at once, and the verdicts in it are published again.
     quarantine : Quarantine, optional
         What remembers at which station the process has died.
     audit : Audit, optional
@@ -80,7 +81,8 @@ class StationDetector:
             for pump in range(1, len(station.pump) + 1)
         ]
         self._model = ModelPublisher(bus, station, self.detector)
-        self._last: dict[int, Verdict] = {}
+        self._recent = RecentVerdicts(None if told is None else told.given_up)
+        self._states: dict[int, State] = {}
         self._answers: OrderedDict[str, Verdict] = OrderedDict()
         self._counts: Counter[str] = Counter()
         self._heard_s = time.monotonic()
@@ -91,8 +93,7 @@ class StationDetector:
         if told is not None:
             log.info("station '%s': goes on from its checkpoint", self.station)
             self._answers.update(told.answers)
-            for verdict in told.verdicts:
-                self._publish(verdict)
+            self._tell_again(told.verdicts)
 
     def handle_payloads(self, payloads: Iterable[bytes], kind: type[SampleMessage] = Sample) -> int:
         """Judge what has come from the bus; how many samples. What is not of its kind is counted and left out."""
@@ -139,7 +140,17 @@ class StationDetector:
         return self._heard or self.detector.last_heard
 
     def _told(self) -> Told:
-        return Told(self._answers, list(self._last.values()), list(self._maintenance.records.values()), self._heard)
+        acts = list(self._maintenance.records.values())
+        return Told(self._answers, self._recent.verdicts(), acts, self._heard, self._recent.given_up())
+
+    def unproven(self) -> list[tuple[int, int]]:
+        """Pump and time of verdicts that are told no more, and that nobody may have heard."""
+        return [(pump, time_ns) for pump, times_ns in self._recent.unproven.items() for time_ns in times_ns]
+
+    def prove(self, pump: int, time_ns: int, *, is_heard: bool) -> None:
+        """Know from now on whether such a verdict was heard."""
+        self._recent.unproven[pump].remove(time_ns)
+        self._counts["unheard"] += not is_heard
 
     def figures(self) -> dict[str, float]:
         """Health figures."""
@@ -242,14 +253,25 @@ class StationDetector:
         log.info("station '%s': %s %s by %s: %s", self.station, record.asset, record.act, record.by, record.result)
         self._acts_publisher.put(record.encode())
 
+    def _tell_again(self, verdicts: Sequence[Verdict]) -> None:
+        """Tell what was told before, in its order: nobody may have heard it. Curves are those of the last ones."""
+        last = {verdict.pump: verdict for verdict in verdicts}
+        for verdict in verdicts:
+            tell = self._publish if verdict is last[verdict.pump] else self._tell
+            tell(verdict)
+
     def _publish(self, verdict: Verdict) -> None:
-        self._counts["verdicts"] += 1
-        self._publishers[verdict.pump - 1].put(verdict.encode())
+        self._tell(verdict)
         self._model.update(verdict)
-        last = self._last.get(verdict.pump)
-        if last is None or last.state != verdict.state:
+
+    def _tell(self, verdict: Verdict) -> None:
+        self._counts["verdicts"] += 1
+        payload = verdict.encode()
+        self._publishers[verdict.pump - 1].put(payload)
+        self._recent.add(verdict, payload)
+        if self._states.get(verdict.pump) != verdict.state:
             log.info("station '%s' pump %d: %s", self.station, verdict.pump, verdict.state)
-        self._last[verdict.pump] = verdict
+        self._states[verdict.pump] = verdict.state
         self._maintenance.follow(verdict)
 
 

@@ -5,6 +5,7 @@ the product had it once and has lost it, the operator was told.
 """
 
 import hashlib
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
@@ -24,11 +25,12 @@ from wetwell.protocols.messages.alarm import Alarm
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.messages.verdict import Verdict
 from wetwell.protocols.station.station_file import Station
-from wetwell.protocols.timestamps import NS_PER_S
+from wetwell.protocols.timestamps import NS_PER_S, from_iso
 from wetwell.services.doctor.verify import verify_kept
 
 ANSWERED_S = 120.0
 """In which a detector that begins has asked the historian and got its answer."""
+_SAID_LOST = re.compile(r"station '(.+)' pump (\d+): verdicts up to (\S+) are lost:")
 
 
 def broken_rules(site: Site) -> list[str]:
@@ -104,6 +106,7 @@ def _verdicts(site: Site) -> Iterator[str]:
 
     Where a clock went back, the historian gives samples in another order than the bus, and some may be judged twice:
     there it is that of a detector which gets just the same. Who comes at the end hears the last of each pump.
+    What nobody has heard is told again by each life of the detector, or said to be lost.
     """
     for station in site.stations:
         branches = site.judged.branches.get(station.name, [[]])
@@ -115,7 +118,7 @@ def _verdicts(site: Site) -> Iterator[str]:
         if untold := {verdict.encode() for verdict in last.values()} - site.verdicts_late:
             yield f"{station.name}: who comes late does not hear the last verdict of a pump, {begin_of(untold)}"
         yield from _alarmed(site, station.name, last)
-        if missing := wanted - heard:
+        if missing := {payload for payload in wanted - heard if not _is_said_lost(site, Verdict.decode(payload))}:
             told = f"{len(missing)} of {len(wanted)} verdicts were not told"
             yield f"{station.name}: {told}, such as {begin_of(missing)}"
         for branch in _ways_of_their_own(branches):
@@ -124,6 +127,15 @@ def _verdicts(site: Site) -> Iterator[str]:
             wanted |= {verdict.encode() for verdict in _verdicts_on(station, branch)}
         if more := heard - wanted:
             yield f"{station.name}: {len(more)} verdicts should not have been told, such as {begin_of(more)}"
+
+
+def _is_said_lost(site: Site, verdict: Verdict) -> bool:
+    """Whether the detector has said that it and those before it are lost."""
+    for told in site.log:
+        said = _SAID_LOST.match(told.text)
+        if said and (said[1], int(said[2])) == (verdict.station, verdict.pump) and verdict.time <= from_iso(said[3]):
+            return True
+    return False
 
 
 def _ways_of_their_own(branches: Sequence[Sequence[Sample]]) -> Iterator[Sequence[Sample]]:

@@ -13,7 +13,6 @@ from rules import broken_rules
 from site_kinds import light_site
 
 from wetwell.protocols.messages.sample import Sample
-from wetwell.protocols.messages.verdict import Verdict
 from wetwell.services.alarms.service import AlarmService
 from wetwell.services.detector.station_detector import StationDetector
 from wetwell.services.historian import daemon as historian_daemon
@@ -37,12 +36,6 @@ def always(*_: object) -> bool:
 async def nothing_missed(*_: object) -> AsyncIterator[list[Sample]]:
     for never in ():
         yield never
-
-
-def publish_news(station: StationDetector, verdict: Verdict, publish=StationDetector._publish) -> None:
-    """Publish what is judged, but not what was told before."""
-    if station._counts or not station.is_restored:
-        publish(station, verdict)
 
 
 def flip_bit_of_row(folder: Path, dice: random.Random) -> Path:
@@ -88,8 +81,12 @@ DEFECTS = {
         ],
     ),
     "a detector that goes on does not tell its last verdicts": (
-        [mock.patch.object(StationDetector, "_publish", publish_news)],
+        [mock.patch.object(StationDetector, "_tell_again")],
         [Accident("stop", "detector", 86_400.0 - 600.0, 1.0)],
+    ),
+    "a detector does not say which verdicts are lost": (
+        [mock.patch("wetwell.services.detector.unheard._say")],
+        [Accident("mute", "detector", 10_000.0, 70_000.0), Accident("kill", "detector", 75_000.0, 1.0)],
     ),
     "alarms that start do not tell what stands": (
         [mock.patch.object(AlarmService, "publish_all")],

@@ -54,6 +54,7 @@ METRICS: Mapping[str, str] = {
     "stands_by": "1 in the member of a pair that could take over at once.",
     "stations": "Stations that are watched.",
     "unacknowledged": "Alarms that wait for an acknowledgement.",
+    "unheard": "Verdicts of lives before that are told no more and that the historian does not have.",
     "verdicts": "Verdicts published, or taken.",
     "wrong_pump_count": "Samples with another number of pumps than the station has.",
 }

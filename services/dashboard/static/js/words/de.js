@@ -355,6 +355,7 @@ export default {
   "to acknowledge": "zu quittieren",
   "told {time}, from {start}": "gesagt {time}, ab {start}",
   "unacknowledged": "nicht quittiert",
+  "unheard": "nie gehört",
   "unknown": "unbekannt",
   "unshelve": "zurückholen",
   "under maintenance": "in Wartung",
