@@ -33,12 +33,13 @@ _OF_EARLIER = {"schema", "answers", "verdicts", "acts"}
 class Told:
     """What was told: answers to orders that were carried out, by their ids, last verdicts, acts of maintenance.
 
+    `verdicts` are messages as they were told.
     `heard` is time and number of the last sample that came before that, let through by the gate or not.
     `given_up` has times of verdicts of each pump that are kept no more, and that may have been heard or not.
     """
 
     answers: Mapping[str, Verdict]
-    verdicts: Sequence[Verdict] = ()
+    verdicts: Sequence[bytes] = ()
     acts: Sequence[MaintenanceRecord] = ()
     heard: tuple[int, int] | None = None
     given_up: Mapping[int, Sequence[int]] = field(default_factory=dict)
@@ -94,7 +95,7 @@ class Checkpoint:
         head = {
             "schema": CHECKPOINT_SCHEMA,
             "answers": {name: answer.model_dump(mode="json") for name, answer in told.answers.items()},
-            "verdicts": [verdict.model_dump(mode="json") for verdict in told.verdicts],
+            "verdicts": [payload.decode() for payload in told.verdicts],
             "acts": [record.model_dump(mode="json") for record in told.acts],
             "heard": told.heard,
             "given_up": {str(pump): list(times_ns) for pump, times_ns in told.given_up.items()},
@@ -132,11 +133,19 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
         if header.pop(_CHECKSUM, None) != _checksum(header, rest) and not is_earlier:
             raise SnapshotError("checkpoint: damaged, its checksum differs")
         answers = {name: Verdict.model_validate(answer) for name, answer in header["answers"].items()}
-        verdicts = [Verdict.model_validate(verdict) for verdict in header["verdicts"]]
+        verdicts = [_as_told(verdict) for verdict in header["verdicts"]]
         acts = [MaintenanceRecord.model_validate(record) for record in header.get("acts", [])]
         return Told(answers, verdicts, acts, _heard(header), _given_up(header)), rest
     except (ValueError, KeyError, AttributeError, TypeError, IndexError, RecursionError) as error:
         raise SnapshotError(f"checkpoint: its first line is damaged ({type(error).__name__})") from error
+
+
+def _as_told(verdict: str | Mapping[str, Any]) -> bytes:
+    """A verdict as it was told; earlier versions kept its fields."""
+    if isinstance(verdict, str):
+        Verdict.model_validate_json(verdict)
+        return verdict.encode()
+    return Verdict.model_validate(verdict).encode()
 
 
 def _heard(header: Mapping[str, Any]) -> tuple[int, int] | None:

@@ -46,10 +46,9 @@ class RecentVerdicts:
         if len(said) > TOLD_AGAIN:
             self._given_up_ns[verdict.pump] = said.popleft().time_ns
 
-    def verdicts(self) -> list[Verdict]:
-        """All that are kept, in the order in which they were told."""
-        said = sorted(one for of_pump in self._said.values() for one in of_pump)
-        return [Verdict.decode(one.payload) for one in said]
+    def payloads(self) -> list[bytes]:
+        """All that are kept as they were told, in that order."""
+        return [one.payload for one in sorted(one for of_pump in self._said.values() for one in of_pump)]
 
     def given_up(self) -> dict[int, list[int]]:
         """Of each pump the time of the last verdict that is kept no more, behind those that are unproven."""

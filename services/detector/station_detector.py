@@ -141,7 +141,7 @@ class StationDetector:
 
     def _told(self) -> Told:
         acts = list(self._maintenance.records.values())
-        return Told(self._answers, self._recent.verdicts(), acts, self._heard, self._recent.given_up())
+        return Told(self._answers, self._recent.payloads(), acts, self._heard, self._recent.given_up())
 
     def unproven(self) -> list[tuple[int, int]]:
         """Pump and time of verdicts that are told no more, and that nobody may have heard."""
@@ -253,8 +253,9 @@ class StationDetector:
         log.info("station '%s': %s %s by %s: %s", self.station, record.asset, record.act, record.by, record.result)
         self._acts_publisher.put(record.encode())
 
-    def _tell_again(self, verdicts: Sequence[Verdict]) -> None:
+    def _tell_again(self, payloads: Sequence[bytes]) -> None:
         """Tell what was told before, in its order: nobody may have heard it. Curves are those of the last ones."""
+        verdicts = [Verdict.decode(payload) for payload in payloads]
         last = {verdict.pump: verdict for verdict in verdicts}
         for verdict in verdicts:
             tell = self._publish if verdict is last[verdict.pump] else self._tell

@@ -98,5 +98,5 @@ def once(branch: Sequence[Sample]) -> list[Sample]:
 def _key(station: str, told: Told, snapshot: bytes) -> tuple[str, bytes]:
     """What tells a state from others: that of the detector, and what it has told."""
     answers = sorted((name, answer.encode()) for name, answer in told.answers.items())
-    said = repr((answers, [one.encode() for one in told.verdicts], [one.encode() for one in told.acts], told.heard))
+    said = repr((answers, list(told.verdicts), [one.encode() for one in told.acts], told.heard))
     return station, hashlib.sha256(said.encode() + snapshot).digest()

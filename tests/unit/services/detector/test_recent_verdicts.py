@@ -19,13 +19,13 @@ def told(recent: RecentVerdicts, *verdicts: Verdict) -> RecentVerdicts:
 def test_the_last_of_each_pump_are_kept_in_the_order_in_which_they_were_told():
     rare, often = verdict(2, 5), [verdict(1, time_ns) for time_ns in range(TOLD_AGAIN + 3)]
     recent = told(RecentVerdicts(), *often[:5], rare, *often[5:])
-    assert recent.verdicts() == [often[3], often[4], rare, *often[5:]]
+    assert recent.payloads() == [one.encode() for one in (often[3], often[4], rare, *often[5:])]
     assert recent.given_up() == {1: [2]}
 
 
 def test_what_is_told_once_more_takes_no_place():
     first, second = verdict(1, 1), verdict(1, 2)
-    assert told(RecentVerdicts(), first, second, first).verdicts() == [first, second]
+    assert told(RecentVerdicts(), first, second, first).payloads() == [first.encode(), second.encode()]
 
 
 def test_nothing_is_given_up_before_there_are_too_many():
