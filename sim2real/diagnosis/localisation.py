@@ -115,10 +115,13 @@ def _drifts(residuals: Floats, bins: Bins) -> bool:
 
 
 def _is_of_zero(residuals: Floats, bins: Bins, ramp_s: float) -> bool:
-    """Whether the power is off by as much, from run to run, before half speed as once the pump runs: a zero moves."""
+    """Whether the power is off by as much, from run to run, before half speed as once the pump runs: a zero moves.
+
+    A pump may have begun to turn up to a second before the first row that shows it.
+    """
     power = bins.signal == POWER
     runs = power & ((bins.regime == STEADY) | (bins.regime == MULTI_PUMP))
-    slow = power & (bins.regime == START_RAMP) & (since_begun_s(bins) + 1 <= ramp_s / 2.0)
+    slow = power & (bins.regime == START_RAMP) & (since_begun_s(bins) + 2 <= ramp_s / 2.0)
     run = bins.cycle * 64 + bins.pump + 1
     size = int(run.max(initial=0)) + 1
     running, starting = groups_of(run, runs, size), groups_of(run, slow, size)
