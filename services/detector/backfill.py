@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterable
 from typing import get_args
 
 import numpy as np
@@ -53,21 +53,29 @@ def samples_of(page: History) -> list[Sample]:
     ]
 
 
+def first_good(station: str, payloads: Iterable[bytes]) -> History | None:
+    """First of some answers that is one, with a line in the log for each before it that is none."""
+    for payload in payloads:
+        try:
+            history = History.decode(payload)
+        except MessageError as error:
+            log.warning("station '%s': %s", station, error)
+            continue
+        if not history.error:
+            return history
+        log.warning("station '%s': the historian says: %s", station, history.error)
+    return None
+
+
 async def _answer(bus: Bus, station: str, query: HistoryQuery) -> History | None:
     """First good answer, within `PATIENCE_S`; None with a line in the log if there is none."""
     clock = asyncio.get_running_loop().time
     end_s = clock() + PATIENCE_S
     while True:
         payloads = await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S)
-        for payload in payloads:
-            try:
-                history = History.decode(payload)
-            except MessageError as error:
-                log.warning("station '%s': %s", station, error)
-                continue
-            if not history.error:
-                return history
-            log.warning("station '%s': the historian says: %s", station, history.error)
+        history = first_good(station, payloads)
+        if history is not None:
+            return history
         if payloads or clock() > end_s:
             log.info("station '%s': no historian has told; what the bus keeps must do", station)
             return None

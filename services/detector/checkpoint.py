@@ -142,10 +142,7 @@ def _parted(data: bytes) -> tuple[Told, bytes]:
 
 def _as_told(verdict: str | Mapping[str, Any]) -> bytes:
     """A verdict as it was told; earlier versions kept its fields."""
-    if isinstance(verdict, str):
-        Verdict.model_validate_json(verdict)
-        return verdict.encode()
-    return Verdict.model_validate(verdict).encode()
+    return verdict.encode() if isinstance(verdict, str) else Verdict.model_validate(verdict).encode()
 
 
 def _heard(header: Mapping[str, Any]) -> tuple[int, int] | None:

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 
 from wetwell.protocols.bus.interface import Bus
 from wetwell.protocols.bus.keys import history_key
-from wetwell.protocols.messages.history import History, HistoryQuery
-from wetwell.protocols.messages.message import MessageError
+from wetwell.protocols.messages.history import HistoryQuery
 from wetwell.protocols.timestamps import to_iso
+from wetwell.services.detector.backfill import ANSWER_S, first_good
 from wetwell.services.detector.station_detector import StationDetector
 
 log = logging.getLogger(__name__)
 
-ANSWER_S = 10.0
 ASK_LATER_S = 60.0
 """Where no historian answers, such as while the detector is cut off from it. [s]"""
 AT_A_TIME = 1_000
@@ -42,15 +41,10 @@ async def say_unheard(bus: Bus, judges: Sequence[StationDetector]) -> None:
 async def _pumps_heard(bus: Bus, station: str, time_ns: int) -> set[int] | None:
     """Pumps of which the historian has a verdict of a time; None if it does not say."""
     query = HistoryQuery(kind="verdicts", start=time_ns, end=time_ns + 1, points=AT_A_TIME)
-    for payload in await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S):
-        try:
-            history = History.decode(payload)
-        except MessageError as error:
-            log.warning("station '%s': %s", station, error)
-            continue
-        if not history.error:
-            return {message["pump"] for message in history.messages if isinstance(message.get("pump"), int)}
-    return None
+    history = first_good(station, await bus.ask(history_key(station), query.encode(), timeout_s=ANSWER_S))
+    if history is None:
+        return None
+    return {message["pump"] for message in history.messages if isinstance(message.get("pump"), int)}
 
 
 def _say(station: str, pump: int, time_ns: int) -> None:
