@@ -107,7 +107,8 @@ class Historian:
     def commit(self, now_ns: int) -> int:
         """Give what waits to the store, and return how many samples, verdicts and alarms are now acknowledged.
 
-        A store that refuses is told once; what waits goes on waiting.
+        A store that refuses is told once; what waits goes on waiting. What was found damaged is put aside even where
+        nothing waits: until then nobody fetches again what was lost.
         """
         with self._commits:
             return self._commit(now_ns)
@@ -130,6 +131,11 @@ class Historian:
             self._counts["committed"] += size
             self._counts["doubled"] += size - new
             self._newest_ns = max([self._newest_ns, *(row.last_ns for row in rows)])
+        try:
+            self._store.mend()
+        except StoreError as error:
+            self._say_failing(error)
+            return acknowledged
         self._committed_at_ns = now_ns
         if self._is_failing:
             log.warning("the store keeps again; %d samples and messages were lost", self._spool.lost)

@@ -145,6 +145,11 @@ class FolderStore:
         self._upkeep.note(span_of(batch.samples))
         return new
 
+    def mend(self) -> None:
+        """Put aside what was found damaged, and has waited for the next writing."""
+        if self.file.is_to_be_mended:
+            self.write(Batch())
+
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
         return self.live.stations()

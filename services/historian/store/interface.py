@@ -87,6 +87,9 @@ class Store(Protocol):
         call it new twice; it is read once.
         """
 
+    def mend(self) -> None:
+        """Put aside what was found not to be what was written, if anything was; each `write` does it, too."""
+
     def stations(self) -> list[StationSpan]:
         """All stations, by name."""
 

@@ -76,6 +76,9 @@ class PostgresStore:
     def check_place(self) -> None:
         """Nothing: the database is where it is."""
 
+    def mend(self) -> None:
+        """Nothing: pages are checked by the database."""
+
     def hang_up(self) -> None:
         """End what waits for the database, which may be cut off."""
         self._connection.hang_up()

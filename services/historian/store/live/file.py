@@ -81,6 +81,11 @@ class LiveFile:
             log.error("%s: %s", path, self.replaced)
             self.mark_end()
 
+    @property
+    def is_to_be_mended(self) -> bool:
+        """Whether something was found that the next writing puts aside."""
+        return self.is_damaged or self.refused.are_any
+
     def mark_end(self) -> None:
         """Say in a file beside the database how far it has come, as the one historian that works on it."""
         with self._lock, contextlib.suppress(sqlite3.Error):  # its next use says what is wrong

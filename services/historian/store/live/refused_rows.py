@@ -43,6 +43,11 @@ class RefusedRows:
         self._found: dict[tuple[Table, tuple[int, ...]], None] = {}
         self._not_there: set[tuple[Table, tuple[int, ...]]] = set()
 
+    @property
+    def are_any(self) -> bool:
+        """Whether a row waits to be put aside."""
+        return bool(self._found)
+
     def note(self, table: Table, *key: int) -> None:
         """Know a row by the key of its table, and tell it."""
         with self._lock:

@@ -96,6 +96,30 @@ def test_where_the_writer_mends_a_row_what_publishers_keep_comes_again(tmp_path)
         assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES + 1))
 
 
+def test_what_a_question_finds_damaged_comes_again_though_nobody_sends_anything_new(tmp_path):
+    """Nothing is to be written, and nobody looks for an hour."""
+    settings = Settings(historian=HistorianSettings(folder=tmp_path, maintain_s=3_600.0))
+
+    async def live() -> None:
+        publisher = bus.publisher(sample_key("alpha"), history=600)
+        running = asyncio.create_task(daemon._run(settings))
+        for number in range(SAMPLES):
+            publisher.put(sample(number))
+        await asyncio.sleep(5.0)
+        store.file._writer.execute("UPDATE sample SET quality = quality + 1 WHERE seq = 300")
+        assert len(store.samples("alpha", 0, 2**62)) == SAMPLES - 1
+        await asyncio.sleep(60.0)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    with contextlib.closing(FolderStore(tmp_path)) as store, MemoryBus() as bus:
+        opened = mock.patch.object(daemon, "open_store", return_value=contextlib.nullcontext(store))
+        with opened, on_bus(bus):
+            run_virtual(live())
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES))
+        assert store.file._writer.execute("SELECT origin FROM refused").fetchall() == [("sample",)]
+
+
 class Thinking:
     """A historian that answers about the station "long" when it is told to."""
 

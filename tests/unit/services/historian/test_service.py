@@ -160,6 +160,9 @@ class Refusing:
         self.kept.append(batch)
         return len(batch)
 
+    def mend(self) -> None:
+        pass
+
     def scrub(self) -> Iterator[None]:
         return iter(())
 
