@@ -266,7 +266,7 @@ class FolderStore:
         self.file.check()
         yield
         for span in self.stations():
-            for day_ns in self.live.days_ns(span.station, -(2**63), 2**63 - 1):
+            for day_ns in self.live.days_of_all_ns(span.station):
                 self.live.put_aside_damaged(span.station, day_ns, day_ns + DAY_NS)
                 yield
         self._refused_files += self.archive.put_aside_damaged_ledgers() + self.archive.missing()

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import shutil
+import sqlite3
 
 import pytest
 from memory_bus import MemoryBus
@@ -19,6 +20,7 @@ from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
 from wetwell.services.historian.store.interface import DAY_NS, Batch, StoreError
+from wetwell.services.historian.store.live.salvage import damage_of
 from wetwell.services.runtime.settings import (
     AlarmSettings,
     DetectorSettings,
@@ -242,3 +244,21 @@ def test_a_daily_file_of_another_station_or_day_is_put_aside_by_a_look_through(k
         assert len(store.samples("alpha", 0, 2**62)) > 0
     assert {path.name for path in folder.rglob("*.refused")} == {f"{file.name}.refused", "2031-01-01.parquet.refused"}
     assert file.exists()
+
+
+def test_a_look_through_reads_messages_and_hours_of_a_day_whose_samples_are_in_a_file(kept, tmp_path):
+    folder = tmp_path / "history"
+    shutil.copytree(kept / "history", folder)
+    with contextlib.closing(sqlite3.connect(folder / "live.sqlite", isolation_level=None)) as database:
+        hours = database.execute("SELECT hour_ns FROM hour ORDER BY hour_ns").fetchall()
+        samples = database.execute("SELECT count(*) FROM sample WHERE time_ns < ?", (hours[1])).fetchone()
+        assert samples == (0,)
+        database.execute("UPDATE hour SET data = zeroblob(length(data)) WHERE hour_ns = ?", hours[0])
+        (first_ns,) = database.execute("SELECT min(time_ns) FROM event").fetchone()
+        database.execute("UPDATE event SET payload = payload || ' ' WHERE time_ns = ?", (first_ns,))
+        changed = database.execute("SELECT changes()").fetchone()[0]
+    with contextlib.closing(FolderStore(folder)) as store:
+        for _ in store.scrub():
+            pass
+        assert store.damages == 1 + changed
+    assert damage_of(folder / "live.sqlite") == []

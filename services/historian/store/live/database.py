@@ -31,6 +31,7 @@ from wetwell.services.historian.store.live.row_checksum import (
     last_ns_of,
     sample_checksum,
 )
+from wetwell.services.historian.store.live.tally import MOST_DAYS
 
 MOST_EVENTS = 1_000_000
 """Messages of one kind that are looked through at once: more than a station tells in a day."""
@@ -42,6 +43,12 @@ _SIZE_AND_KEY = operator.itemgetter(3, 0, 1, 2)
 _STATION_SPANS = "SELECT name, coalesce(first_ns, 0), coalesce(last_ns, -1) FROM station"
 _OF_STATION = "FROM sample WHERE station = (SELECT id FROM station WHERE name = :station) "
 _LAST = "coalesce(last_ns, time_ns)"
+_DAYS_OF_OTHERS = (
+    f"SELECT time_ns / {DAY_NS} FROM event WHERE kind IN {get_args(EventKind)} "  # noqa: S608 - names
+    "AND station = (SELECT id FROM station WHERE name = :station) "
+    f"UNION SELECT hour_ns / {DAY_NS} FROM hour WHERE station = (SELECT id FROM station WHERE name = :station)"
+)
+"""Days of the messages and hours of a station; by its kinds an index has them."""
 _TOUCHING = f"{_OF_STATION} AND time_ns >= :hour AND time_ns < :end AND {_LAST} >= :start "
 """Rows that may have a sample of a span: since a row keeps to its hour, none before the hour of the start has one."""
 
@@ -178,6 +185,16 @@ class LiveDatabase:
             days_ns.append(day_of(next_ns))
             next_ns = self.next_time_ns(station, days_ns[-1] + DAY_NS)
         return days_ns
+
+    def days_of_all_ns(self, station: str) -> list[int]:
+        """Beginnings of the days that have samples, messages or hours, in order.
+
+        Messages and hours of a day stay here when its samples are in a file.
+        """
+        with self._file.reading() as database:
+            found = database.execute(_DAYS_OF_OTHERS, {"station": station}).fetchall()
+        others_ns = {day * DAY_NS for (day,) in found if isinstance(day, int) and abs(day) <= MOST_DAYS}
+        return sorted(others_ns | set(self.days_ns(station, -(2**63), 2**63 - 1)))
 
     def count(self, station: str, start_ns: int, end_ns: int, most: int) -> int:
         """Number of samples of a span, up to `most`; one that came alone and in a row of several counts twice."""

@@ -16,7 +16,7 @@ Counted = Literal["sample", "event"]
 
 _BITS = 0xFFFF_FFFF
 """Of a CRC-32: a damaged one must not overflow the sum."""
-_MOST_DAYS = 100_000
+MOST_DAYS = 100_000
 """From 1970; a stamp in nanoseconds reaches little further."""
 
 _TALLY = """
@@ -74,7 +74,7 @@ class Miscount(NamedTuple):
 
     def __str__(self) -> str:
         what = "rows of samples" if self.origin == "sample" else "messages"
-        is_day = isinstance(self.day, int) and abs(self.day) <= _MOST_DAYS  # a bit can turn a number into a text
+        is_day = isinstance(self.day, int) and abs(self.day) <= MOST_DAYS  # a bit can turn a number into a text
         of = f"station '{self.name or self.station}' on {to_iso(self.day * DAY_NS)[:10] if is_day else self.day}"
         if self.counted > self.found:
             return f"{self.counted - self.found} {what} of {of} are missing"
