@@ -20,7 +20,7 @@ from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects.effect import Component, Effect
 from wetwell.simulator.effects.station.correction_part import MOST_SIZE
-from wetwell.simulator.effects.station.learnt_correction import COMPONENT_OF, LEAST_OFFSET
+from wetwell.simulator.effects.station.learnt_correction import LEAST_OFFSET
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,8 +37,8 @@ class Unnamed(Candidate):
 
     @property
     def component(self) -> Component:
-        """Component that its term belongs to."""
-        return COMPONENT_OF[self.proposal.target.term]
+        """Component in which its cause lies."""
+        return effect_of(self.proposal).place
 
     @property
     def log_prior(self) -> float:

@@ -13,7 +13,6 @@ from wetwell.sim2real.diagnosis.correction_report import CorrectionAddend, Corre
 from wetwell.sim2real.diagnosis.report import Gap
 from wetwell.sim2real.diagnosis.shrinkage import gap_of
 from wetwell.sim2real.residuals.bins import Bins
-from wetwell.simulator.effects.station.learnt_correction import COMPONENT_OF
 from wetwell.simulator.parameters import PlantParameters
 
 LEAST_CLOSED = 0.5
@@ -66,7 +65,7 @@ def weighed(
         term=effect.term,
         pump=effect.pump,
         main=effect.main,
-        component=COMPONENT_OF[effect.term],
+        component=effect.place,
         covariates=tuple(dict.fromkeys(name_of(part) for part in effect.part)),
         equation=equation(effect, reference),
         sentence=said,
@@ -74,9 +73,7 @@ def weighed(
         shrinkage=gap.shrinkage,
         shrinkage_ci=gap.shrinkage_ci,
         equivalent=tuple(
-            EquivalentTerm(
-                term=one.term, component=COMPONENT_OF[one.term], equation=equation(one, one.reference(plant))
-            )
+            EquivalentTerm(term=one.term, component=one.place, equation=equation(one, one.reference(plant)))
             for one in learnt.equivalent
         ),
     )

@@ -30,7 +30,7 @@ from wetwell.sim2real.diagnosis.report import (
     UntestedEffect,
     Where,
 )
-from wetwell.sim2real.diagnosis.shrinkage import gap_of
+from wetwell.sim2real.diagnosis.shrinkage import excess_that_matters, gap_of
 from wetwell.sim2real.experiments.advice import next_experiment
 from wetwell.sim2real.experiments.conditions import Conditions, conditions_of
 from wetwell.sim2real.experiments.proposals import Proposals, proposals_of
@@ -204,13 +204,13 @@ def diagnose(
     found = attribute(replay, residuals, regimes, candidates, progress, each, priors)
     verdict = verdict_of(found.posterior)
     rng = np.random.default_rng(seed)
-    excess = np.where(found.validation, found.plain**2 - bins.floor, 0.0)
+    excess = excess_that_matters(found.plain, found.validation, bins)
     likeliest = max(found.unknown, key=lambda way: way.share, default=None)
     patterns = residuals.telemetry.components(() if likeliest is None else likeliest.acting)
     fall_m = 0.0 if found.falls is None else found.falls.far_m
     if fall_m > 0.0:
         patterns |= {"level_m": "level_sensor"}
-    beside = np.where(found.validation, found.beside**2 - bins.floor, 0.0)
+    beside = excess_that_matters(found.beside, found.validation, bins)
     pattern = localise(beside, found.beside, bins, plain.plant, patterns)
     by_component = component_probability(found.posterior, found.unknown, pattern)
     unknown_at = place_of_unknown(found.unknown, pattern)

@@ -66,6 +66,25 @@ def is_late(by_signal: Floats, excess: Floats, residuals: Floats, bins: Bins) ->
     return False
 
 
+def are_ahead(by_signal: Floats, residuals: Floats, bins: Bins) -> bool:
+    """Whether most of the gap is of pumps, all of whose readings come before their frequency: that is late then.
+
+    Flow, head and power are too high at starts and too low at stops. The level has passed the start level when a pump
+    is seen to start, and the stop level when it is seen to stop: with a shorter ramp it has not.
+
+    Parameters
+    ----------
+    by_signal, residuals, bins
+        As of `is_late`.
+    """
+    shown = [rows for rows in (bins.signal == one for one in (FLOW, HEAD, POWER)) if rows.any()]
+    starts = [*(rows & (bins.regime == START_RAMP) for rows in shown), bins.signal == START_LEVEL]
+    stops = [*(rows & (bins.regime == STOP_RAMP) for rows in shown), bins.signal == STOP_LEVEL]
+    return by_signal[[FLOW, HEAD, POWER]].sum() > 0.5 * by_signal.sum() and all(
+        mean_of(residuals, one) > 0.0 > mean_of(residuals, other) for one, other in zip(starts, stops, strict=True)
+    )
+
+
 def _is_behind(excess: Floats, residuals: Floats, bins: Bins) -> bool:
     """Whether a level reads too low where pumps start and too high where they stop, and leaves its course there.
 

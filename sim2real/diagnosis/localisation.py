@@ -12,6 +12,7 @@ from wetwell.sim2real.diagnosis.lateness import (
     OF_CHANNEL,
     SWINGING,
     WHERE_IT_MOVES,
+    are_ahead,
     block_means,
     is_late,
     mean_of,
@@ -79,7 +80,7 @@ def localise(
     for quantity, component in patterns.items():
         if by_signal[[TELEMETRY, *OF_CHANNEL.get(quantity, ())]].sum() > 0.5 * total:
             return component
-    if is_late(by_signal, excess, residuals, bins):
+    if is_late(by_signal, excess, residuals, bins) or are_ahead(by_signal, residuals, bins):
         return "telemetry"
     hydraulic = by_signal[FLOW] + by_signal[HEAD]
     if hydraulic > (1.0 - ALONE) * total:

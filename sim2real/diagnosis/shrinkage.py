@@ -7,8 +7,9 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats, Integers
 from wetwell.sim2real.diagnosis.report import Gap, SignalGap
 from wetwell.sim2real.diagnosis.report_part import Interval
+from wetwell.sim2real.recording.regimes import REGIMES
 from wetwell.sim2real.residuals.asinh_loss import squares_of
-from wetwell.sim2real.residuals.bins import SIGNALS, Bins
+from wetwell.sim2real.residuals.bins import SIGNALS, Bins, allowed_size
 from wetwell.sim2real.residuals.groups import groups_of
 
 FLOOR = 1.0
@@ -55,6 +56,29 @@ def gaps_of(before: Floats, after: Floats, bins: Bins, rows: Flags) -> tuple[flo
 def shrinkage(before: float, after: float) -> float:
     """Share of the gap over the floor that is gone; 0 without a gap to shrink."""
     return (before - after) / (before - FLOOR) if before - FLOOR > NOTHING else 0.0
+
+
+def excess_that_matters(residuals: Floats, rows: Flags, bins: Bins) -> Floats:
+    """(bins,) what of the squares is beyond noise, in each cell that departs by more than is allowed, if any does.
+
+    A cell is a signal of a pump in a regime. Thousands of seconds of ramps that are off by less than is allowed would
+    outweigh a stop level that is off by ten times of that.
+
+    Parameters
+    ----------
+    residuals : (bins,) array
+        As `asinh_loss` makes them.
+    rows : (bins,) array
+        That count; 0 elsewhere.
+    bins : Bins
+    """
+    cells = groups_of((bins.signal * len(REGIMES) + bins.regime) * 64 + bins.pump + 1, rows)
+    square = residuals**2
+    allowed = allowed_size(bins.material, bins.floor) ** 2
+    matters = cells.means(square - bins.floor) > cells.means(allowed)
+    excess = np.zeros(bins.size)
+    excess[rows] = np.where(matters[cells.number] | ~matters.any(), (square - bins.floor)[rows], 0.0)
+    return excess
 
 
 def cell_gap(excess: Floats, bins: Bins, cell: Flags, rng: np.random.Generator) -> tuple[float, Interval]:

@@ -9,7 +9,7 @@ from wetwell.protocols.errors import ConfigError
 from wetwell.protocols.station.station_file import load_station
 from wetwell.sim2real.correction.wording import equation, sentence
 from wetwell.simulator.effects import EFFECTS, effects_of
-from wetwell.simulator.effects.station.learnt_correction import COMPONENT_OF, LearntCorrection
+from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 from wetwell.simulator.parameters import plant_parameters
 
 NAME = r"[a-z][a-z0-9_]{2,39}"
@@ -144,7 +144,7 @@ def new_effect(diagnosis: Path, name: str, out: Path) -> dict[str, object]:
 
 def _words(learnt: LearntCorrection, name: str, formula: str, summary: str) -> dict[str, object]:
     sizes = {"offset": learnt.offset} | {f"size_{k}": part.size for k, part in enumerate(learnt.part, start=1)}
-    component = COMPONENT_OF[learnt.term]
+    component = learnt.place
     of_parts = []
     for k, part in enumerate(learnt.part, start=1):
         given = part.model_dump(exclude_none=True, exclude={"size"})

@@ -14,6 +14,7 @@ from wetwell.simulator.corrections.parts import (
     STATIC_HEAD,
     TERMS,
     CorrectionPart,
+    Covariate,
     Term,
 )
 from wetwell.simulator.effects.effect import Component, Effect, MainNumber, PumpNumber, limits
@@ -36,7 +37,11 @@ COMPONENT_OF: dict[Term, Component] = {
     "level_balance": "sump",
     "level_reading": "level_sensor",
 }
-"""Where the cause of a correction lies."""
+"""Where the cause of a correction of a term lies that goes with something."""
+
+
+IN_A_RUN: tuple[Covariate, ...] = ("since_start_s", "idle_before_s")
+"""What tells the seconds of a run, and one run, from others."""
 
 
 class LearntCorrection(Effect):
@@ -78,6 +83,21 @@ class LearntCorrection(Effect):
     part: Annotated[tuple[PartTable, ...], Field(max_length=3)] = ()
     pump: PumpNumber = 0
     main: MainNumber = 0
+
+    @property
+    def place(self) -> Component:
+        """Component in which the cause lies.
+
+        A power that is off alike in all runs of all pumps is its meter's: drives wear one by one, and what they draw
+        goes with load and supply. A speed that is off in one pump alone, or comes in a run, is the pump's: a drive
+        turns as it is told in each second of a run, and a worn or ragged impeller does less at the same speed.
+        """
+        comes_in_a_run = any(part.covariate in IN_A_RUN for part in self.part)
+        if self.term == "power" and not self.part and not self.pump:
+            return "power_meter"
+        if self.term == "speed" and (self.pump or comes_in_a_run):
+            return "pump"
+        return COMPONENT_OF[self.term]
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -36,6 +36,24 @@ def run(station, seconds=SECONDS):
     return {**recording.columns, **recording.truth}
 
 
+@pytest.mark.parametrize(
+    ("correction", "place"),
+    [
+        (learnt("power", offset=0.1), "power_meter"),
+        (learnt("power", offset=0.1, pump=2), "drive"),
+        (learnt("power", part("flow_m3h")), "drive"),
+        (learnt("speed", offset=-0.05), "drive"),
+        (learnt("speed", part("hour_of_day")), "drive"),
+        (learnt("speed", offset=-0.05, pump=2), "pump"),
+        (learnt("speed", part("since_start_s")), "pump"),
+        (learnt("pump_head", offset=-0.05), "pump"),
+    ],
+)
+def test_the_cause_lies_where_its_term_is_or_where_what_it_goes_with_points(alpha, correction, place):
+    (effect,) = effects_of(under(alpha, correction))
+    assert effect.place == place
+
+
 @pytest.mark.parametrize("layout", ["individual", "common"])
 @pytest.mark.parametrize(
     ("term", "offset", "named"),

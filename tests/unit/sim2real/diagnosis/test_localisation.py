@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wetwell.sim2real.diagnosis.localisation import localise
+from wetwell.sim2real.diagnosis.shrinkage import excess_that_matters
 from wetwell.sim2real.recording.regimes import START_RAMP, STEADY, STOP_RAMP
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, START_LEVEL, STOP_LEVEL, Bins, joined
 from wetwell.simulator.parameters import plant_parameters
@@ -177,3 +178,40 @@ def test_flow_that_comes_late_at_starts_alone_is_the_check_valve(alpha):
     _, c1, c2 = plant.curves[0]
     on_curve = (c1 + 2.0 * c2 * float(plant.rated_flow_m3h[0])) / HEAD_DEVIATION
     assert blamed(np.where(bins.signal == FLOW, -10.0, -10.0 * on_curve), bins, alpha) == "pump"
+
+
+def readings_ahead(starts, stops):
+    """Flow, head, power and levels of switches, by what they are off at starts and at stops."""
+    parts, residuals = [], []
+    for regime, sizes in ((START_RAMP, starts), (STOP_RAMP, stops)):
+        at_switch = START_LEVEL if regime == START_RAMP else STOP_LEVEL
+        for signal, size in zip((FLOW, HEAD, POWER, at_switch), sizes, strict=True):
+            parts.append(bins_of([signal], regime))
+            residuals.append(np.full(parts[-1].size, size))
+    return np.concatenate(residuals), joined(parts)
+
+
+@pytest.mark.parametrize(
+    ("starts", "stops", "component"),
+    [
+        ((8.0, 8.0, 8.0, 2.0), (-8.0, -8.0, -8.0, -2.0), "telemetry"),
+        ((8.0, 8.0, 8.0, -2.0), (-8.0, -8.0, -8.0, -2.0), "drive"),
+        ((8.0, 8.0, 8.0, 2.0), (8.0, -8.0, -8.0, -2.0), "drive"),
+        ((0.2, 0.2, 0.2, 8.0), (-0.2, -0.2, -0.2, -8.0), "controller"),
+    ],
+)
+def test_readings_that_all_come_before_their_frequency_are_telemetry(alpha, starts, stops, component):
+    """A shorter ramp moves no level of a switch, and a late controller no flow."""
+    residuals, bins = readings_ahead(starts, stops)
+    assert blamed(residuals, bins, alpha) == component
+
+
+def test_a_stop_level_is_not_outweighed_by_ramps_that_are_off_by_less_than_is_allowed():
+    ramps, stops = bins_of([FLOW, HEAD, POWER, LEVEL], STOP_RAMP), bins_of([STOP_LEVEL], STEADY)
+    bins = joined([replace(ramps, material=np.ones(ramps.size)), stops])
+    ramps_off = np.where(np.arange(bins.size) < ramps.size, 0.9, 2.0)
+    excess = excess_that_matters(ramps_off, np.ones(bins.size, dtype=np.bool_), bins)
+    assert set(np.unique(bins.signal[excess > 0.0])) == {STOP_LEVEL}
+    assert excess[-1] == 4.0
+    hardly = np.full(bins.size, 0.3)
+    assert np.all(excess_that_matters(hardly, bins.signal == FLOW, bins)[bins.signal == FLOW] == pytest.approx(0.09))
