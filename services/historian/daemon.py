@@ -21,7 +21,7 @@ from wetwell.services.historian.service import Historian, PayloadKind
 from wetwell.services.historian.store.opening import open_store
 from wetwell.services.runtime.clock import now_ns
 from wetwell.services.runtime.connection import connect
-from wetwell.services.runtime.folder_lock import CHECK_S
+from wetwell.services.runtime.folder_lock import look_for_ever
 from wetwell.services.runtime.lifecycle import report_health, run_until_stopped
 from wetwell.services.runtime.settings import Settings
 
@@ -156,7 +156,7 @@ async def keep(bus: Bus, historian: Historian, commit_s: float, maintain_s: floa
     async with asyncio.TaskGroup() as group:
         for kind, subscription in subscriptions.items():
             group.create_task(_handle(historian, kind, subscription), name=f"historian.{kind}")
-        group.create_task(_watch(historian), name="historian.hold")
+        group.create_task(look_for_ever(historian.check_place), name="historian.hold")
         group.create_task(_commit(historian, commit_s), name="historian.commit")
         group.create_task(_maintain(historian, maintain_s), name="historian.maintain")
         group.create_task(_answer(historian, questions), name="historian.answer")
@@ -169,13 +169,6 @@ async def _handle(historian: Historian, kind: PayloadKind, subscription: Subscri
             historian.handle(kind, payload)
             if number % PAYLOADS_AT_ONCE == 0:
                 await asyncio.sleep(0)
-
-
-async def _watch(historian: Historian) -> None:
-    """Look for ever whether the history is still in its place."""
-    while True:
-        historian.check_place()
-        await asyncio.sleep(CHECK_S)
 
 
 async def _commit(historian: Historian, period_s: float) -> None:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -61,9 +61,14 @@ class Hold:
         ConfigError
             Once it is lost.
         """
-        while True:
-            self.check()
-            await asyncio.sleep(CHECK_S)
+        await look_for_ever(self.check)
+
+
+async def look_for_ever(check: Callable[[], None]) -> None:
+    """Look each `CHECK_S` whether what is held is still held; what a look raises ends it."""
+    while True:
+        check()
+        await asyncio.sleep(CHECK_S)
 
 
 @contextlib.contextmanager

@@ -21,6 +21,7 @@ import numpy as np
 from accidents import SLOW_S, Plan
 from acts import happen
 from judged import Judged
+from looks import Looks
 from network import Network, Sent, SimulatedBus
 from readable import Row, Stock, readable_in, stock_of
 from simulated_plc import SimulatedPlc
@@ -229,6 +230,7 @@ class Process:
 
     def _stand(self) -> None:
         assert self.bus is not None
+        self._site.looks.matter()  # one that is due meanwhile comes when it goes on
         self.life.is_stalled = True
         self.bus.mute_s = self.bus.deaf_s = float("inf")
 
@@ -303,6 +305,7 @@ class Site:
         self.dice = random.Random(self.seed)
         self.network = Network(self.dice)
         self.judged = Judged()
+        self.looks = Looks()
         self.strains: Counter[str] = Counter()
         self.clock_s = 0.0
         self.kept_samples = self.dice.choice(KEPT_SAMPLES)
@@ -415,6 +418,7 @@ class Site:
         if act(folder):
             readable = readable_in(folder) if name == "historian" else set()
             self.harms.append(Harm(kind, name, _now_s(), readable))
+            self.looks.matter()
 
     def take_stock(self) -> None:
         """Note what the history has now."""
@@ -528,6 +532,7 @@ class Site:
         with contextlib.ExitStack() as patches:
             for target, replacement in (
                 ("wetwell.services.runtime.clock.time", SimpleNamespace(time_ns=time_ns)),
+                ("wetwell.services.runtime.folder_lock.asyncio", SimpleNamespace(sleep=self.looks.sleep)),
                 ("wetwell.services.gateway.poller.connection_to", lambda plc: self.plcs[plc.station].connection()),
                 ("wetwell.services.gateway.poller.random", self.dice),
                 ("wetwell.services.runtime.sample_sender.LEAST_KEPT", self.kept_samples),

@@ -1,6 +1,8 @@
 """An event loop whose clock jumps: hours of waiting cost nothing, and a seed gives the same events each time."""
 
 import asyncio
+import heapq
+import itertools
 import math
 import selectors
 from collections import deque
@@ -73,6 +75,17 @@ class _Ready(deque[asyncio.Handle]):
         return self._nothing
 
 
+class _Timer(asyncio.TimerHandle):
+    """Of those that are due at the same time the one that was made first comes first, whatever else waits."""
+
+    def __init__(self, number: int, *args: Any) -> None:
+        super().__init__(*args)
+        self._number = number
+
+    def __lt__(self, other: "_Timer") -> bool:
+        return (self._when, self._number) < (other._when, other._number)
+
+
 class VirtualLoop(asyncio.SelectorEventLoop):
     """Loop on a virtual clock that begins at 0 s. No threads and no sockets: nothing wakes it from outside.
 
@@ -85,10 +98,18 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         nothing = asyncio.Handle(lambda: None, (), self)
         nothing.cancel()
         self._ready = _Ready(nothing)
+        self._numbers = itertools.count()
 
     def time(self) -> float:
         """Virtual time. [s]"""
         return self._clock[0]
+
+    def call_at(self, when: float, callback: Any, *args: Any, context: Any = None) -> asyncio.TimerHandle:
+        """A timer that comes in its turn."""
+        timer = _Timer(next(self._numbers), when, callback, args, self, context)
+        heapq.heappush(self._scheduled, timer)
+        timer._scheduled = True
+        return timer
 
     def call_soon_threadsafe(self, callback: Any, *args: Any, context: Any = None) -> asyncio.Handle:
         """All is in one thread."""
