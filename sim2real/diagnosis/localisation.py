@@ -67,7 +67,7 @@ def localise(
     Parameters
     ----------
     excess : (bins,) array
-        What of the square of each residual is beyond noise.
+        What of the square of each residual is beyond noise, as of `excess_that_matters`.
     residuals : (bins,) array
     bins : Bins
     plant : PlantParameters

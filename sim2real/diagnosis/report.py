@@ -29,7 +29,7 @@ class Where(ReportPart):
     ci : (float, float)
         In which it lies with 95 %. [1]
     share : float
-        Of the whole gap. [1]
+        Of all that departs by more than is allowed. [1]
     """
 
     component: Component
