@@ -20,7 +20,7 @@ from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects.effect import Component, Effect
 from wetwell.simulator.effects.station.correction_part import MOST_SIZE
-from wetwell.simulator.effects.station.learnt_correction import LEAST_OFFSET
+from wetwell.simulator.effects.station.learnt_correction import LEAST_OFFSET, place_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +38,8 @@ class Unnamed(Candidate):
     @property
     def component(self) -> Component:
         """Component in which its cause lies."""
-        return effect_of(self.proposal).place
+        target = self.proposal.target
+        return place_of(target.term, target.pump, [atom.place.covariate for atom in self.proposal.atoms])
 
     @property
     def log_prior(self) -> float:

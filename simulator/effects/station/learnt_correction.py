@@ -1,5 +1,6 @@
 """What a diagnosis has learnt and nobody has named yet."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
@@ -26,7 +27,7 @@ LEAST_OFFSET = -0.9
 """Of the term, at the least. [1]"""
 LEAST_LEFT = 0.05
 """Share of a term that a correction has to leave of it. [1]"""
-COMPONENT_OF: dict[Term, Component] = {
+_COMPONENT_OF: dict[Term, Component] = {
     "head_loss": "rising_main",
     "static_head": "rising_main",
     "pump_head": "pump",
@@ -38,10 +39,30 @@ COMPONENT_OF: dict[Term, Component] = {
     "level_reading": "level_sensor",
 }
 """Where the cause of a correction of a term lies that goes with something."""
-
-
-IN_A_RUN: tuple[Covariate, ...] = ("since_start_s", "idle_before_s")
+_IN_A_RUN: tuple[Covariate, ...] = ("since_start_s", "idle_before_s")
 """What tells the seconds of a run, and one run, from others."""
+
+
+def place_of(term: Term, pump: int, covariates: Collection[Covariate]) -> Component:
+    """Component in which the cause of a correction lies.
+
+    A power that is off alike in all runs of all pumps is its meter's: drives wear one by one, and what they draw goes
+    with load and supply. A speed that is off in one pump alone, or comes in a run, is the pump's: a drive turns as it
+    is told in each second of a run, and a worn or ragged impeller does less at the same speed.
+
+    Parameters
+    ----------
+    term : str
+    pump : int
+        Of which pump, from 1; 0 for all.
+    covariates : collection of str
+        What it goes with; empty for a constant.
+    """
+    if term == "power" and not pump and not covariates:
+        return "power_meter"
+    if term == "speed" and (pump or not set(covariates).isdisjoint(_IN_A_RUN)):
+        return "pump"
+    return _COMPONENT_OF[term]
 
 
 class LearntCorrection(Effect):
@@ -86,18 +107,8 @@ class LearntCorrection(Effect):
 
     @property
     def place(self) -> Component:
-        """Component in which the cause lies.
-
-        A power that is off alike in all runs of all pumps is its meter's: drives wear one by one, and what they draw
-        goes with load and supply. A speed that is off in one pump alone, or comes in a run, is the pump's: a drive
-        turns as it is told in each second of a run, and a worn or ragged impeller does less at the same speed.
-        """
-        comes_in_a_run = any(part.covariate in IN_A_RUN for part in self.part)
-        if self.term == "power" and not self.part and not self.pump:
-            return "power_meter"
-        if self.term == "speed" and (self.pump or comes_in_a_run):
-            return "pump"
-        return COMPONENT_OF[self.term]
+        """Component in which the cause lies."""
+        return place_of(self.term, self.pump, [part.covariate for part in self.part])
 
     @property
     def bounds(self) -> tuple[float, float]:

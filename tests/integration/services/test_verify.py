@@ -251,7 +251,7 @@ def test_a_look_through_reads_messages_and_hours_of_a_day_whose_samples_are_in_a
     shutil.copytree(kept / "history", folder)
     with contextlib.closing(sqlite3.connect(folder / "live.sqlite", isolation_level=None)) as database:
         hours = database.execute("SELECT hour_ns FROM hour ORDER BY hour_ns").fetchall()
-        samples = database.execute("SELECT count(*) FROM sample WHERE time_ns < ?", (hours[1])).fetchone()
+        samples = database.execute("SELECT count(*) FROM sample WHERE time_ns < ?", hours[1]).fetchone()
         assert samples == (0,)
         database.execute("UPDATE hour SET data = zeroblob(length(data)) WHERE hour_ns = ?", hours[0])
         (first_ns,) = database.execute("SELECT min(time_ns) FROM event").fetchone()

@@ -4,12 +4,14 @@ import asyncio
 import contextlib
 import logging
 import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from unittest import mock
 
 from memory_bus import MemoryBus
 from virtual_loop import run_virtual
 
+from wetwell.protocols.bus.interface import Publisher
 from wetwell.protocols.bus.keys import history_key, sample_key
 from wetwell.protocols.messages.sample import Sample
 from wetwell.protocols.timestamps import NS_PER_S
@@ -72,9 +74,10 @@ def test_what_was_lost_comes_again_from_the_publishers(tmp_path, caplog):
     assert "what was lost is taken from the publishers" in caplog.text
 
 
-def test_where_the_writer_mends_a_row_what_publishers_keep_comes_again(tmp_path):
-    """The disk has changed another row too, which the writer does not remember, and nobody looks for an hour."""
-    settings = Settings(historian=HistorianSettings(folder=tmp_path, maintain_s=3_600.0))
+@contextlib.contextmanager
+def kept_through(folder: Path, happen: Callable[[FolderStore, Publisher], None]) -> Iterator[FolderStore]:
+    """The store of a daemon that has got samples, a minute after what happens then; nobody looks for an hour."""
+    settings = Settings(historian=HistorianSettings(folder=folder, maintain_s=3_600.0))
 
     async def live() -> None:
         publisher = bus.publisher(sample_key("alpha"), history=600)
@@ -82,40 +85,36 @@ def test_where_the_writer_mends_a_row_what_publishers_keep_comes_again(tmp_path)
         for number in range(SAMPLES):
             publisher.put(sample(number))
         await asyncio.sleep(5.0)
-        store.file._writer.execute("UPDATE sample SET quality = quality + 1 WHERE seq = 300")
-        store.file.refused.note("sample", 1, 7 * NS_PER_S, 7)  # it was another one on the disk
-        publisher.put(sample(SAMPLES))
+        happen(store, publisher)
         await asyncio.sleep(60.0)
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
 
-    with contextlib.closing(FolderStore(tmp_path)) as store, MemoryBus() as bus:
+    with contextlib.closing(FolderStore(folder)) as store, MemoryBus() as bus:
         opened = mock.patch.object(daemon, "open_store", return_value=contextlib.nullcontext(store))
         with opened, on_bus(bus):
             run_virtual(live())
+        yield store
+
+
+def test_where_the_writer_mends_a_row_what_publishers_keep_comes_again(tmp_path):
+    """The disk has changed another row too, which the writer does not remember."""
+
+    def happen(store: FolderStore, publisher: Publisher) -> None:
+        store.file._writer.execute("UPDATE sample SET quality = quality + 1 WHERE seq = 300")
+        store.file.refused.note("sample", 1, 7 * NS_PER_S, 7)  # it was another one on the disk
+        publisher.put(sample(SAMPLES))
+
+    with kept_through(tmp_path, happen) as store:
         assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES + 1))
 
 
 def test_what_a_question_finds_damaged_comes_again_though_nobody_sends_anything_new(tmp_path):
-    """Nothing is to be written, and nobody looks for an hour."""
-    settings = Settings(historian=HistorianSettings(folder=tmp_path, maintain_s=3_600.0))
-
-    async def live() -> None:
-        publisher = bus.publisher(sample_key("alpha"), history=600)
-        running = asyncio.create_task(daemon._run(settings))
-        for number in range(SAMPLES):
-            publisher.put(sample(number))
-        await asyncio.sleep(5.0)
+    def happen(store: FolderStore, _: Publisher) -> None:
         store.file._writer.execute("UPDATE sample SET quality = quality + 1 WHERE seq = 300")
         assert len(store.samples("alpha", 0, 2**62)) == SAMPLES - 1
-        await asyncio.sleep(60.0)
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
 
-    with contextlib.closing(FolderStore(tmp_path)) as store, MemoryBus() as bus:
-        opened = mock.patch.object(daemon, "open_store", return_value=contextlib.nullcontext(store))
-        with opened, on_bus(bus):
-            run_virtual(live())
+    with kept_through(tmp_path, happen) as store:
         assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(SAMPLES))
         assert store.file._writer.execute("SELECT origin FROM refused").fetchall() == [("sample",)]
 
