@@ -107,12 +107,12 @@ class LiveFile:
                 self._begin_anew("damaged")
             try:
                 self._writer.execute("BEGIN IMMEDIATE")
-                damages, is_out_of_order = self.refused.put_aside(self._writer)
+                aside = self.refused.put_aside(self._writer)
                 yield self._writer
                 self._writer.execute(COUNT_COMMIT)
                 self._writer.execute("COMMIT")
-                self.damages += damages
-                self.is_damaged = self.is_damaged or is_out_of_order
+                self.damages += aside.number
+                self.is_damaged = self.refused.forget(aside) or self.is_damaged
             except (sqlite3.Error, UnicodeDecodeError) as error:
                 self._note(error)
                 raise StoreError(f"{self._path}: {error}") from error

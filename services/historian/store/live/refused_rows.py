@@ -5,7 +5,7 @@ import sqlite3
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from wetwell.services.historian.store.live.connection import of_key
 from wetwell.services.historian.store.live.row_checksum import is_event_intact, is_hour_intact, is_sample_intact
@@ -13,6 +13,8 @@ from wetwell.services.historian.store.live.row_checksum import is_event_intact, 
 log = logging.getLogger(__name__)
 
 Table = Literal["sample", "event", "hour"]
+Row = tuple[Table, tuple[int, ...]]
+"""Table and key of a row."""
 
 _ROW_OF: dict[Table, str] = {
     "sample": of_key("station", "time_ns", "seq"),
@@ -28,6 +30,14 @@ _CHECK: dict[Table, tuple[str, Callable[..., bool]]] = {
 """All columns of a row, and what says of them whether they are what was written."""
 
 
+class PutAside(NamedTuple):
+    """What one transaction moves: the rows that were found, how many of them are there, and which are not."""
+
+    rows: frozenset[Row]
+    number: int
+    not_there: frozenset[Row]
+
+
 class RefusedRows:
     """Rows that were found damaged. As long as one is in its table, what comes again could not take its place.
 
@@ -40,8 +50,8 @@ class RefusedRows:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lock = threading.Lock()
-        self._found: dict[tuple[Table, tuple[int, ...]], None] = {}
-        self._not_there: set[tuple[Table, tuple[int, ...]]] = set()
+        self._found: dict[Row, None] = {}
+        self._not_there: set[Row] = set()
 
     @property
     def are_any(self) -> bool:
@@ -56,29 +66,37 @@ class RefusedRows:
         if is_new:
             log.error("%s: a row of table %s is not what was written, and left out", self._path, table)
 
-    def put_aside(self, database: sqlite3.Connection) -> tuple[int, bool]:
+    def put_aside(self, database: sqlite3.Connection) -> PutAside:
         """Move what was found into the table of refused rows, in a transaction of the caller.
 
         A row that has its key and is what was written is another one, such as that of a file begun anew, or what the
         writer remembers of a page that the disk has changed: it is written once more, and counts. Where the disk has
         changed one row it may have changed others, which nobody has read yet.
-
-        Returns
-        -------
-        count, is_damaged : int, bool
-            How many rows; and whether one is read again and again that is not found by its key: then the order of
-            the file is damaged.
         """
         with self._lock:
-            found, self._found = self._found, {}
-        count, is_damaged = 0, False
+            found = list(self._found)
+        count, not_there = 0, set[Row]()
         for table, key in found:
             there, intact = _put_aside(database, table, key)
             count += there
             if there == intact:
-                is_damaged = is_damaged or (table, key) in self._not_there
-                self._not_there.add((table, key))
-        return count, is_damaged
+                not_there.add((table, key))
+        return PutAside(frozenset(found), count, frozenset(not_there))
+
+    def forget(self, aside: PutAside) -> bool:
+        """Wait no longer with what was put aside, once its transaction is kept.
+
+        Returns
+        -------
+        bool
+            Whether a row is read again and again that is not found by its key: then the order of the file is damaged.
+        """
+        with self._lock:
+            for row in aside.rows:
+                self._found.pop(row, None)
+            is_out_of_order = not self._not_there.isdisjoint(aside.not_there)
+            self._not_there |= aside.not_there
+        return is_out_of_order
 
 
 def _put_aside(database: sqlite3.Connection, table: Table, key: tuple[int, ...]) -> tuple[int, int]:

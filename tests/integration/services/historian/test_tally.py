@@ -113,6 +113,21 @@ def test_rows_that_are_missing_or_put_in_show_are_told_once_and_come_again(path,
         assert set(verdicts) == {f"verdict {number}".encode() for number in range(0, 120, 10)}
 
 
+def test_a_row_that_was_found_damaged_waits_for_a_writing_that_is_kept(path):
+    behind_its_back(path, "UPDATE sample SET quality = quality + 1 WHERE seq = 7")
+    with contextlib.closing(FolderStore(path.parent)) as store:
+        assert len(store.samples("alpha", 0, 2**62)) == 119
+        for _ in range(2):  # a second time says nothing more of the order of the file
+            with pytest.raises(StoreError), store.file.transaction() as database:
+                raise sqlite3.OperationalError("database or disk is full")
+            assert store.file.is_to_be_mended
+            assert database.execute("SELECT count(*) FROM refused").fetchone() == (0,)
+        store.write(batch(0, 120))
+        assert not store.file.is_to_be_mended
+        assert store.samples("alpha", 0, 2**62).seq.tolist() == list(range(120))
+        assert store.damages == 1
+
+
 def test_what_is_rolled_into_files_or_deleted_when_it_is_old_is_not_missing(tmp_path):
     with contextlib.closing(FolderStore(tmp_path, keep_days=9)) as store:
         store.write(batch(0, 100))
