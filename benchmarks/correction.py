@@ -5,8 +5,8 @@
 Each case is drawn as in `wetwell gap trial` (kinds as said; plants fine and elastic take turns). The correction is
 learnt whether or not a diagnosis would say `unknown`. Where one is taken on a truth without any, the diagnosis is
 made, too: only its `unknown` would let a user see it. Of what was left out of the library the component is known, and
-no covariate. Two effects have another component than the term that they are in the simulator: a leak of a check valve
-flows into the wet well, and a late channel is read wrong. Those terms are right for them, too.
+no covariate. A late channel has another component than the term that it is in the simulator: it is read wrong. That
+term is right for it, too.
 """
 
 import argparse
@@ -73,8 +73,6 @@ def right_of(truth: TruthCase) -> tuple[set[str], set[str]]:
     match first.name:
         case "channel_delay":
             return {READING_OF[str(first.parameters["channel"])]}, set()
-        case "check_valve_leak":
-            return {"level_balance"}, set()
         case name:
             return RIGHT.get(name, (set(), set()))
 

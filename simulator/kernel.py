@@ -15,6 +15,7 @@ from wetwell.simulator.corrections.parts import (
     POWER_TERM,
     PUMP_HEAD,
     SPEED,
+    SUMP_AREA,
 )
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.hydraulics import pump_head_m
@@ -122,7 +123,10 @@ def move_plant(
     inflow_m3h = forcing.inflow_m3h[second] + unmetered_m3h + extra_inflow_m3h
     inflow_m3h += state.correction[LEVEL_BALANCE, 0]
     inflow_m3h += back_flow_m3h(plant, state, forcing, second, level_m)
-    now.volume_m3 = next_volume_m3(now.volume_m3, inflow_m3h, over_m3h, state.mean_flow_m3h)
+    before_m3 = now.volume_m3
+    now.volume_m3 = next_volume_m3(before_m3, inflow_m3h, over_m3h, state.mean_flow_m3h)
+    if plant.has_corrections:
+        now.volume_m3 = before_m3 + (now.volume_m3 - before_m3) / (1.0 + state.correction[SUMP_AREA, 0])
     if is_moving:
         load_pumps(plant, state, forcing.voltage_factor[second], truth, at_truth)
     truth.level_m[at_truth] = level_m

@@ -16,7 +16,9 @@ EFFECT_OF_A_CONSTANT: dict[Term, str] = {
     "flow_reading": "flow_meter_gain",
     "head_reading": "head_sensor_offset",
     "power": "power_meter_gain",
+    "back_flow": "check_valve_leak",
     "level_balance": "unmetered_inflow",
+    "sump_area": "sump_area_profile",
 }
 """Effect of the library that a constant correction of a term is."""
 

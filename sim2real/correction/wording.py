@@ -19,12 +19,15 @@ TERMS_IN_WORDS: dict[Term, str] = {
     "flow_reading": "the reading of the flow meter",
     "head_reading": "the reading of the head sensor",
     "power": "the power",
+    "back_flow": "the flow back through a standing pump",
     "level_balance": "the flow into the wet well",
     "level_reading": "the reading of the level sensor",
+    "sump_area": "the area of the wet well",
 }
 UNITS_OF_TERMS: dict[Term, str] = {
     "static_head": "m",
     "head_reading": "m",
+    "back_flow": "m³/h",
     "level_balance": "m³/h",
     "level_reading": "m",
 }

@@ -5,7 +5,7 @@ import math
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.protocols.jit import compiled, inlined
 from wetwell.protocols.quantities import FIRST_PUMP, FLOW, HEAD, LEVEL, POWER
-from wetwell.simulator.corrections.parts import FLOW_READING, HEAD_READING, LEVEL_READING
+from wetwell.simulator.corrections.parts import FLOW_READING, HEAD_READING, LEVEL_READING, SUMP_AREA
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.kernel import move_plant
 from wetwell.simulator.parameters import PlantRecords
@@ -116,6 +116,7 @@ def replay_seconds(
             came_m += level_gain[second] * error_m
             filtered_m += sensor_gain[0, second] * error_m
             sensed_m += sensor_gain[1, second] * error_m
+            area_m2 *= 1.0 + state.correction[SUMP_AREA, 0]
             extra_m3h += coming * inflow_gain[second] * error_m * area_m2 * 3600.0
 
 

@@ -3,6 +3,7 @@
 from wetwell.protocols.jit import inlined
 from wetwell.simulator.corrections.parts import (
     ALL,
+    BACK_FLOW,
     COLUMN,
     DAY_OF_WEEK,
     DAYS,
@@ -30,7 +31,7 @@ FIRST_MONDAY_D = 4.0
 def correct(plant: PlantRecords, state: PlantState, forcing: Forcing, second: int, level_m: float) -> None:
     """Set what is added to each term, (terms, pumps), for a second; covariates of flow are those of the one before.
 
-    A term of the station as a whole (balance and reading of the level) has the same value for each pump.
+    A term of the station as a whole (balance and reading of the level, area) has the same value for each pump.
     """
     _note_runs(plant, state)
     added = state.correction
@@ -42,7 +43,7 @@ def correct(plant: PlantRecords, state: PlantState, forcing: Forcing, second: in
         for i in range(state.pumps.size):
             if part.pump not in (ALL, i) or part.main not in (ALL, plant.pumps[i].main):
                 continue
-            if part.term < LEVEL_BALANCE and not _is_used(part.term, i, plant, state):
+            if part.term < BACK_FLOW and not _is_used(part.term, i, plant, state):
                 continue
             value = _covariate(part.covariate, part.column, part.term, i, plant, state, forcing, second, level_m)
             shape = shape_at(part.shape, value, part.centre, part.scale, part.low, part.high)

@@ -15,13 +15,15 @@ Term = Literal[
     "flow_reading",
     "head_reading",
     "power",
+    "back_flow",
     "level_balance",
     "level_reading",
+    "sump_area",
 ]
 TERMS: tuple[Term, ...] = get_args(Term)
 HEAD_LOSS, STATIC_HEAD, PUMP_HEAD, SPEED, FLOW_READING, HEAD_READING = range(6)
-POWER_TERM, LEVEL_BALANCE, LEVEL_READING = range(6, 9)
-"""Places of the terms."""
+POWER_TERM, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING, SUMP_AREA = range(6, 11)
+"""Places of the terms: first those of a pipe, then those of a pump, and from the balance on those of the station."""
 
 Covariate = Literal[
     "level_m",
@@ -89,7 +91,7 @@ class CorrectionPart:
         From 0, or `ALL`.
     size : float
         In the unit of the term: a share, or m of the static head, of a head reading and of a level, m³/h of the
-        balance.
+        balance, and m³/h at 1 m of the back flow.
     centre, scale, low, high : float
         In the unit of the covariate: zero and unit of the shape, and the range in which it is known.
     """

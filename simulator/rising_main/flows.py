@@ -4,7 +4,7 @@ import math
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import inlined
-from wetwell.simulator.corrections.parts import HEAD_LOSS, STATIC_HEAD
+from wetwell.simulator.corrections.parts import BACK_FLOW, HEAD_LOSS, STATIC_HEAD
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.hydraulics import common_flows, header_back_flow_m3h, individual_flow_m3h
 from wetwell.simulator.parameters import MainParameters, PlantRecords
@@ -259,7 +259,8 @@ def _valve_leak_m3h(plant: PlantRecords, state: PlantState, forcing: Forcing, se
     """Flow back through the check valve of a pump at 1 m, if it stands. [m³/h]."""
     if state.speed_ratio[i] > 0.0 or state.flow_m3h[i] > 0.0:
         return 0.0
-    leak_m3h: float = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
+    told_m3h = plant.pumps[i].valve_leak_m3h + forcing.valve_leak_m3h[i, second]
+    leak_m3h: float = max(told_m3h + state.correction[BACK_FLOW, i], 0.0)
     return leak_m3h
 
 

@@ -1,5 +1,6 @@
 """What a diagnosis has learnt and nobody has named yet."""
 
+import math
 from collections.abc import Collection
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
@@ -8,9 +9,11 @@ from pydantic import Field
 
 from wetwell.simulator.corrections.parts import (
     ALL,
+    BACK_FLOW,
     COVARIATES,
     HEAD_READING,
     LEVEL_BALANCE,
+    LEVEL_READING,
     SHAPES,
     STATIC_HEAD,
     TERMS,
@@ -27,6 +30,8 @@ LEAST_OFFSET = -0.9
 """Of the term, at the least. [1]"""
 LEAST_LEFT = 0.05
 """Share of a term that a correction has to leave of it. [1]"""
+_MAY_BE_NOTHING = frozenset({STATIC_HEAD, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING})
+"""Places of terms of which a correction may leave nothing."""
 _COMPONENT_OF: dict[Term, Component] = {
     "head_loss": "rising_main",
     "static_head": "rising_main",
@@ -35,8 +40,10 @@ _COMPONENT_OF: dict[Term, Component] = {
     "flow_reading": "flow_meter",
     "head_reading": "head_sensor",
     "power": "drive",
+    "back_flow": "pump",
     "level_balance": "sump",
     "level_reading": "level_sensor",
+    "sump_area": "sump",
 }
 """Where the cause of a correction of a term lies that goes with something."""
 _IN_A_RUN: tuple[Covariate, ...] = ("since_start_s", "idle_before_s")
@@ -68,11 +75,13 @@ def place_of(term: Term, pump: int, covariates: Collection[Covariate]) -> Compon
 class LearntCorrection(Effect):
     r"""One term of the model goes with what its addends say, and no effect of the library has a name for it.
 
-    $$X \leftarrow X + X_r\,c \quad (\text{readings of flow, power, losses, pump head, speed: } X_r = X), \qquad
+    $$X \leftarrow X + X_r\,c \quad (\text{read flow, power, losses, pump head, speed, area: } X_r = X), \qquad
     c = c_0 + \sum_k a_k\, \phi_k\!\left(\frac{x_k - x_{0k}}{s_k}\right)$$
 
     The reference $X_r$ is the rated head for static head and reading of the head, the rated flow for the balance
-    of the level, 1 m for its reading. Shapes φ: z, z², cos 2πz, exp(−z), ln(1 + z), and the step [z >= 0].
+    of the level, 1 m for its reading. What flows back through a standing pump is counted at 1 m, and its reference is
+    such that the rated flow would flow back at the rated head. Shapes φ: z, z², cos 2πz, exp(−z), ln(1 + z), and the
+    step [z >= 0].
 
     Parameters
     ----------
@@ -118,11 +127,10 @@ class LearntCorrection(Effect):
 
     def reference(self, parameters: PlantParameters) -> float:
         """X_r in the unit of the term; 1 where c is a share of the term itself. [m, m³/h, 1]."""
-        term = TERMS.index(self.term)
-        if term in {STATIC_HEAD, HEAD_READING}:
-            heads_m = [pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) for pump in parameters.pumps]
-            return max(heads_m)
-        return max(pump.rated_flow_m3h for pump in parameters.pumps) if term == LEVEL_BALANCE else 1.0
+        term, flow_m3h = TERMS.index(self.term), max(pump.rated_flow_m3h for pump in parameters.pumps)
+        head_m = max(pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) for pump in parameters.pumps)
+        of_term = {STATIC_HEAD: head_m, HEAD_READING: head_m, LEVEL_BALANCE: flow_m3h}
+        return of_term.get(term, flow_m3h / math.sqrt(head_m) if term == BACK_FLOW else 1.0)
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Add the addends.
@@ -138,7 +146,7 @@ class LearntCorrection(Effect):
             if number and not fits:
                 raise ValueError(f"learnt_correction.{key}: got {number}, term '{self.term}' has no {key} of its own")
         low, high = self.bounds
-        if not of_station and term != STATIC_HEAD and 1.0 + low < LEAST_LEFT:
+        if term not in _MAY_BE_NOTHING and 1.0 + low < LEAST_LEFT:
             raise ValueError(
                 f"learnt_correction: {self.term} would fall to {1.0 + low:.3g} of itself, must keep {LEAST_LEFT:g}"
             )

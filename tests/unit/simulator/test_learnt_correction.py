@@ -47,6 +47,8 @@ def run(station, seconds=SECONDS):
         (learnt("speed", offset=-0.05, pump=2), "pump"),
         (learnt("speed", part("since_start_s")), "pump"),
         (learnt("pump_head", offset=-0.05), "pump"),
+        (learnt("back_flow", offset=0.1), "pump"),
+        (learnt("sump_area", part("level_m")), "sump"),
     ],
 )
 def test_the_cause_lies_where_its_term_is_or_where_what_it_goes_with_points(alpha, correction, place):
@@ -64,6 +66,8 @@ def test_the_cause_lies_where_its_term_is_or_where_what_it_goes_with_points(alph
         ("flow_reading", 0.12, {"name": "flow_meter_gain", "factor": 1.12}),
         ("head_reading", 0.1, {"name": "head_sensor_offset", "offset_m": 0.1}),
         ("level_balance", 0.08, {"name": "unmetered_inflow", "flow_m3h": 0.08}),
+        ("back_flow", 0.05, {"name": "check_valve_leak", "leak_m3h": 0.05}),
+        ("sump_area", 0.2, {"name": "sump_area_profile", "height_m": 0.1, "bottom_factor": 1.2, "top_factor": 1.2}),
     ],
 )
 def test_a_constant_correction_is_the_effect_that_has_a_name(term, offset, named, layout, quiet_alpha):
@@ -72,7 +76,10 @@ def test_a_constant_correction_is_the_effect_that_has_a_name(term, offset, named
     station = under(plain, learnt(term, offset=offset))
     (effect,) = effects_of(station)
     reference = effect.reference(plant_parameters(station))
-    named = {key: value * reference if key in {"offset_m", "flow_m3h"} else value for key, value in named.items()}
+    named = {
+        key: value * reference if key in {"offset_m", "flow_m3h", "leak_m3h"} else value
+        for key, value in named.items()
+    }
     ours, theirs = run(station), run(under(plain, named))
     compared = [name for name in ours if not name.startswith("truth_")]
     for name in compared:
@@ -181,6 +188,23 @@ def test_each_term_moves_its_own_signal(quiet_alpha):
     for term in set(TERMS) - set(own):
         rows = run(under(quiet_alpha, learnt(term, part("since_start_s", "decay", 0.1, 0.0, 600.0, scale=60.0))))
         assert not np.array_equal(rows["level_m"], plain["level_m"]), term
+
+
+def test_less_than_nothing_flows_back_through_no_pump(quiet_alpha):
+    plain, rows = run(quiet_alpha), run(under(quiet_alpha, learnt("back_flow", offset=-0.05)))
+    np.testing.assert_allclose(rows["level_m"], plain["level_m"], rtol=1e-12)
+
+
+def test_where_the_area_is_twice_as_large_the_level_moves_half_as_fast(quiet_alpha):
+    above = part("level_m", "step", 1.0, 0.0, 9.0, centre=1.0, scale=1.0)
+    rows = run(under(quiet_alpha, learnt("sump_area", above)))
+    level_m = rows["truth_level_m"]
+    net_m3h = rows["inflow_m3h"] - sum(rows[f"truth_pump{i}_flow_m3h"] for i in (1, 2, 3))
+    moved = (net_m3h[:-1] != 0.0) & (level_m[:-1] < 3.0) & (level_m[:-1] > 0.1)
+    area_m2 = (net_m3h[:-1] / 3600.0)[moved] / np.diff(level_m)[moved]
+    is_above = level_m[:-1][moved] >= 1.0
+    assert min(is_above.sum(), (~is_above).sum()) > 300
+    assert np.median(area_m2[is_above]) == pytest.approx(2.0 * np.median(area_m2[~is_above]), rel=1e-3)
 
 
 def test_a_column_without_values_stands_at_its_centre(quiet_alpha):

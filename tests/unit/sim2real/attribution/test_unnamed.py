@@ -40,6 +40,9 @@ def test_it_is_as_probable_as_its_term_and_addends(proposal):
         ("pump_head", 2, "pump_wear"),
         ("head_reading", 0, "head_sensor_offset"),
         ("level_reading", 0, None),
+        ("back_flow", 0, "check_valve_leak"),
+        ("back_flow", 1, None),
+        ("sump_area", 0, "sump_area_profile"),
     ],
 )
 def test_a_constant_has_the_name_of_an_effect_of_as_many_pumps(term, pump, named):
