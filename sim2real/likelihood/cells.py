@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats, Integers
-from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES, START_RAMP, STOP_RAMP
+from wetwell.sim2real.recording.regimes import MULTI_PUMP, REGIMES, START_RAMP, STEADY, STOP_RAMP
 from wetwell.sim2real.residuals.bins import LEVEL, Bins, allowed_size
 from wetwell.sim2real.residuals.phases import group_of, phase
 
@@ -13,6 +13,9 @@ SPANS = 32
 """More than there are spans since a regime began."""
 TIMES = (1.0, 3.0, 10.0, 30.0)
 """How many times what is known a size may be of which nobody knows more: half a decade apart. [1]"""
+POORLY = 0.1
+"""Probability that a right model is poor in a span or group; that a block is one where it mostly is; that it rains in
+a cycle, and that it does not where several pumps run. [1]"""
 SURGES = (0.0, *TIMES[:3])
 """Variance that surges of an inflow without a meter add to the level, over what the drift of the inflow at rest makes
 of it: rain comes faster than that. In slow rows with a meter, what the rows hide of inflow and switches, over what
@@ -168,8 +171,9 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     $$\sigma^2 = \overline{f} / n, \qquad a^2 = m^2 + 1 - \overline{f}$$
 
     with the share f of a bin's variance that is noise, which the n bins of a cell average away, the material size m,
-    and the rest of that variance, which is what a right model may be off. Several pumps run because it rains: what an
-    inflow without a meter does to the level then, it may do alike in all storms.
+    and the rest of that variance, which is what a right model may be off. Several pumps run because it rains, and so
+    does one that runs for longer than nearly all others: what an inflow without a meter does to the level then, it
+    may do alike in all storms.
 
     Parameters
     ----------
@@ -196,7 +200,8 @@ def cells_of(bins: Bins, condition: Integers, *, has_inflow: bool, is_each_secon
     noise = np.bincount(of_bin, bins.floor) / counts
     variance, allowed = noise / counts, allowed_size(np.bincount(of_bin, bins.material) / counts, noise)
     if not has_inflow:
-        in_storms = ((signal == LEVEL) & (regime == MULTI_PUMP))[group]
+        is_rare = (np.bincount(group) < POORLY * cycles) & (span < SPANS)  # of what a crew does nobody knows
+        in_storms = ((signal == LEVEL) & ((regime == MULTI_PUMP) | (regime == STEADY) & is_rare))[group]
         allowed[in_storms] = np.hypot(allowed, np.sqrt(RAIN * variance))[in_storms]
     in_storm = np.bincount(bins.cycle, bins.regime == MULTI_PUMP) > 0.0
     block_of = (signal * len(REGIMES) + regime)[group]

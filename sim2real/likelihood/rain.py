@@ -3,9 +3,8 @@
 import numpy as np
 
 from wetwell.protocols.arrays import Flags, Floats
-from wetwell.sim2real.likelihood.cells import RAIN, Block
+from wetwell.sim2real.likelihood.cells import POORLY, RAIN, Block
 from wetwell.sim2real.likelihood.covariance import expected_squares
-from wetwell.sim2real.likelihood.ways import POORLY
 
 
 def rainy_cells(block: Block, residuals: Floats) -> tuple[Flags, float]:

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from wetwell.protocols.arrays import Floats, Integers
-from wetwell.sim2real.likelihood.cells import Block
+from wetwell.sim2real.likelihood.cells import POORLY, Block
 from wetwell.sim2real.likelihood.covariance import (
     DIFFERING,
     GOOD,
@@ -21,9 +21,6 @@ from wetwell.sim2real.likelihood.covariance import (
 )
 from wetwell.sim2real.likelihood.scatter import scatter_of, settled
 from wetwell.sim2real.residuals.bins import START_LEVEL, STOP_LEVEL
-
-POORLY = 0.1
-"""Probability that a right model is poor in a span or group; and that a block is one where it mostly is. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

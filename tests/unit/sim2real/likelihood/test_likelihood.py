@@ -1,6 +1,6 @@
 """The likelihood against dense matrices, and what it must and must not gain from."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import product
 
 import numpy as np
@@ -8,7 +8,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from wetwell.sim2real.likelihood.cells import RAIN, cells_of
+from wetwell.sim2real.likelihood.cells import POORLY, RAIN, cells_of
 from wetwell.sim2real.likelihood.covariance import (
     GOOD,
     HARDLY_DIFFERENT,
@@ -25,7 +25,7 @@ from wetwell.sim2real.likelihood.covariance import (
 from wetwell.sim2real.likelihood.evidence import TRUSTED, Member, cell_weights, evidence, evidence_of_none
 from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.rain import rainy_cells
-from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, POORLY, SPAN_WAYS, Way
+from wetwell.sim2real.likelihood.ways import CHANGING_WAYS, OWN_WAYS, SPAN_WAYS, Way
 from wetwell.sim2real.recording.regimes import IDLE, MULTI_PUMP, STEADY
 from wetwell.sim2real.residuals.bins import FLOW, HEAD, LEVEL, POWER, STOP_LEVEL, Bins
 
@@ -40,8 +40,11 @@ def cells():
     return made(has_inflow=True)
 
 
-def made(*, has_inflow, is_each_second=True, seconds=(0, 70, 80), of_level=IDLE):
-    """A flow that runs and a level at rest, or in another regime: a span of one bin in a cycle, and one of two."""
+def made(*, has_inflow, is_each_second=True, seconds=(0, 70, 80), of_level=IDLE, longest=None):
+    """A flow that runs and a level at rest, or in another regime: a span of one bin in a cycle, and one of two.
+
+    The last one is in the cycles of `longest` alone, if these are given.
+    """
     half = CYCLES * len(seconds)
     signal = np.repeat([FLOW, LEVEL], half)
     cycle = np.tile(np.repeat(np.arange(CYCLES), len(seconds)), 2)
@@ -57,6 +60,9 @@ def made(*, has_inflow, is_each_second=True, seconds=(0, 70, 80), of_level=IDLE)
         tolerance=0.1 * ones,
         material=np.where(signal == FLOW, 1.5, 0.7),
     )
+    if longest is not None:
+        kept = (bins.second % 1000 < seconds[-1]) | np.isin(cycle, longest)
+        bins = Bins(**{field.name: getattr(bins, field.name)[kept] for field in fields(Bins)})
     return cells_of(bins, np.zeros(bins.size, dtype=int), has_inflow=has_inflow, is_each_second=is_each_second)
 
 
@@ -320,6 +326,20 @@ def test_storms_may_all_do_alike_to_a_level_whose_inflow_nobody_measures(regime,
     residuals = np.sqrt(cells.variance) * np.random.default_rng(31).normal(size=cells.group.size)
     residuals[level.rows] += 6.0 * np.sqrt(level.variance)
     assert (unknown_in(cells, residuals) > 3.0) == is_unknown
+
+
+@pytest.mark.parametrize(
+    ("longest", "has_inflow", "is_of_storms"), [((3, 7), False, False), ((3,), False, True), ((3,), True, False)]
+)
+def test_a_run_that_lasts_longer_than_nine_of_ten_is_that_of_a_storm(longest, has_inflow, is_of_storms):
+    """An inflow that falls for an hour leaves the observer behind it, alike in each storm."""
+    cells = made(has_inflow=has_inflow, of_level=STEADY, seconds=(0, 70, 900), longest=longest)
+    (level,) = (block for block in cells.blocks if block.signal == LEVEL)
+    may_be = level.allowed >= np.sqrt(RAIN * level.variance)
+    is_late = level.group == level.group.max()
+    assert is_late.sum() == len(longest)
+    assert not may_be[~is_late].any()
+    assert may_be[is_late].all() == is_of_storms
 
 
 def unknown_in(cells, residuals):
