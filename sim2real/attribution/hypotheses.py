@@ -57,7 +57,7 @@ class Hypothesis:
     slopes : (cells, parameters) array
         Change of the residuals with each parameter, over its range.
     is_there : bool
-        Whether none of its effects may be neutral, and none that is told could do another's work.
+        Whether none of its effects may be neutral, and none that is told could do another's work or widens the gap.
     told : tuple of str
         Its effects that matter, in order of the alphabet. The others are companions: too small to be told.
     needed : tuple of str
@@ -87,7 +87,8 @@ class Hypothesis:
 class _Shown:
     """Cells of a fit: what is left, its slopes, what each effect explains and what it does late, and their form.
 
-    `may_each_lack` says that the station can be without each of them.
+    `may_each_lack` says that the station can be without each of them, and `widening` which of them widen the gap: all
+    else as it is, the simulator is nearer to the recording without them.
     """
 
     residuals: Floats
@@ -96,6 +97,7 @@ class _Shown:
     late: Sequence[Floats]
     form: Form
     may_each_lack: bool
+    widening: frozenset[int]
 
 
 class Hypotheses:
@@ -351,6 +353,7 @@ class Hypotheses:
             late=late,
             form=self._form(fit, signatures, self._plain - residuals, late),
             may_each_lack=None not in fewer,
+            widening=frozenset(k for k, one in enumerate(fewer) if self._fitter.cost(one) < self._fitter.cost(fit)),
         )
 
     def weigh(self, fit: Fit) -> Hypothesis:
@@ -377,6 +380,7 @@ class Hypotheses:
             slopes=shown.slopes,
             is_there=shown.may_each_lack
             and bool(is_needed.all())
+            and shown.widening.isdisjoint(told)
             and are_named(fit, found, [fit.names[member] for member in told])
             and not any(self._could_others(fit, k, np.isin(of_member, told) & (of_member != k), shown) for k in told),
             told=tuple(sorted(fit.names[member] for member in told)),

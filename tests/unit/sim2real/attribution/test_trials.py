@@ -89,6 +89,19 @@ def test_a_set_is_weighed_without_what_it_does_not_need(alpha):
     assert hypotheses.possible[0].told == ("flow_meter_gain", "static_head_bias")
 
 
+@pytest.mark.parametrize("is_nearer", [True, False])
+def test_what_leaves_the_simulator_further_from_a_recording_than_nothing_is_no_answer(alpha, monkeypatch, is_nearer):
+    """However likely it is: the likelihood may prize what scatters less more than what is far off in all cycles."""
+    friction = of_all(alpha, "friction_bias")
+    fitter, _, hypotheses, _ = searched(recorded(alpha, [EFFECTS["friction_bias"](factor=1.3)]), alpha, [friction])
+    found = fitter.refine(fitter.at([friction], [friction.neutral(np.array([0.3] * len(friction.free)))]))
+    measured = fitter.cost
+    monkeypatch.setattr(fitter, "cost", lambda fit: measured(fit) if is_nearer else -measured(fit))
+    weighed = hypotheses.weigh(found)
+    assert weighed.told == ("friction_bias",)
+    assert weighed.is_possible == is_nearer
+
+
 def test_what_explains_less_of_the_loss_than_a_limit_is_weighed_where_it_surprises_more(alpha):
     """A limit takes seconds of starts away, in which a right model is often wrong."""
     area, limit = of_all(alpha, "sump_area_profile"), of_all(alpha, "flow_low_cutoff")
