@@ -19,7 +19,7 @@ NONE_PRIOR = 0.5
 """Probability that nothing of the library acts where nothing unknown does. [1]"""
 FURTHER_PRIOR = 0.02
 """Ratio of the probability of a set with one more effect to that of the set without it. [1]"""
-MISJUDGED = 0.15
+MISJUDGED = 0.1
 """Probability that the likelihood takes unknown for known, or the other way round: what acts is too small to be seen
 beside others, or of a form that is neither a known one nor what something unknown is taken for. [1]"""
 CREDIBLE = 0.95

@@ -49,7 +49,7 @@ def _posterior(report: GapReport) -> str:
         shares["all others"] = rest
     words = (
         "The answers exclude one another, so their probabilities sum to 100 %. None gets more than "
-        f"{percent(1.0 - MISJUDGED)}, however clear: of such answers on sealed recordings, one in seven is wrong."
+        f"{percent(1.0 - MISJUDGED)}, however clear: of such answers on sealed recordings, one in ten is wrong."
     )
     bars = paragraph(words) + share_bars("Probability of each answer", shares)
     places = {effect_words(name): share for name, share in report.component_probability.items() if share >= DRAWN}
