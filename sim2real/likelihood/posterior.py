@@ -140,7 +140,7 @@ def posterior_of(
     >>> far = Weight(effects=("ragging",), acting=("ragging",), log=-90.0, log_flexible=0.0)
     >>> best = posterior_of([Weight(effects=(), acting=(), log=0.0, log_flexible=-9.0), far], 25)[0]
     >>> best.verdict, round(best.probability, 2)
-    ('none', 0.85)
+    ('none', 0.9)
     """
     priors = np.array([_log_prior(weight.acting, library, log_share) for weight in weights])
     sets = priors + np.array([weight.log for weight in weights])
