@@ -12,6 +12,8 @@ from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.replay.changing import Acting, Changing
 from wetwell.simulator.effects import EFFECTS, LIBRARY, effect_table
 from wetwell.simulator.effects.effect import Component, Effect
+from wetwell.simulator.hydraulics import pump_head_m
+from wetwell.simulator.parameters import PlantParameters
 
 WIDE = 50.0
 """Ratio of a range's ends from which a parameter is varied on a logarithmic scale."""
@@ -158,7 +160,12 @@ class Candidate:
 
 
 def candidates_of(
-    pumps: int, mains: int, *, only: Iterable[str] | None = None, without: Iterable[str] = ()
+    pumps: int,
+    mains: int,
+    *,
+    usual: Mapping[str, float] | None = None,
+    only: Iterable[str] | None = None,
+    without: Iterable[str] = (),
 ) -> tuple[Candidate, ...]:
     """Candidates for a station.
 
@@ -166,6 +173,8 @@ def candidates_of(
     ----------
     pumps, mains : int
         How many there are.
+    usual : mapping of str to float
+        What is usual at the station by its unit, as of `usual_at`: it says how far parameters are looked for.
     only, without : names of effects
         Restrict the library.
 
@@ -191,9 +200,8 @@ def candidates_of(
             for parameter in row["parameters"]
             if "unit" not in parameter and (parameter["name"], mains) != ("main", 1)
         }
-        forms = EFFECTS[row["name"]].forms
         free = tuple(
-            _free_parameter(parameter, forms.get(parameter["name"], ()))
+            _free_parameter(EFFECTS[row["name"]], parameter, usual or {})
             for parameter in row["parameters"]
             if "unit" in parameter
         )
@@ -204,20 +212,31 @@ def candidates_of(
     return tuple(found)
 
 
+def usual_at(plant: PlantParameters) -> dict[str, float]:
+    """Rated flow of the largest pump, and the inertia that its rated head moves to its rated flow in a second."""
+    flow_m3h = float(max(plant.rated_flow_m3h))
+    inertias = [
+        3600.0 * pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) / pump.rated_flow_m3h
+        for pump in plant.pumps
+    ]
+    return {"m³/h": flow_m3h, "s²/m²": max(inertias)}
+
+
 def _numbers(count: int) -> list[int]:
     """All of them, then each; one alone is all."""
     return [0, *(range(1, count + 1) if count > 1 else ())]
 
 
-def _free_parameter(parameter: Mapping[str, Any], forms: tuple[float, ...]) -> FreeParameter:
+def _free_parameter(effect: type[Effect], parameter: Mapping[str, Any], usual: Mapping[str, float]) -> FreeParameter:
     neutral = parameter.get("neutral")
     start = parameter.get("default", neutral)
+    size, times = effect.reach.get(parameter["name"], (parameter["high"], 0.0))
     return FreeParameter(
         name=parameter["name"],
         unit=parameter["unit"],
         low=parameter["low"],
-        high=parameter["high"],
+        high=min(parameter["high"], max(size, times * usual.get(parameter["unit"], 0.0))),
         start=float(parameter["low"] if start is None else start),
         neutral=neutral,
-        forms=forms,
+        forms=effect.forms.get(parameter["name"], ()),
     )

@@ -10,7 +10,7 @@ from wetwell.protocols.recordings.recording import Recording
 from wetwell.protocols.station.station_file import EffectTable, Station
 from wetwell.protocols.timestamps import NS_PER_S, to_iso
 from wetwell.sim2real.attribution.attribution import Attribution, attribute
-from wetwell.sim2real.attribution.candidates import candidates_of
+from wetwell.sim2real.attribution.candidates import candidates_of, usual_at
 from wetwell.sim2real.attribution.trials import Each
 from wetwell.sim2real.correction.learning import columns_of_no_use, learn
 from wetwell.sim2real.diagnosis.components import component_probability, place_of_unknown
@@ -48,6 +48,7 @@ from wetwell.sim2real.residuals.conditions import conditions_of as conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
 from wetwell.simulator.effects import effects_of
 from wetwell.simulator.effects.effect import Component
+from wetwell.simulator.parameters import plant_parameters
 
 FALLS = (
     "the level falls by up to {:.0f} cm while no pump runs: no inflow does that, so its sensor reads high now and "
@@ -189,7 +190,8 @@ def diagnose(
         If recording and station do not fit, the recording is too short or in other units, or a name is not in the
         library.
     """
-    library = candidates_of(len(station.pump), len(station.mains), only=only, without=without)
+    counts, usual = (len(station.pump), len(station.mains)), usual_at(plant_parameters(station))
+    library = candidates_of(*counts, usual=usual, only=only, without=without)
     is_external = station.control.is_external
     candidates = [each for each in library if not (is_external and each.component == "controller")]
     recordings = [recording] if isinstance(recording, Recording) else recording

@@ -30,9 +30,10 @@ class CheckValveLeak(Effect):
     component: ClassVar[Component] = "pump"
     neutral: ClassVar[dict[str, float]] = {"leak_m3h": 0.0}
     may_change: ClassVar[bool] = True
+    reach: ClassVar[dict[str, tuple[float, float]]] = {"leak_m3h": (50.0, 0.1)}
 
     name: Literal["check_valve_leak"] = "check_valve_leak"
-    leak_m3h: Annotated[float, limits(0.0, 50.0, "m³/h")]
+    leak_m3h: Annotated[float, limits(0.0, 500.0, "m³/h")]
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Let the valves leak."""

@@ -33,10 +33,11 @@ class PumpWear(Effect):
     component: ClassVar[Component] = "pump"
     neutral: ClassVar[dict[str, float]] = {"head_loss": 0.0, "leak_m3h": 0.0, "vane_loss_m": 0.0}
     may_change: ClassVar[bool] = True
+    reach: ClassVar[dict[str, tuple[float, float]]] = {"leak_m3h": (60.0, 0.3)}
 
     name: Literal["pump_wear"] = "pump_wear"
     head_loss: Annotated[float, limits(0.0, 0.6, "1")] = 0.0
-    leak_m3h: Annotated[float, limits(0.0, 60.0, "m³/h")] = 0.0
+    leak_m3h: Annotated[float, limits(0.0, 1500.0, "m³/h")] = 0.0
     vane_loss_m: Annotated[float, limits(0.0, 20.0, "m")] = 0.0
     pump: PumpNumber = 0
 

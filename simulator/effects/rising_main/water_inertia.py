@@ -38,10 +38,11 @@ class WaterInertia(Effect):
     component: ClassVar[Component] = "rising_main"
     neutral: ClassVar[dict[str, float]] = {"inertia_s2_m2": 0.0}
     is_everywhere: ClassVar[bool] = True
+    reach: ClassVar[dict[str, tuple[float, float]]] = {"inertia_s2_m2": (3.0e4, 30.0)}
     forms: ClassVar[dict[str, tuple[float, ...]]] = {"wave_s": (0.0, 1.0, 3.0, 8.0)}
 
     name: Literal["water_inertia"] = "water_inertia"
-    inertia_s2_m2: Annotated[float, limits(0.0, 3.0e4, "s²/m²")]
+    inertia_s2_m2: Annotated[float, limits(0.0, 1.0e6, "s²/m²")]
     wave_s: Annotated[float, limits(0.0, MOST_WAVE_S, "s")] = 0.0
     main: MainNumber = 0
 

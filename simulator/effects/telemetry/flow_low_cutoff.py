@@ -25,9 +25,10 @@ class FlowLowCutoff(Effect):
     component: ClassVar[Component] = "flow_meter"
     neutral: ClassVar[dict[str, float]] = {"cutoff_m3h": 0.0}
     is_limit: ClassVar[bool] = True
+    reach: ClassVar[dict[str, tuple[float, float]]] = {"cutoff_m3h": (200.0, 1.0)}
 
     name: Literal["flow_low_cutoff"] = "flow_low_cutoff"
-    cutoff_m3h: Annotated[float, limits(0.0, 200.0, "m³/h")]
+    cutoff_m3h: Annotated[float, limits(0.0, 5000.0, "m³/h")]
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
         """Cut low flows off."""

@@ -2,7 +2,8 @@
 
 import pytest
 
-from wetwell.sim2real.attribution.candidates import candidates_of
+from wetwell.sim2real.attribution.candidates import candidates_of, usual_at
+from wetwell.simulator.parameters import plant_parameters
 
 
 def test_a_strength_that_is_neutral_by_the_guess_has_no_grid():
@@ -20,6 +21,32 @@ def test_the_mains_of_a_station_are_tried_together_and_one_by_one():
     fixed = [candidate.fixed for candidate in candidates_of(4, 2, only=["friction_bias"])]
     assert fixed == [(("main", 0),), (("main", 1),), (("main", 2),)]
     assert [candidate.fixed for candidate in candidates_of(4, 1, only=["friction_bias"])] == [()]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "usual", "reach"),
+    [
+        ("flow_low_cutoff", "m³/h", 90.0, 200.0),
+        ("flow_low_cutoff", "m³/h", 900.0, 900.0),
+        ("flow_low_cutoff", "m³/h", 9e4, 5000.0),
+        ("flow_low_cutoff", "s²/m²", 900.0, 200.0),
+        ("water_inertia", "s²/m²", 2500.0, 75_000.0),
+    ],
+)
+def test_a_parameter_is_looked_for_as_far_as_the_station_is_large(name, unit, usual, reach):
+    for given, high in ((None, min(reach, 200.0 if name == "flow_low_cutoff" else 3e4)), ({unit: usual}, reach)):
+        found = candidates_of(1, 1, usual=given, only=[name])[0]
+        assert (found.free[0].low, found.free[0].high) == (0.0, high)
+
+
+def test_what_is_usual_at_a_station_goes_by_its_pumps(alpha):
+    """A column of water of that inertia is at the rated flow in a second, if all of the rated head pulls."""
+    plant = plant_parameters(alpha)
+    usual, pump = usual_at(plant), plant.pumps[0]
+    flow_m3h = pump.rated_flow_m3h
+    head_m = pump.c0 + pump.c1 * flow_m3h + pump.c2 * flow_m3h**2
+    assert usual["m³/h"] == flow_m3h
+    assert usual["s²/m²"] * flow_m3h / 3600.0 == pytest.approx(head_m)
 
 
 def test_in_the_grid_of_a_strength_the_others_are_neutral():
