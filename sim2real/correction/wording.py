@@ -19,7 +19,7 @@ TERMS_IN_WORDS: dict[Term, str] = {
     "flow_reading": "the reading of the flow meter",
     "head_reading": "the reading of the head sensor",
     "power": "the power",
-    "back_flow": "the flow back through a standing pump",
+    "back_flow": "the flow, at 1 m of head, back through the check valve of the pump",
     "level_balance": "the flow into the wet well",
     "level_reading": "the reading of the level sensor",
     "sump_area": "the area of the wet well",
