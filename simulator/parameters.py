@@ -14,6 +14,7 @@ from wetwell.protocols.station.pump import Pump
 from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.station_file import Electrical, Sensors, Station
 from wetwell.simulator.corrections.parts import Column, CorrectionPart
+from wetwell.simulator.hydraulics import pump_head_m
 from wetwell.simulator.power import hydraulic_power_kw, power_line, shaft_points
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
@@ -201,6 +202,11 @@ class PlantParameters:
     def rated_flow_m3h(self) -> Floats:
         """(pumps,) flows of each pump alone at nominal speed. [m³/h]."""
         return np.array([pump.rated_flow_m3h for pump in self.pumps])
+
+    @property
+    def rated_head_m(self) -> Floats:
+        """(pumps,) heads at these flows. [m]."""
+        return np.array([pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) for pump in self.pumps])
 
     def with_pumps(self, changed: Callable[[PumpParameters], PumpParameters], number: int = 0) -> "PlantParameters":
         """The same plant with one pump changed (from 1), or all (0)."""

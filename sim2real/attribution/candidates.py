@@ -12,7 +12,6 @@ from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.replay.changing import Acting, Changing
 from wetwell.simulator.effects import EFFECTS, LIBRARY, effect_table
 from wetwell.simulator.effects.effect import Component, Effect
-from wetwell.simulator.hydraulics import pump_head_m
 from wetwell.simulator.parameters import PlantParameters
 
 WIDE = 50.0
@@ -214,12 +213,8 @@ def candidates_of(
 
 def usual_at(plant: PlantParameters) -> dict[str, float]:
     """Rated flow of the largest pump, and the inertia that its rated head moves to its rated flow in a second."""
-    flow_m3h = float(max(plant.rated_flow_m3h))
-    inertias = [
-        3600.0 * pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) / pump.rated_flow_m3h
-        for pump in plant.pumps
-    ]
-    return {"m³/h": flow_m3h, "s²/m²": max(inertias)}
+    flow_m3h = plant.rated_flow_m3h
+    return {"m³/h": float(np.max(flow_m3h)), "s²/m²": float(np.max(3600.0 * plant.rated_head_m / flow_m3h))}
 
 
 def _numbers(count: int) -> list[int]:

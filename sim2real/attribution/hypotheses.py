@@ -345,7 +345,7 @@ class Hypotheses:
             np.zeros(residuals.size) if one is None else self._late(fit, member, one)
             for member, one in enumerate(fewer)
         ]
-        slopes = self._fitter.slopes(fit)
+        slopes, cost = self._fitter.slopes(fit), self._fitter.cost(fit)
         return _Shown(
             residuals=residuals,
             slopes=np.array([cells.means(column) for column in slopes.T]).reshape(-1, residuals.size).T,
@@ -353,7 +353,7 @@ class Hypotheses:
             late=late,
             form=self._form(fit, signatures, self._plain - residuals, late),
             may_each_lack=None not in fewer,
-            widening=frozenset(k for k, one in enumerate(fewer) if self._fitter.cost(one) < self._fitter.cost(fit)),
+            widening=frozenset(k for k, one in enumerate(fewer) if self._fitter.cost(one) < cost),
         )
 
     def weigh(self, fit: Fit) -> Hypothesis:

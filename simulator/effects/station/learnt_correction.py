@@ -5,6 +5,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from wetwell.simulator.corrections.parts import (
@@ -23,7 +24,6 @@ from wetwell.simulator.corrections.parts import (
 )
 from wetwell.simulator.effects.effect import Component, Effect, MainNumber, PumpNumber, limits
 from wetwell.simulator.effects.station.correction_part import MOST_SIZE, PartTable
-from wetwell.simulator.hydraulics import pump_head_m
 from wetwell.simulator.parameters import PlantParameters
 
 LEAST_OFFSET = -0.9
@@ -127,8 +127,8 @@ class LearntCorrection(Effect):
 
     def reference(self, parameters: PlantParameters) -> float:
         """X_r in the unit of the term; 1 where c is a share of the term itself. [m, m³/h, 1]."""
-        term, flow_m3h = TERMS.index(self.term), max(pump.rated_flow_m3h for pump in parameters.pumps)
-        head_m = max(pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) for pump in parameters.pumps)
+        term = TERMS.index(self.term)
+        flow_m3h, head_m = float(np.max(parameters.rated_flow_m3h)), float(np.max(parameters.rated_head_m))
         of_term = {STATIC_HEAD: head_m, HEAD_READING: head_m, LEVEL_BALANCE: flow_m3h}
         return of_term.get(term, flow_m3h / math.sqrt(head_m) if term == BACK_FLOW else 1.0)
 
