@@ -396,17 +396,14 @@ class Site:
         """A second daemon of one name: it must be refused while the first is there."""
         return Process(self, f"twin of {name}", self._work[name])
 
-    @property
     def disk_s(self) -> float:
-        """How long a write waits for the disk. [s]"""
+        """How long a write waits for the disk now. [s]"""
         return SLOW_S if self.strains["slow"] else 0.0
 
     @contextlib.contextmanager
     def span(self, what: str, name: str) -> Iterator[None]:
         """Note from when to when something could not work."""
         begin_s = _now_s()
-        for process in self.processes.values():
-            process.life.disk_s = self.disk_s
         yield
         self.spans.append(Span(what, name, begin_s, _now_s()))
 

@@ -6,7 +6,7 @@ import itertools
 import math
 import selectors
 from collections import deque
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,14 +22,14 @@ class Life:
         Whether it stands, as after SIGSTOP: what is due waits in `held`.
     is_dead : bool
         Whether it was killed: nothing that it writes reaches a disk any more.
-    disk_s : float
-        How long its threads wait for a disk. [s]
+    disk_s : callable
+        How long its threads wait for a disk now. [s]
     """
 
     name: str
     is_stalled: bool = False
     is_dead: bool = False
-    disk_s: float = 0.0
+    disk_s: Callable[[], float] = float
     held: list[asyncio.Handle] = field(default_factory=list)
 
     def go_on(self) -> None:
@@ -119,8 +119,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Done in this thread: at once, or when the disk of a simulated process has let it wait."""
         future = self.create_future()
         life = LIFE.get()
-        if life is not None and life.disk_s:
-            self.call_later(life.disk_s, _work, future, func, args)
+        disk_s = 0.0 if life is None else life.disk_s()
+        if disk_s:
+            self.call_later(disk_s, _work, future, func, args)
         else:
             _work(future, func, args)
         return future
