@@ -23,7 +23,7 @@ from wetwell.services.historian.store.live.end import COUNT_COMMIT, End, lost_of
 from wetwell.services.historian.store.live.refused_rows import RefusedRows
 from wetwell.services.historian.store.live.row_checksum import is_sample_intact
 from wetwell.services.historian.store.live.salvage import salvage
-from wetwell.services.historian.store.live.schema import prepare, schema_damages
+from wetwell.services.historian.store.live.schema import mend_schema, prepare, schema_damages
 from wetwell.services.historian.store.live.tally import miscounts, settle
 
 log = logging.getLogger(__name__)
@@ -194,6 +194,7 @@ class LiveFile:
                 self.ids.clear()
                 self._writer = self._open()
                 mend_head(aside)
+                mend_schema(aside)
                 saved, lost = salvage(aside, self._writer)
                 write_end(self._path, End.of(self._writer))
         except StoreError as error:

@@ -10,6 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from wetwell.services.historian.store.interface import StoreError
+from wetwell.services.historian.store.live.connection import UNREADABLE, connect
 from wetwell.services.historian.store.live.end import END_TABLES
 from wetwell.services.historian.store.live.tally import TALLY_TABLES
 
@@ -119,6 +120,24 @@ def schema_damages(database: sqlite3.Connection) -> list[str]:
     return damages or version_damages(database)
 
 
+def mend_schema(path: Path) -> None:
+    """Write the text of each table as it was made into a damaged file: by another one no row of it may be found.
+
+    Rows of earlier versions are read by it, too: columns that came later stand behind the others.
+    """
+    with (
+        contextlib.suppress(*UNREADABLE),
+        contextlib.closing(_new_database()) as new,
+        contextlib.closing(connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as damaged,
+    ):
+        damaged.execute("PRAGMA writable_schema = ON")
+        with contextlib.suppress(*UNREADABLE):  # it takes the schema as far as it can, and the next statement works
+            damaged.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        texts = new.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'")
+        damaged.executemany("UPDATE sqlite_master SET sql = ?2 WHERE name = ?1 AND sql IS NOT ?2", texts)
+        damaged.commit()
+
+
 def version_damages(database: sqlite3.Connection) -> list[str]:
     """Say that a disk has changed the version of a database; empty if not.
 
@@ -132,9 +151,14 @@ def version_damages(database: sqlite3.Connection) -> list[str]:
 
 @cache
 def _made() -> dict[str, object]:
-    with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as database:
-        database.executescript(_LIVE_TABLES)
+    with contextlib.closing(_new_database()) as database:
         return _parts(database)
+
+
+def _new_database() -> sqlite3.Connection:
+    database = sqlite3.connect(":memory:", isolation_level=None)
+    database.executescript(_LIVE_TABLES)
+    return database
 
 
 def _parts(database: sqlite3.Connection) -> dict[str, object]:

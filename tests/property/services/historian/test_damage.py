@@ -455,6 +455,11 @@ def test_a_word_of_the_schema_that_names_another_thing_is_damage(content, tmp_pa
         (b"last_ns INTEGER, crc", b"mast_ns INTEGER, crc"),
         (b"first_ns INTEGER, last_ns INTEGER)", b"firsv_ns INTEGER, last_ns INTEGER)"),
         (b"name TEXT NOT NULL UNIQUE", b"nam\xe5 TEXT NOT NULL UNIQUE"),
+        (b"first_ns INTEGER, last_ns INTEGER)", b"first_ns INTEGER$ last_ns INTEGER)"),  # a column less
+        (b"size INTEGER NOT NULL DEFAULT 1", b"size INTEGER NOT NULL DEFAULU 1"),  # no SQL any more
+        (b"PRIMARY KEY (station, time_ns, seq)", b"PRIMARY KEY (station, time_ns& seq)"),
+        (b"seq)\n) WITHOUT ROWID", b"seq)\n) WITHOUT SOWID"),
+        (b"CREATE TABLE event", b"CREATE TABLE evenu"),
         (b"data BLOB NOT NULL, size", b"data BLOB NOT NULL, si\xf3e"),
         (b"AFTER DELETE", b"AFTER DEL\xc5TE"),
         (b"INSERT INTO tally", b"INSERT IN\x11O tally"),

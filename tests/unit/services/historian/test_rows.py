@@ -228,6 +228,23 @@ def test_a_database_of_version_1_is_upgraded_and_nothing_is_lost(
         assert history.columns["seq"] == tuple(map(float, range(301)))
 
 
+@pytest.mark.parametrize(
+    ("word", "broken"),
+    [(b"first_ns INTEGER, last_ns", b"first_ns INTEGER$ last_ns"), (b"data BLOB NOT NULL,", b"data BLOB NOT NULL$")],
+)
+def test_a_broken_word_of_the_schema_of_version_1_costs_no_row(tmp_path: Path, word: bytes, broken: bytes) -> None:
+    path = tmp_path / "live.sqlite"
+    of_version_1(path, 300)
+    content = path.read_bytes()
+    assert word in content
+    path.write_bytes(content.replace(word, broken, 1))
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert store.samples("alpha", 0, DAY_NS).seq.tolist() == list(range(300))
+        assert store.events("verdicts", "alpha", 0, 10, 10) == [b"{}"]
+        assert store.hours("alpha", 0, DAY_NS).values.tolist() == [[1.0]]
+    assert path.with_name("live.sqlite.refused-1").exists()
+
+
 def test_a_database_of_version_1_is_not_upgraded_beside_its_historian(tmp_path: Path) -> None:
     of_version_1(tmp_path / "live.sqlite", 10)
     with contextlib.closing(FolderStore(tmp_path / "other")) as other, other.alone():
