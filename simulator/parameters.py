@@ -18,7 +18,7 @@ from wetwell.simulator.hydraulics import pump_head_m
 from wetwell.simulator.power import hydraulic_power_kw, power_line, shaft_points
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
-from wetwell.simulator.wet_well import ProfileSlice, profile_of_slices
+from wetwell.simulator.wet_well import SECONDS_PER_HOUR, ProfileSlice, profile_of_slices
 
 _NO_CORRECTION = (CorrectionPart(term=0, size=0.0),)
 """Records have at least one: compiled code must know what they are."""
@@ -207,6 +207,11 @@ class PlantParameters:
     def rated_head_m(self) -> Floats:
         """(pumps,) heads at these flows. [m]."""
         return np.array([pump_head_m(pump.c0, pump.c1, pump.c2, 1.0, pump.rated_flow_m3h) for pump in self.pumps])
+
+    @property
+    def rated_inertia_s2_m2(self) -> Floats:
+        """(pumps,) inertias of the water that these heads bring to these flows in a second. [s²/m²]."""
+        return np.asarray(SECONDS_PER_HOUR * self.rated_head_m / self.rated_flow_m3h, dtype=np.float64)
 
     def with_pumps(self, changed: Callable[[PumpParameters], PumpParameters], number: int = 0) -> "PlantParameters":
         """The same plant with one pump changed (from 1), or all (0)."""

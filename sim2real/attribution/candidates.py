@@ -213,8 +213,7 @@ def candidates_of(
 
 def usual_at(plant: PlantParameters) -> dict[str, float]:
     """Rated flow of the largest pump, and the inertia that its rated head moves to its rated flow in a second."""
-    flow_m3h = plant.rated_flow_m3h
-    return {"m³/h": float(np.max(flow_m3h)), "s²/m²": float(np.max(3600.0 * plant.rated_head_m / flow_m3h))}
+    return {"m³/h": float(np.max(plant.rated_flow_m3h)), "s²/m²": float(np.max(plant.rated_inertia_s2_m2))}
 
 
 def _numbers(count: int) -> list[int]:

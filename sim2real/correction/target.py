@@ -4,13 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wetwell.simulator.corrections.parts import LEVEL_BALANCE, STATIC_HEAD, TERMS, Term
+from wetwell.simulator.corrections.parts import INERTIA, LEVEL_BALANCE, TERMS, Term
 from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.parameters import PlantParameters
 
 EFFECT_OF_A_CONSTANT: dict[Term, str] = {
     "head_loss": "friction_bias",
     "static_head": "static_head_bias",
+    "inertia": "water_inertia",
     "pump_head": "pump_wear",
     "speed": "motor_slip",
     "flow_reading": "flow_meter_gain",
@@ -53,7 +54,7 @@ def targets_of(plant: PlantParameters) -> list[Target]:
     found: list[Target] = []
     log_term = -float(np.log(len(TERMS)))
     for number, term in enumerate(TERMS):
-        of_pipe, of_station = number <= STATIC_HEAD, number >= LEVEL_BALANCE
+        of_pipe, of_station = number <= INERTIA, number >= LEVEL_BALANCE
         count = 1 if of_station else len(plant.mains) if of_pipe else len(plant.pumps)
         of_all = Target(term=term, pump=0, main=0, log_prior=log_term - (float(np.log(2.0)) if count > 1 else 0.0))
         found.append(of_all)

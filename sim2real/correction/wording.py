@@ -14,6 +14,7 @@ from wetwell.simulator.effects.station.learnt_correction import LearntCorrection
 TERMS_IN_WORDS: dict[Term, str] = {
     "head_loss": "the head loss of the main",
     "static_head": "the static head",
+    "inertia": "the inertia of the water in the main",
     "pump_head": "the head of the pump",
     "speed": "the speed of the pump",
     "flow_reading": "the reading of the flow meter",
@@ -26,6 +27,7 @@ TERMS_IN_WORDS: dict[Term, str] = {
 }
 UNITS_OF_TERMS: dict[Term, str] = {
     "static_head": "m",
+    "inertia": "s²/m²",
     "head_reading": "m",
     "back_flow": "m³/h",
     "level_balance": "m³/h",

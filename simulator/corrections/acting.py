@@ -11,11 +11,11 @@ from wetwell.simulator.corrections.parts import (
     HEAD_LOSS,
     HOUR_OF_DAY,
     IDLE_BEFORE,
+    INERTIA,
     LEVEL_BALANCE,
     LEVEL_COVARIATE,
     SINCE_START,
     SPEED_COVARIATE,
-    STATIC_HEAD,
     shape_at,
 )
 from wetwell.simulator.forcing import Forcing
@@ -56,7 +56,7 @@ def _is_seen(j: int, i: int, term: int, plant: PlantRecords) -> bool:
     if term >= LEVEL_BALANCE or i == j:
         return True
     main = plant.pumps[i].main
-    return term <= STATIC_HEAD and plant.pumps[j].main == main and plant.mains[main].is_common_header
+    return term <= INERTIA and plant.pumps[j].main == main and plant.mains[main].is_common_header
 
 
 @inlined

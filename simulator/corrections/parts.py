@@ -10,6 +10,7 @@ from wetwell.protocols.jit import compiled
 Term = Literal[
     "head_loss",
     "static_head",
+    "inertia",
     "pump_head",
     "speed",
     "flow_reading",
@@ -21,8 +22,8 @@ Term = Literal[
     "sump_area",
 ]
 TERMS: tuple[Term, ...] = get_args(Term)
-HEAD_LOSS, STATIC_HEAD, PUMP_HEAD, SPEED, FLOW_READING, HEAD_READING = range(6)
-POWER_TERM, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING, SUMP_AREA = range(6, 11)
+HEAD_LOSS, STATIC_HEAD, INERTIA, PUMP_HEAD, SPEED, FLOW_READING, HEAD_READING = range(7)
+POWER_TERM, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING, SUMP_AREA = range(7, 12)
 """Places of the terms: first those of a pipe, then those of a pump, and from the balance on those of the station."""
 
 Covariate = Literal[
@@ -90,8 +91,8 @@ class CorrectionPart:
     pump, main : int
         From 0, or `ALL`.
     size : float
-        In the unit of the term: a share, or m of the static head, of a head reading and of a level, m³/h of the
-        balance, and m³/h at 1 m of the back flow.
+        In the unit of the term: a share, or m of the static head, of a head reading and of a level, s²/m² of the
+        inertia, m³/h of the balance, and m³/h at 1 m of the back flow.
     centre, scale, low, high : float
         In the unit of the covariate: zero and unit of the shape, and the range in which it is known.
     """

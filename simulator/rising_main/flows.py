@@ -4,7 +4,7 @@ import math
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import inlined
-from wetwell.simulator.corrections.parts import BACK_FLOW, HEAD_LOSS, STATIC_HEAD
+from wetwell.simulator.corrections.parts import BACK_FLOW, HEAD_LOSS, INERTIA, STATIC_HEAD
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.hydraulics import common_flows, header_back_flow_m3h, individual_flow_m3h
 from wetwell.simulator.parameters import MainParameters, PlantRecords
@@ -14,6 +14,9 @@ from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 STAGE = 1.0 - math.sqrt(0.5)
 """γ of the two-stage implicit step of second order that damps every stiffness (R. Alexander 1977)."""
+
+LEAST_INERTIA = 0.05
+"""Share of the inertia of a main that a correction leaves of it at the least. [1]"""
 
 
 @inlined
@@ -33,7 +36,7 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
     flow_m3h, mean_m3h = state.flow_m3h, state.mean_flow_m3h
     for i in pumps:
         state.open_ratio[i] = _open_ratio(plant, state, m, i, static_head_m, friction_h2_m5)
-    if plant.mains[m].inertia_s2_m2 <= 0.0:
+    if not _has_inertia(plant, state, m, pumps):
         _solve_flows(plant, state, m, static_head_m, friction_h2_m5, 0.0, leak_m3h, 0.0)
         for i in pumps:
             mean_m3h[i] = flow_m3h[i]
@@ -49,6 +52,23 @@ def move_water(plant: PlantRecords, state: PlantState, forcing: Forcing, second:
         _move_waves(plant, state, m, static_head_m, friction_h2_m5, was_moving, leak_m3h)
         return
     _move_column(plant, state, m, static_head_m, friction_h2_m5, leak_m3h)
+
+
+@inlined
+def _has_inertia(plant: PlantRecords, state: PlantState, m: int, pumps: Integers) -> bool:
+    """Whether the water of main m has inertia at any of its pumps."""
+    largest_s2_m2 = 0.0
+    for i in pumps:
+        largest_s2_m2 = max(largest_s2_m2, inertia_s2_m2(plant, state, m, i))
+    return largest_s2_m2 > 0.0
+
+
+@inlined
+def inertia_s2_m2(plant: PlantRecords, state: PlantState, m: int, i: int) -> float:
+    """Inertia of the water of main m at a pump, and what a correction adds. [s²/m²]."""
+    of_main = plant.mains[m].inertia_s2_m2
+    inertia: float = max(of_main + state.correction[INERTIA, i], LEAST_INERTIA * of_main)
+    return inertia
 
 
 @inlined
@@ -75,20 +95,20 @@ def _move_column(
     """Set the flows of main m, whose water is accelerated as a whole, after the second, and their means over it."""
     flow_m3h, mean_m3h, before_m3h = state.flow_m3h, state.mean_flow_m3h, state.flow_before_m3h
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
-    inertia_m_m3h = plant.mains[m].inertia_s2_m2 / SECONDS_PER_HOUR * STEPS / STAGE
+    steps_per_s = STEPS / STAGE
     for _ in range(STEPS):
         for i in pumps:
             before_m3h[i] = flow_m3h[i]
         back_before_m3h = state.back_m3h[m]
         back_m3h = _solve_flows(
-            plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h, leak_m3h, back_before_m3h
+            plant, state, m, static_head_m, friction_h2_m5, steps_per_s, leak_m3h, back_before_m3h
         )
         back_m3h = back_before_m3h + (back_m3h - back_before_m3h) * (1.0 - STAGE) / STAGE
         for i in pumps:
             mean_m3h[i] += (1.0 - STAGE) * flow_m3h[i] / STEPS
             flow_m3h[i] = before_m3h[i] + (flow_m3h[i] - before_m3h[i]) * (1.0 - STAGE) / STAGE
         state.back_m3h[m] = _solve_flows(
-            plant, state, m, static_head_m, friction_h2_m5, inertia_m_m3h, leak_m3h, back_m3h
+            plant, state, m, static_head_m, friction_h2_m5, steps_per_s, leak_m3h, back_m3h
         )
         for i in pumps:
             mean_m3h[i] += STAGE * flow_m3h[i] / STEPS
@@ -108,11 +128,11 @@ def _move_waves(
     main, flow_m3h = plant.mains[m], state.flow_m3h
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     way, s_m3h = 0.5 * main.wave_s * STEPS, main.linear_flow_m3h
-    b = 2.0 * main.inertia_s2_m2 / (main.wave_s * SECONDS_PER_HOUR)
     share = main.shared_friction if main.is_common_header else 1.0
     for step in range(STEPS):
         for at in pumps[:1] if main.is_common_header else pumps:
             water = state.water[at]
+            b = 2.0 * inertia_s2_m2(plant, state, m, at) / (main.wave_s * SECONDS_PER_HOUR)
             lift_m = lift_at_m(state, at, static_head_m)
             loss_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, at])
             if step == 0 and not was_moving:
@@ -160,17 +180,21 @@ def _solve_flows(
     m: int,
     static_head_m: float,
     friction_h2_m5: float,
-    inertia_m_m3h: float,
+    steps_per_s: float,
     leak_m3h: float,
     back_before_m3h: float,
 ) -> float:
-    """Set the flows of main m by its layout, and return what runs back; pipes of their own have air of their own."""
+    """Set the flows of main m by its layout, and return what runs back; pipes of their own have air of their own.
+
+    Without a step in time they are those of the duty points.
+    """
     main, curves, flow_m3h = plant.mains[m], state.curves, state.flow_m3h
     pumps = plant.pumps_by_main[plant.pumps_until[m] : plant.pumps_until[m + 1]]
     if main.is_common_header:
         at = pumps[0]
         lift_m = lift_at_m(state, at, static_head_m)
         friction_h2_m5 *= 1.0 + state.correction[HEAD_LOSS, at]
+        inertia_m_m3h = inertia_s2_m2(plant, state, m, at) / SECONDS_PER_HOUR * steps_per_s
         back_m3h: float = common_flows(
             pumps,
             curves,
@@ -188,6 +212,7 @@ def _solve_flows(
     for i in pumps:
         lift_m = lift_at_m(state, i, static_head_m)
         own_h2_m5 = friction_h2_m5 * (1.0 + state.correction[HEAD_LOSS, i])
+        inertia_m_m3h = inertia_s2_m2(plant, state, m, i) / SECONDS_PER_HOUR * steps_per_s
         flow_m3h[i] = individual_flow_m3h(
             curves[i], state.open_ratio[i], lift_m, own_h2_m5, main.linear_flow_m3h, inertia_m_m3h, flow_m3h[i]
         )

@@ -13,6 +13,7 @@ from wetwell.simulator.corrections.parts import (
     BACK_FLOW,
     COVARIATES,
     HEAD_READING,
+    INERTIA,
     LEVEL_BALANCE,
     LEVEL_READING,
     SHAPES,
@@ -30,11 +31,14 @@ LEAST_OFFSET = -0.9
 """Of the term, at the least. [1]"""
 LEAST_LEFT = 0.05
 """Share of a term that a correction has to leave of it. [1]"""
-_MAY_BE_NOTHING = frozenset({STATIC_HEAD, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING})
+SLOW_START_S = 10.0
+"""In so long a time the rated head brings the water of the reference of the inertia to the rated flow. [s]"""
+_MAY_BE_NOTHING = frozenset({STATIC_HEAD, INERTIA, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING})
 """Places of terms of which a correction may leave nothing."""
 _COMPONENT_OF: dict[Term, Component] = {
     "head_loss": "rising_main",
     "static_head": "rising_main",
+    "inertia": "rising_main",
     "pump_head": "pump",
     "speed": "drive",
     "flow_reading": "flow_meter",
@@ -79,7 +83,8 @@ class LearntCorrection(Effect):
     c = c_0 + \sum_k a_k\, \phi_k\!\left(\frac{x_k - x_{0k}}{s_k}\right)$$
 
     The reference $X_r$ is the rated head for static head and reading of the head, the rated flow for the balance
-    of the level, 1 m for its reading. What flows back through a standing pump is counted at 1 m, and its reference is
+    of the level, 1 m for its reading. That of the inertia is brought to the rated flow by the rated head in
+    `SLOW_START_S`. What flows back through a standing pump is counted at 1 m, and its reference is
     such that the rated flow would flow back at the rated head. Shapes φ: z, z², cos 2πz, exp(−z), ln(1 + z), and the
     step [z >= 0].
 
@@ -126,10 +131,11 @@ class LearntCorrection(Effect):
         return self.offset + sum(lows), self.offset + sum(highs)
 
     def reference(self, parameters: PlantParameters) -> float:
-        """X_r in the unit of the term; 1 where c is a share of the term itself. [m, m³/h, 1]."""
+        """X_r in the unit of the term; 1 where c is a share of the term itself. [m, s²/m², m³/h, 1]."""
         term = TERMS.index(self.term)
         flow_m3h, head_m = float(np.max(parameters.rated_flow_m3h)), float(np.max(parameters.rated_head_m))
-        of_term = {STATIC_HEAD: head_m, HEAD_READING: head_m, LEVEL_BALANCE: flow_m3h}
+        inertia_s2_m2 = SLOW_START_S * float(np.max(parameters.rated_inertia_s2_m2))
+        of_term = {STATIC_HEAD: head_m, INERTIA: inertia_s2_m2, HEAD_READING: head_m, LEVEL_BALANCE: flow_m3h}
         return of_term.get(term, flow_m3h / math.sqrt(head_m) if term == BACK_FLOW else 1.0)
 
     def modify(self, parameters: PlantParameters) -> PlantParameters:
@@ -141,7 +147,7 @@ class LearntCorrection(Effect):
             If they would leave nothing of a flow or a head, or name a pump or a main that the term does not have.
         """
         term = TERMS.index(self.term)
-        of_station, of_pipe = term >= LEVEL_BALANCE, term <= STATIC_HEAD
+        of_station, of_pipe = term >= LEVEL_BALANCE, term <= INERTIA
         for key, number, fits in (("pump", self.pump, not (of_station or of_pipe)), ("main", self.main, of_pipe)):
             if number and not fits:
                 raise ValueError(f"learnt_correction.{key}: got {number}, term '{self.term}' has no {key} of its own")

@@ -47,6 +47,7 @@ def run(station, seconds=SECONDS):
         (learnt("speed", offset=-0.05, pump=2), "pump"),
         (learnt("speed", part("since_start_s")), "pump"),
         (learnt("pump_head", offset=-0.05), "pump"),
+        (learnt("inertia", offset=0.1), "rising_main"),
         (learnt("back_flow", offset=0.1), "pump"),
         (learnt("sump_area", part("level_m")), "sump"),
     ],
@@ -62,6 +63,7 @@ def test_the_cause_lies_where_its_term_is_or_where_what_it_goes_with_points(alph
     [
         ("head_loss", 0.3, {"name": "friction_bias", "factor": 1.3}),
         ("static_head", 0.1, {"name": "static_head_bias", "offset_m": 0.1}),
+        ("inertia", 0.2, {"name": "water_inertia", "inertia_s2_m2": 0.2}),
         ("pump_head", -0.15, {"name": "pump_wear", "head_loss": 0.15}),
         ("flow_reading", 0.12, {"name": "flow_meter_gain", "factor": 1.12}),
         ("head_reading", 0.1, {"name": "head_sensor_offset", "offset_m": 0.1}),
@@ -77,7 +79,7 @@ def test_a_constant_correction_is_the_effect_that_has_a_name(term, offset, named
     (effect,) = effects_of(station)
     reference = effect.reference(plant_parameters(station))
     named = {
-        key: value * reference if key in {"offset_m", "flow_m3h", "leak_m3h"} else value
+        key: value * reference if key in {"offset_m", "inertia_s2_m2", "flow_m3h", "leak_m3h"} else value
         for key, value in named.items()
     }
     ours, theirs = run(station), run(under(plain, named))

@@ -37,6 +37,7 @@ def test_it_is_as_probable_as_its_term_and_addends(proposal):
     [
         ("speed", 0, "motor_slip"),
         ("speed", 2, None),
+        ("inertia", 0, "water_inertia"),
         ("pump_head", 2, "pump_wear"),
         ("head_reading", 0, "head_sensor_offset"),
         ("level_reading", 0, None),

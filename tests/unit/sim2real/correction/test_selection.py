@@ -120,5 +120,5 @@ def test_one_pump_is_as_probable_as_all_of_them(alpha):
     targets = targets_of(plant_parameters(alpha))
     assert sum(np.exp(target.log_prior) for target in targets) == pytest.approx(1.0)
     speeds = {one.pump: float(np.exp(one.log_prior)) for one in targets if one.term == "speed"}
-    assert speeds == pytest.approx({0: 1.0 / 22.0, 1: 1.0 / 66.0, 2: 1.0 / 66.0, 3: 1.0 / 66.0})
+    assert speeds == pytest.approx({0: 1.0 / 24.0, 1: 1.0 / 72.0, 2: 1.0 / 72.0, 3: 1.0 / 72.0})
     assert [(one.pump, one.main) for one in targets if one.term == "level_balance"] == [(0, 0)]
