@@ -156,13 +156,16 @@ def attribute(
             own_ends = its_ends if whole is telling else ends_of(whole)
             if {*whole.told} != {*told} or not are_sized(whole.fit, own_ends, told):
                 whole, own_ends = likely, its_ends if likely is telling else ends_of(likely)
-            own, own_ends = in_order(fitter, whole.fit, own_ends, told)
-            ends, accepted = own_ends, informed(fitter, own, priors)
+            own = whole.fit
             break
         hypotheses.rule_out(told)
     else:
-        told, accepted, own, own_ends, ends = (), None, None, np.zeros((0, 2)), np.zeros((0, 2))
+        told, own, own_ends = (), None, np.zeros((0, 2))
     posterior = shared(posterior, hypotheses.alike)
+    accepted, ends = None, own_ends
+    if own is not None:
+        own, own_ends = in_order(fitter, own, own_ends, told, posterior)
+        accepted, ends = informed(fitter, own, priors), own_ends
     unknown = unknown_shares(hypotheses.weights(), len(singles), log_share, unnamed)
     progress(1.0)
     if accepted is not None and accepted is not own:

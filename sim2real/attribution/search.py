@@ -9,6 +9,7 @@ from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
 from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.trials import Each, Trials
+from wetwell.sim2real.likelihood.posterior import SetProbability
 from wetwell.simulator.effects import EFFECTS
 
 MOST_EFFECTS = 4
@@ -138,13 +139,18 @@ def _untried(fits: Iterable[Fit], tried: set[frozenset[str]]) -> list[Fit]:
     return found
 
 
-def in_order(fitter: Fitter, fit: Fit, ends: Floats, told: Sequence[str]) -> tuple[Fit, Floats]:
+def in_order(
+    fitter: Fitter, fit: Fit, ends: Floats, told: Sequence[str], posterior: Sequence[SetProbability]
+) -> tuple[Fit, Floats]:
     """The fit with its effects in order, and the ends of its intervals.
 
-    Those that are told come before the others, and in each part the one first without which most is left.
+    Those that are told come before the others, and in each part those that more likely act. Of those that are as
+    likely to the hundredth the one comes first without which most is left.
     """
     left = [fitter.cost(fitter.without(fit, member)) for member in range(len(fit.names))]
-    order = sorted(range(len(fit.names)), key=lambda member: (fit.names[member] not in told, -left[member]))
+    likely = [round(sum(one.probability for one in posterior if name in one.effects), 2) for name in fit.names]
+    is_beside = [name not in told for name in fit.names]
+    order = sorted(range(len(left)), key=lambda member: (is_beside[member], -likely[member], -left[member]))
     parts = fit.split(ends)
     ordered = Fit(
         candidates=tuple(fit.candidates[k] for k in order),
