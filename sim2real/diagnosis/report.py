@@ -292,7 +292,7 @@ class GapReport(ReportPart):
     where : list of Where
         Where the gap lies, by share, the largest first; the first names the component that is held responsible.
     effects : list of FoundEffect
-        Accepted effects, the strongest first; none for `none` and `unknown`.
+        Accepted effects, those that more likely act first, of equals the strongest; none for `none` and `unknown`.
     companions : list of FoundEffect
         What acts beside them and is too small to matter: no part of the answer, but of the station that is written.
     posterior : list of AnswerProbability
