@@ -102,7 +102,7 @@ class LiveFile:
     def transaction(self) -> Iterator[sqlite3.Connection]:
         """Connection of which all is kept at the end, or nothing; what is refused is put aside with it."""
         with self._lock:
-            if self.is_damaged:
+            if self.is_damaged or (self.refused.are_any and self._has_broken_trees()):
                 self._writer.close()
                 self._begin_anew("damaged")
             try:
@@ -143,8 +143,7 @@ class LiveFile:
             If it is damaged, or cannot be read now.
         """
         with self.reading() as database:
-            told = [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
-            told += schema_damages(database)
+            told = _broken_trees(database) + schema_damages(database)
             found = [] if told else list(miscounts(database))
         if told:
             self.is_damaged = True
@@ -163,6 +162,16 @@ class LiveFile:
             with contextlib.suppress(OSError):
                 sizes += path.stat().st_size
         return sizes
+
+    def _has_broken_trees(self) -> bool:
+        """Whether SQLite finds damage: of two tables that share a page, what one refuses may be rows of the other."""
+        try:
+            with self.reading() as database:
+                return bool(_broken_trees(database))
+        except StoreError:
+            if not self.is_damaged:
+                raise
+            return True
 
     def _note(self, error: sqlite3.Error | UnicodeDecodeError) -> None:
         """Know from now on that the file is damaged, if that is what the error says."""
@@ -228,6 +237,11 @@ class LiveFile:
             database.close()
             raise sqlite3.DatabaseError(damages[0])
         return database
+
+
+def _broken_trees(database: sqlite3.Connection) -> list[str]:
+    """First thing that SQLite finds wrong; empty if it finds nothing."""
+    return [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
 
 
 def _put_aside(path: Path) -> Path:

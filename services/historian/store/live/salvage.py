@@ -37,6 +37,11 @@ MOST_SKIPPED = 10_000
 """Hundreds of messages that are looked for before the last one."""
 MOST_TRIED = 20_000
 """Spans of a station, or of a hundred messages, that are read by themselves where some rows cannot be read."""
+_SPAN_OF_SAMPLES = """
+UPDATE station SET first_ns = (SELECT min(time_ns) FROM sample WHERE station = id),
+    last_ns = (SELECT max(coalesce(last_ns, time_ns)) FROM sample WHERE station = id) WHERE first_ns IS NULL
+"""
+"""Times of stations of which only the name could be read."""
 
 
 def damage_of(path: Path) -> list[str]:
@@ -89,6 +94,7 @@ def salvage(damaged: Path, target: sqlite3.Connection) -> tuple[int, int]:
                         continue
                     with contextlib.suppress(sqlite3.IntegrityError, sqlite3.InterfaceError):
                         saved += target.execute(insert, its).rowcount
+            target.execute(_SPAN_OF_SAMPLES)
     except UNREADABLE:
         target.execute("ROLLBACK")
         return 0, 0

@@ -16,7 +16,8 @@ def station_rows(database: sqlite3.Connection) -> list[StationRow]:
 
     SQLite keeps each name twice, in the table and in its index. Where they differ, messages of the station say which
     one it is. No two stations have one name: an index where it stands of several is another one, such as by a page in
-    the place of its own, and says nothing.
+    the place of its own, and says nothing. Of a station that only the index has messages must say the same name, and
+    its times are not known.
 
     Parameters
     ----------
@@ -27,6 +28,7 @@ def station_rows(database: sqlite3.Connection) -> list[StationRow]:
     with contextlib.suppress(*UNREADABLE):
         rows.extend(database.execute("SELECT id, name, first_ns, last_ns FROM station"))
     names = _names_in_index(database)
+    rows += [(number, "", None, None) for number in names.keys() - {row[0] for row in rows}]
     certain = []
     for number, name, first_ns, last_ns in rows:
         others = names.get(number, set()) - {name}
@@ -36,12 +38,12 @@ def station_rows(database: sqlite3.Connection) -> list[StationRow]:
     return certain
 
 
-def _names_in_index(database: sqlite3.Connection) -> dict[object, set[object]]:
+def _names_in_index(database: sqlite3.Connection) -> dict[int, set[object]]:
     """Names of each number, as far as the index can be read; none if it is not one of names."""
-    found: set[tuple[object, object]] = set()
+    found: set[tuple[int, object]] = set()
     with contextlib.suppress(*UNREADABLE):
         found.update(database.execute("SELECT id, name FROM main.station INDEXED BY sqlite_autoindex_station_1"))
-    names: dict[object, set[object]] = {}
+    names: dict[int, set[object]] = {}
     if len({name for _, name in found}) == len(found):
         for number, name in found:
             names.setdefault(number, set()).add(name)

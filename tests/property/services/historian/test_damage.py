@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import random
+import sqlite3
 
 import pytest
 
@@ -12,7 +13,7 @@ from wetwell.services.historian.rows import pack, pack_arrays
 from wetwell.services.historian.samples import Samples
 from wetwell.services.historian.service import Historian
 from wetwell.services.historian.store.folder_store import FolderStore
-from wetwell.services.historian.store.interface import Batch, EventRow, StoreError
+from wetwell.services.historian.store.interface import Batch, EventRow, StationSpan, StoreError
 from wetwell.services.historian.store.live.salvage import damage_of
 
 PAGE = 4096
@@ -533,3 +534,38 @@ def test_another_index_in_the_place_of_the_names_costs_no_station_though_no_mess
         store.write(Batch())
         assert [span.station for span in store.stations()] == ["alpha", "beta"]
         assert [len(store.samples(station, 0, 2**62)) for station in STATIONS] == [TIMES, TIMES]
+
+
+@pytest.mark.parametrize("byte", [b"\0", b"\xff"])
+def test_a_table_of_stations_that_cannot_be_read_costs_no_sample(content, tmp_path, byte):
+    """Messages confirm the names that the index has."""
+    (tmp_path / "live.sqlite").write_bytes(content)
+    page = (roots_of(tmp_path)["station"] - 1) * PAGE
+    (tmp_path / "live.sqlite").write_bytes(content[:page] + byte * PAGE + content[page + PAGE :])
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        with contextlib.suppress(StoreError):
+            store.file.check()
+        persistent(lambda: store.write(Batch()))
+        assert [len(store.samples(station, 0, 2**62)) for station in STATIONS] == [TIMES, TIMES]
+        last_ns = sample("alpha", TIMES - 1).time
+        assert store.stations() == [StationSpan("alpha", 0, last_ns), StationSpan("beta", 0, last_ns)]
+
+
+def test_hours_on_a_page_of_samples_are_not_deleted_there(content, tmp_path):
+    """Of two tables with one page the other one has rows there."""
+    (tmp_path / "live.sqlite").write_bytes(content)
+    samples, hours = (roots_of(tmp_path)[name] - 1 for name in ("sample", "hour"))
+    changed = bytearray(content)
+    changed[hours * PAGE : (hours + 1) * PAGE] = content[samples * PAGE : (samples + 1) * PAGE]
+    (tmp_path / "live.sqlite").write_bytes(changed)
+    with contextlib.closing(FolderStore(tmp_path)) as store:
+        assert not len(store.hours("alpha", 0, 30_000 * NS_PER_S))
+        persistent(lambda: store.write(Batch()))
+        assert [len(store.samples(station, 0, 2**62)) for station in STATIONS] == [TIMES, TIMES]
+    assert (tmp_path / "live.sqlite.refused-1").exists()
+
+
+def roots_of(folder) -> dict[str, int]:
+    """First page of each table and index."""
+    with contextlib.closing(sqlite3.connect(folder / "live.sqlite")) as database:
+        return dict(database.execute("SELECT name, rootpage FROM sqlite_master"))
