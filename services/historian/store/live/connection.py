@@ -43,6 +43,11 @@ def connect(place: Path | str, **options: Any) -> sqlite3.Connection:
     return database
 
 
+def broken_trees(database: sqlite3.Connection, most: int = 1) -> list[str]:
+    """What SQLite finds wrong in its trees and pages, the first of it; empty if it finds nothing."""
+    return [str(text) for (text,) in database.execute(f"PRAGMA integrity_check({most})") if text != "ok"]
+
+
 def is_for_reading_only(path: Path) -> bool:
     """Whether the head of a file names a format that SQLite only reads; none is made like that."""
     try:

@@ -15,6 +15,7 @@ from wetwell.services.historian.store.interface import StoreError
 from wetwell.services.historian.store.live.connection import (
     UNKNOWN_FORMAT,
     UNREADABLE,
+    broken_trees,
     connect,
     is_for_reading_only,
     mend_head,
@@ -143,7 +144,7 @@ class LiveFile:
             If it is damaged, or cannot be read now.
         """
         with self.reading() as database:
-            told = _broken_trees(database) + schema_damages(database)
+            told = broken_trees(database) + schema_damages(database)
             found = [] if told else list(miscounts(database))
         if told:
             self.is_damaged = True
@@ -167,7 +168,7 @@ class LiveFile:
         """Whether SQLite finds damage: of two tables that share a page, what one refuses may be rows of the other."""
         try:
             with self.reading() as database:
-                return bool(_broken_trees(database))
+                return bool(broken_trees(database))
         except StoreError:
             if not self.is_damaged:
                 raise
@@ -237,11 +238,6 @@ class LiveFile:
             database.close()
             raise sqlite3.DatabaseError(damages[0])
         return database
-
-
-def _broken_trees(database: sqlite3.Connection) -> list[str]:
-    """First thing that SQLite finds wrong; empty if it finds nothing."""
-    return [str(text) for (text,) in database.execute("PRAGMA integrity_check(1)") if text != "ok"]
 
 
 def _put_aside(path: Path) -> Path:

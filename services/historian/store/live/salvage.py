@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wetwell.protocols.timestamps import NS_PER_S
-from wetwell.services.historian.store.live.connection import UNREADABLE, connect
+from wetwell.services.historian.store.live.connection import UNREADABLE, broken_trees, connect
 from wetwell.services.historian.store.live.end import lost_of
 from wetwell.services.historian.store.live.row_checksum import (
     is_event_intact,
@@ -35,6 +35,8 @@ COUNTED_VERSION = 4
 """The first one that knows how many rows it has."""
 MOST_SKIPPED = 10_000
 """Hundreds of messages that are looked for before the last one."""
+MOST_DAMAGES = 100
+"""Damages of trees and pages that are told of a file."""
 MOST_TRIED = 20_000
 """Spans of a station, or of a hundred messages, that are read by themselves where some rows cannot be read."""
 _SPAN_OF_SAMPLES = """
@@ -50,7 +52,7 @@ def damage_of(path: Path) -> list[str]:
     counts: dict[str, int] = {}
     try:
         with _reading(path) as database:
-            told += [str(text) for (text,) in database.execute("PRAGMA integrity_check") if text != "ok"]
+            told += broken_trees(database, MOST_DAMAGES)
             version = int(database.execute("PRAGMA user_version").fetchone()[0])
             told += schema_damages(database) if version >= COUNTED_VERSION else version_damages(database)
             crc = "crc" if version >= CHECKED_VERSION else "NULL"
