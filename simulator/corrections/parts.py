@@ -74,6 +74,8 @@ class Column:
     noise: float = 0.0
 
 
+LEAST_LEFT = 0.05
+"""Share of a term, or of the inertia that a main has, that a correction has to leave of it. [1]"""
 ALL = -1
 """Place of a pump, or a main, that stands for all."""
 

@@ -4,7 +4,7 @@ import math
 
 from wetwell.protocols.arrays import Floats, Integers
 from wetwell.protocols.jit import inlined
-from wetwell.simulator.corrections.parts import BACK_FLOW, HEAD_LOSS, INERTIA, STATIC_HEAD
+from wetwell.simulator.corrections.parts import BACK_FLOW, HEAD_LOSS, INERTIA, LEAST_LEFT, STATIC_HEAD
 from wetwell.simulator.forcing import Forcing
 from wetwell.simulator.hydraulics import common_flows, header_back_flow_m3h, individual_flow_m3h
 from wetwell.simulator.parameters import MainParameters, PlantRecords
@@ -14,9 +14,6 @@ from wetwell.simulator.wet_well import SECONDS_PER_HOUR
 
 STAGE = 1.0 - math.sqrt(0.5)
 """γ of the two-stage implicit step of second order that damps every stiffness (R. Alexander 1977)."""
-
-LEAST_INERTIA = 0.05
-"""Share of the inertia of a main that a correction leaves of it at the least. [1]"""
 
 
 @inlined
@@ -67,7 +64,7 @@ def _has_inertia(plant: PlantRecords, state: PlantState, m: int, pumps: Integers
 def inertia_s2_m2(plant: PlantRecords, state: PlantState, m: int, i: int) -> float:
     """Inertia of the water of main m at a pump, and what a correction adds. [s²/m²]."""
     of_main = plant.mains[m].inertia_s2_m2
-    inertia: float = max(of_main + state.correction[INERTIA, i], LEAST_INERTIA * of_main)
+    inertia: float = max(of_main + state.correction[INERTIA, i], LEAST_LEFT * of_main)
     return inertia
 
 

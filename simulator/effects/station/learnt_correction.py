@@ -14,6 +14,7 @@ from wetwell.simulator.corrections.parts import (
     COVARIATES,
     HEAD_READING,
     INERTIA,
+    LEAST_LEFT,
     LEVEL_BALANCE,
     LEVEL_READING,
     SHAPES,
@@ -29,8 +30,6 @@ from wetwell.simulator.parameters import PlantParameters
 
 LEAST_OFFSET = -0.9
 """Of the term, at the least. [1]"""
-LEAST_LEFT = 0.05
-"""Share of a term that a correction has to leave of it. [1]"""
 SLOW_START_S = 10.0
 """In so long a time the rated head brings the water of the reference of the inertia to the rated flow. [s]"""
 _MAY_BE_NOTHING = frozenset({STATIC_HEAD, INERTIA, BACK_FLOW, LEVEL_BALANCE, LEVEL_READING})
