@@ -199,8 +199,8 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
             continue
         head_m = 0.0
         power_kw = 0.0
-        if now.shaft_ratio > 0.0:  # a standing pump reads 0, also while the water still moves through it
-            head_m = pump_head_m(curve[0], curve[1], curve[2], state.speed_ratio[i], flow_m3h)
+        if now.shaft_ratio > 0.0:  # a pump reads 0 where it stands, or the water moves on faster than it would pump
+            head_m = max(pump_head_m(curve[0], curve[1], curve[2], state.speed_ratio[i], flow_m3h), 0.0)
             speed_ratio, fall_h_m3 = slipped(
                 now.shaft_ratio, flow_m3h, pump.slip, pump.shutoff_power_share, pump.rated_flow_m3h
             )

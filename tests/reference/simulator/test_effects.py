@@ -451,6 +451,16 @@ def test_a_motor_that_slips_takes_its_torque_at_the_speed_of_the_field(quiet_alp
     assert rows["pump1_power_kw"][60] / plain["pump1_power_kw"][60] == pytest.approx(expected, rel=1e-6)
 
 
+def test_a_pump_that_the_water_overtakes_reads_no_head(quiet_alpha):
+    """Its curve would be negative there: it raises nothing, as one that stands."""
+    rows = run(quiet_alpha, {"name": "water_inertia", "inertia_s2_m2": 3000.0})
+    ratio, flow_m3h = rows["pump1_frequency_hz"] / NOMINAL_HZ, rows["pump1_flow_m3h"]
+    by_curve = C0 * ratio**2 + C1 * ratio * flow_m3h + C2 * flow_m3h**2
+    is_overtaken = (by_curve < 0.0) & (ratio > 0.0)
+    assert is_overtaken.any()
+    assert (rows["pump1_head_m"][is_overtaken] == 0.0).all()
+
+
 def slipping(slip):
     """Speed and torque over the rated ones of a pump whose motor slips, alone on its main."""
 
