@@ -77,6 +77,7 @@ EFFECTS = {
     "channel_delay": 'channel = "head_m"\ndelay_s = 8.0',
     "check_valve_leak": "leak_m3h = 12.0",
     "common_header": "shared_fraction = 0.6",
+    "constant_losses": "losses_share = 0.04",
     "control_delay": "delay_s = 12.0",
     "flow_low_cutoff": "cutoff_m3h = 40.0",
     "flow_meter_gain": "factor = 0.93",

@@ -219,7 +219,11 @@ def load_pumps(plant: PlantRecords, state: PlantState, voltage_factor: float, tr
                 )
                 if by_load > 0.0:
                     power_kw += by_load * loaded_power_kw(  # the field turns faster than the shaft, with its torque
-                        shaft_kw / turned, pump.rated_shaft_kw, station.motor_efficiency, station.drive_efficiency
+                        shaft_kw / turned,
+                        pump.rated_shaft_kw,
+                        station.motor_efficiency,
+                        station.drive_efficiency,
+                        station.losses_share,
                     )
                 power_kw *= voltage_factor * (1.0 + state.correction[POWER_TERM, i])
                 if pump.slip_power_exponent > 0.0:

@@ -15,7 +15,7 @@ from wetwell.protocols.station.rising_main import RisingMain
 from wetwell.protocols.station.station_file import Electrical, Sensors, Station
 from wetwell.simulator.corrections.parts import Column, CorrectionPart
 from wetwell.simulator.hydraulics import pump_head_m
-from wetwell.simulator.power import hydraulic_power_kw, power_line, shaft_points
+from wetwell.simulator.power import STANDING_LOSS_SHARE, hydraulic_power_kw, power_line, shaft_points
 from wetwell.simulator.records import Records, records_of
 from wetwell.simulator.telemetry.channels import PUMP_CHANNELS, channels, channels_of
 from wetwell.simulator.wet_well import SECONDS_PER_HOUR, ProfileSlice, profile_of_slices
@@ -140,7 +140,8 @@ class PlantParameters:
     Wet well: profile, an overflow weir, inflow that no meter sees, as its mean and its swing over the day. Pumps: see
     `PumpParameters`. Mains: see `MainParameters`. Drive: shape of the ramp. Control: levels, delay, rotation, limits,
     level controller. `rated_level_m` is where the rated duties are told. Electrical: a power that follows the
-    frequency, or the load, or between the two by `load_share`. Sensors: one a channel. Corrections: learnt addends to
+    frequency, or the load, or between the two by `load_share`; of the load `losses_share` of the rated power is lost
+    whatever it is. Sensors: one a channel. Corrections: learnt addends to
     terms, and the columns of a user that they go by, in the order of the forcing's.
     """
 
@@ -182,6 +183,7 @@ class PlantParameters:
     motor_efficiency: float
     drive_efficiency: float
     load_share: float
+    losses_share: float = STANDING_LOSS_SHARE
 
     sensors: tuple[SensorParameters, ...]
 

@@ -14,7 +14,7 @@ GRAVITY_M_S2 = 9.81
 INRUSH_LIMIT = 5.0
 """Largest motor current, in rated currents."""
 STANDING_LOSS_SHARE = 0.02
-"""Losses of motor and drive that do not depend on the load, as a share of the rated shaft power."""
+"""Losses of motor and drive that do not depend on the load, over the rated shaft power, unless told. [1]"""
 
 
 @compiled
@@ -160,13 +160,17 @@ def power_line(points: Points, shutoff_share: float, rated_flow_m3h: float) -> t
 
 @compiled
 def loaded_power_kw(
-    shaft_kw: float, rated_shaft_kw: float, motor_efficiency: float, drive_efficiency: float
+    shaft_kw: float,
+    rated_shaft_kw: float,
+    motor_efficiency: float,
+    drive_efficiency: float,
+    losses_share: float = STANDING_LOSS_SHARE,
 ) -> float:
     r"""Input power of drive and motor under a load.
 
-    $$P_\text{el} = \frac{P + 0.02\, P_n}{\eta_m \eta_d} \qquad \text{with } \eta_m \eta_d \text{ at rated load}$$
+    $$P_\text{el} = \frac{P + c\, P_n}{(1 + c)\, \eta_m \eta_d}$$
 
-    Scaled so that the losses at rated load are those of the efficiencies. [kW, kW, 1, 1 -> kW]
+    so that the losses at rated load are those of the efficiencies. [kW, kW, 1, 1, 1 -> kW]
 
     Examples
     --------
@@ -174,4 +178,4 @@ def loaded_power_kw(
     16.809
     """
     total = motor_efficiency * drive_efficiency
-    return (shaft_kw + STANDING_LOSS_SHARE * rated_shaft_kw) / (total * (1.0 + STANDING_LOSS_SHARE))
+    return (shaft_kw + losses_share * rated_shaft_kw) / (total * (1.0 + losses_share))

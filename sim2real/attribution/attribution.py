@@ -37,6 +37,7 @@ from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.bins import TELEMETRY, Bins
 from wetwell.sim2real.residuals.conditions import conditions_of
 from wetwell.sim2real.residuals.station import StationResiduals
+from wetwell.simulator.effects import EFFECTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +124,8 @@ def attribute(
     training, validation = halves(residuals.bins, replay.traces.pumps)
     fitter = Fitter(replay, residuals, training)
     plain = fitter.plain.residuals
-    tested, not_tested = shown_by(candidates, fitter, replay, regimes, each)
+    may_be_told = [one for one in candidates if EFFECTS[one.name].is_told]
+    tested, not_tested = shown_by(may_be_told, fitter, replay, regimes, each)
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     cells = weighed_cells(replay, residuals, residuals_of(plain))
     trials = Trials(fitter, cells, guesses, progress, each)
@@ -150,7 +152,7 @@ def attribute(
     while verdict_of(posterior := weighed()) == "effect":
         told = best_set(posterior, hypotheses.alike)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
-        fit = completed(fitter, likely.fit, tested)
+        fit = completed(fitter, likely.fit, [one for one in candidates if one.is_of_all])
         whole = likely if fit is likely.fit else hypotheses.weigh(fit)
         if {*told} <= {*whole.told} and are_sized(telling.fit, its_ends := ends_of(telling), told):
             own_ends = its_ends if whole is telling else ends_of(whole)

@@ -10,7 +10,7 @@ import numpy as np
 
 from wetwell.protocols.arrays import Floats
 from wetwell.sim2real.replay.changing import Acting, Changing
-from wetwell.simulator.effects import EFFECTS, LIBRARY, effect_table
+from wetwell.simulator.effects import COMPANIONS, EFFECTS, LIBRARY, effect_table
 from wetwell.simulator.effects.effect import Component, Effect
 from wetwell.simulator.parameters import PlantParameters
 
@@ -94,6 +94,11 @@ class Candidate:
         """Whether readings pass its strength one by one."""
         return EFFECTS[self.name].is_limit
 
+    @property
+    def is_of_all(self) -> bool:
+        """Whether each real station has some of it, and it is of all its pumps or mains."""
+        return EFFECTS[self.name].is_everywhere and all(place == 0 for _, place in self.fixed)
+
     def effect(self, point: Floats) -> Effect:
         """Effect with its free parameters at a point, each normalised to its range; as it is in the last period."""
         return self._in_period(point, self.periods)
@@ -166,7 +171,7 @@ def candidates_of(
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
 ) -> tuple[Candidate, ...]:
-    """Candidates for a station.
+    """Candidates for a station: all that may be told, and what is sized beside it.
 
     Parameters
     ----------
@@ -182,9 +187,8 @@ def candidates_of(
     ValueError
         If a name is not in the library, or nothing is left.
     """
-    wanted = set(LIBRARY) if only is None else set(only)
-    dropped = set(without)
-    for name in wanted | dropped:
+    wanted, dropped = {*LIBRARY, *COMPANIONS} if only is None else set(only), set(without)
+    for name in (wanted - set(COMPANIONS)) | dropped:
         if name not in LIBRARY:
             raise ValueError(f"effect '{name}' is not in the library: see wetwell effects")
     if not wanted - dropped:

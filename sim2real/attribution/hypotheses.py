@@ -28,6 +28,7 @@ from wetwell.sim2real.likelihood.flexible import flexible_factor
 from wetwell.sim2real.likelihood.posterior import UnnamedWeight, Weight
 from wetwell.sim2real.residuals.asinh_loss import residuals_of
 from wetwell.sim2real.residuals.rates import rate_of
+from wetwell.simulator.effects import EFFECTS
 from wetwell.simulator.effects.effect import Effect
 
 HOPELESS = (0.5, 50.0)
@@ -368,7 +369,8 @@ class Hypotheses:
         told = [
             member
             for member, (signature, late) in enumerate(zip(shown.signatures, shown.late, strict=True))
-            if not is_only_late(fit, member, self._fitter.station.materiality.time_s)
+            if EFFECTS[fit.names[member]].is_told
+            and not is_only_late(fit, member, self._fitter.station.materiality.time_s)
             and self._matters(signature, shown.form, shown.form.late - late)
         ]
         is_needed = are_needed(found, [len(one.neutral) for one in members])

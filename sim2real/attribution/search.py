@@ -160,11 +160,10 @@ def in_order(
     return ordered, np.concatenate([parts[k] for k in order])
 
 
-def completed(fitter: Fitter, fit: Fit, tested: Iterable[Candidate]) -> Fit:
+def completed(fitter: Fitter, fit: Fit, everywhere: Iterable[Candidate]) -> Fit:
     """The fit with what each real station has, where that comes closer to cycles that were not fitted."""
-    for candidate in tested:
-        is_of_all = all(value == 0 for _, value in candidate.fixed)
-        if EFFECTS[candidate.name].is_everywhere and is_of_all and candidate.name not in fit.names:
+    for candidate in everywhere:
+        if candidate.name not in fit.names:
             started = min([fit, *fitter.along(candidate, candidate.start_grids({}), fit)], key=fitter.cost)
             whole = fit if started is fit else fitter.refine(started)
             fit = min(fit, whole, key=lambda one: float(np.sum(one.residuals[~fitter.rows] ** 2)))

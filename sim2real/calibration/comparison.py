@@ -182,6 +182,7 @@ def _power_kw(parameters: PlantParameters, speed: Floats, flow_m3h: Floats) -> F
             rated_shaft_kw=np.array([pump.rated_shaft_kw for pump in parameters.pumps]),
             shutoff_share=np.array([pump.shutoff_power_share for pump in parameters.pumps]),
             efficiency=parameters.motor_efficiency * parameters.drive_efficiency,
+            losses_share=parameters.losses_share,
         )
         for i, own in enumerate(speed):
             turning = own > 0.0

@@ -62,7 +62,7 @@ class Diagnosis:
 
     `remarks` are on the correction and on columns; `attribution` and what follows are for drawings.
 
-    `companions` act beside the effects, and are too small to matter. `own_effects` are the effects with their sizes
+    `companions` are what each station has, and no answer. `own_effects` are the effects with their sizes
     by this recording alone, without what other stations say.
     `posterior` has the probability of each answer, best first, and sums to 1; `component_probability` that something
     is in a component, whether an effect of the library or something unknown. `seed` is that of all that is drawn.

@@ -294,7 +294,7 @@ class GapReport(ReportPart):
     effects : list of FoundEffect
         Accepted effects, those that more likely act first, of equals the strongest; none for `none` and `unknown`.
     companions : list of FoundEffect
-        What acts beside them and is too small to matter: no part of the answer, but of the station that is written.
+        What each station has, sized beside them: no part of the answer, but of the station that is written.
     posterior : list of AnswerProbability
         Each answer that is still possible, the most probable first.
     component_probability : dict

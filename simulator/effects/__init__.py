@@ -9,6 +9,7 @@ from wetwell.protocols.errors import first_fault
 from wetwell.protocols.station.station_file import Station
 from wetwell.simulator.effects.controller.control_delay import ControlDelay
 from wetwell.simulator.effects.controller.threshold_shift import ThresholdShift
+from wetwell.simulator.effects.drive.constant_losses import ConstantLosses
 from wetwell.simulator.effects.drive.load_dependent_power import LoadDependentPower
 from wetwell.simulator.effects.drive.motor_slip import MotorSlip
 from wetwell.simulator.effects.drive.ramp_shape import RampShape
@@ -43,6 +44,7 @@ AnyEffect = Annotated[
     | ChannelDelay
     | CheckValveLeak
     | CommonHeader
+    | ConstantLosses
     | ControlDelay
     | FlowLowCutoff
     | FlowMeterGain
@@ -72,8 +74,10 @@ AnyEffect = Annotated[
 EFFECTS: dict[str, type[Effect]] = {
     effect.model_fields["name"].default: effect for effect in get_args(get_args(AnyEffect)[0])
 }
-LIBRARY = tuple(name for name, effect in EFFECTS.items() if not effect.is_learnt)
-"""Names of the effects that a diagnosis tries."""
+LIBRARY = tuple(name for name, effect in EFFECTS.items() if effect.is_told and not effect.is_learnt)
+"""Names of the effects that a diagnosis may tell."""
+COMPANIONS = tuple(name for name, effect in EFFECTS.items() if effect.is_everywhere)
+"""Names of those that each real station has, which a diagnosis sizes beside what it tells."""
 _ADAPTER: TypeAdapter[tuple[AnyEffect, ...]] = TypeAdapter(tuple[AnyEffect, ...])
 
 

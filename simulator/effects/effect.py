@@ -43,7 +43,8 @@ class Effect(Table):
     `has_one_form` says that its name fixes its equation, as of a constant offset: only the size is open. `is_limit`
     says that readings pass its strength one by one: what it does has no slope. `forms` has values of a parameter
     between which no slope leads, as from rigid water to waves. `is_everywhere` says that each real station has some
-    of it, so that its size is asked for even where it is too small to be told. `reach` says how far a diagnosis looks
+    of it, so that its size is asked for even where it is too small to be told; `is_told` is false of what is never
+    told, however large. `reach` says how far a diagnosis looks
     for a parameter: up to a size, or so many times what is usual at the station where that is more. `is_learnt` says
     that its form comes from a recording: it is not among those that a diagnosis tries. Its component is the
     "station", and its parameters say which part of it.
@@ -62,6 +63,7 @@ class Effect(Table):
     forms: ClassVar[dict[str, tuple[float, ...]]] = {}
     may_change: ClassVar[bool] = False
     is_everywhere: ClassVar[bool] = False
+    is_told: ClassVar[bool] = True
     reach: ClassVar[dict[str, tuple[float, float]]] = {}
     is_learnt: ClassVar[bool] = False
 

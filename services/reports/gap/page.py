@@ -80,8 +80,8 @@ def _parameters(report: GapReport) -> str:
     ]
     beside = [
         paragraph(
-            f"The {effect_words(one.name)} is too small to matter. With it the simulator comes closer to cycles that "
-            "it was not fitted to, so station.toml holds it."
+            f"Each station has some {effect_words(one.name)}, and here that is no answer. With its size the "
+            "simulator comes closer to cycles that it was not fitted to, so station.toml holds it."
         )
         for one in report.companions
     ]

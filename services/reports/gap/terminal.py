@@ -45,7 +45,7 @@ def gap_lines(report: GapReport, out: Path) -> str:
         lines.append(f"  effect  {effect.name}: {_values(effect)}")
         if effect.equivalent:
             lines.append(f"          not to be told from {', '.join(effect.equivalent)}")
-    lines += [f"  beside  {one.name}: {_values(one)}; too small to matter" for one in report.companions]
+    lines += [f"  beside  {one.name}: {_values(one)}; each station has some" for one in report.companions]
     if (learnt := report.correction) is not None:
         low, high = learnt.shrinkage_ci
         lines += [f"  correction {learnt.equation}", f"  {learnt.sentence}"]

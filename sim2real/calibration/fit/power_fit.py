@@ -14,8 +14,8 @@ from wetwell.simulator.power import STANDING_LOSS_SHARE
 class PowerLines:
     r"""Input power of pumps whose lines of shaft power differ from those of the datasheets in size and slope.
 
-    $$P = P_n \frac{N^3 \left(c_i \left(s + (1 - s) x\right) + d_i (x - 1)\right) + 0.02\, c_i}{1.02\, \eta_m \eta_d},
-    \qquad x = \frac{Q}{N Q_n}$$
+    $$P = P_n \frac{N^3 \left(c_i \left(s + (1 - s) x\right) + d_i (x - 1)\right) + c_0\, c_i}
+    {(1 + c_0)\, \eta_m \eta_d}, \qquad x = \frac{Q}{N Q_n}$$
 
     Parameters are (2 pumps,): c of each pump, d of each pump.
 
@@ -25,22 +25,25 @@ class PowerLines:
         Q_n, P_n and s of the datasheets. [m³/h, kW, 1]
     efficiency : float
         η of motor and drive together, at rated load.
+    losses_share : float
+        c₀, constant losses over the rated shaft power. [1]
     """
 
     rated_flow_m3h: Floats
     rated_shaft_kw: Floats
     shutoff_share: Floats
     efficiency: float
+    losses_share: float = STANDING_LOSS_SHARE
 
     def design(self, pump: Integers, speed_ratio: Floats, flow_m3h: Floats) -> Floats:
         """(n, 2 pumps) input power for each unit of a parameter, of pumps at flows and speeds, (n,) each. [kW]."""
         pumps = self.rated_flow_m3h.size
         share = self.shutoff_share[pump]
         load = flow_m3h / (speed_ratio * self.rated_flow_m3h[pump])
-        rated_kw = self.rated_shaft_kw[pump] / (self.efficiency * (1.0 + STANDING_LOSS_SHARE))
+        rated_kw = self.rated_shaft_kw[pump] / (self.efficiency * (1.0 + self.losses_share))
         rows = np.arange(pump.size)
         design = np.zeros((pump.size, 2 * pumps))
-        design[rows, pump] = rated_kw * (speed_ratio**3 * (share + (1.0 - share) * load) + STANDING_LOSS_SHARE)
+        design[rows, pump] = rated_kw * (speed_ratio**3 * (share + (1.0 - share) * load) + self.losses_share)
         design[rows, pumps + pump] = rated_kw * speed_ratio**3 * (load - 1.0)
         return design
 

@@ -10,7 +10,7 @@ from wetwell.simulator.parameters import PlantParameters
 class LoadDependentPower(Effect):
     r"""The electrical power follows the shaft power, where the plain model lets it follow the frequency alone.
 
-    $$P = (1 - \lambda)\, P_f(N) + \lambda\, \gamma\, \frac{P_s(Q, N) + 0.02\, P_n}{1.02\, \eta_m \eta_d}, \qquad
+    $$P = (1 - \lambda)\, P_f(N) + \lambda\, \gamma\, \frac{P_s(Q, N) + c\, P_n}{(1 + c)\, \eta_m \eta_d}, \qquad
     P_s = N^3 P_n \left(s + (1 - s) \frac{Q}{N Q_n}\right)$$
 
     Parameters
@@ -21,6 +21,8 @@ class LoadDependentPower(Effect):
         s, shaft power at zero flow over the rated one; also shapes the torque under `motor_slip`. [1]
     rated_factor : float
         γ, power at rated load over the one that the configured efficiencies give. [1]
+
+    The constant losses c are .02 where no `constant_losses` tells them.
 
     References
     ----------

@@ -74,6 +74,18 @@ def test_water_that_is_too_slow_to_matter_is_no_answer_but_in_the_station(alpha)
     assert (alone.companions, alone.gap.after > 1.03) == ((), True)
 
 
+def test_losses_that_each_drive_has_are_no_answer_but_in_the_station(alpha):
+    load = {"electrical": alpha.electrical.model_copy(update={"power_model": "load"})}
+    station = alpha.model_copy(update=load)
+    effects = [{"name": "friction_bias", "factor": 1.25}, {"name": "constant_losses", "losses_share": 0.06}]
+    told = diagnose(record(station, effects), station)
+    assert [effect.name for effect in told.effects] == ["friction_bias"]
+    assert "constant_losses" not in {name for one in told.posterior for name in one.effects}
+    (losses,) = (one for one in told.companions if one.name == "constant_losses")
+    assert losses.parameters["losses_share"].value == pytest.approx(0.06, rel=0.1)
+    assert "constant_losses" in [effect.name for effect in told.station.effect]
+
+
 def test_what_does_not_matter_beside_the_inertia_is_not_told(alpha):
     """Alone a lag of two fifths of a second has to be .6 s long, to do what the water does as well."""
     late = {"name": "channel_delay", "channel": "flow_m3h", "delay_s": 0.4}

@@ -451,6 +451,21 @@ def test_a_motor_that_slips_takes_its_torque_at_the_speed_of_the_field(quiet_alp
     assert rows["pump1_power_kw"][60] / plain["pump1_power_kw"][60] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("losses_share", [0.0, 0.005, 0.1])
+def test_constant_losses_are_a_share_of_the_rated_power_and_leave_that_at_rated_load(quiet_alpha, losses_share):
+    load = {"name": "load_dependent_power", "share": 1.0, "shutoff_share": 0.4}
+    rows = run(quiet_alpha, load, {"name": "constant_losses", "losses_share": losses_share})
+    plain = run(quiet_alpha, load)
+    start = first_run(plain).start
+    ratio, flow_m3h = (rows[f"pump1_{name}"][start : start + 60] for name in ("frequency_hz", "flow_m3h"))
+    ratio = ratio / NOMINAL_HZ
+    shaft = ratio**2 * (0.4 * ratio + 0.6 * flow_m3h / duty_m3h())
+    expected = (shaft + losses_share) / (1.0 + losses_share)
+    power_kw, full_kw = rows["pump1_power_kw"][start : start + 60], plain["pump1_power_kw"][start + 59]
+    assert ratio.min() < 0.3
+    np.testing.assert_allclose(power_kw / full_kw, expected, rtol=5e-3)
+
+
 def test_a_pump_that_the_water_overtakes_reads_no_head(quiet_alpha):
     """Its curve would be negative there: it raises nothing, as one that stands."""
     rows = run(quiet_alpha, {"name": "water_inertia", "inertia_s2_m2": 3000.0})

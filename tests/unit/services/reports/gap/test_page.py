@@ -50,7 +50,7 @@ def test_what_is_too_small_to_matter_is_no_answer_and_told_with_its_size():
     tables = tuple(map(EffectTable.model_validate, effects))
     report, text = page_of(STATION.model_copy(update={"effect": tables}), [*TRIED, "water_inertia"])
     assert [one.name for one in report.companions] == ["water_inertia"]
-    assert "The water inertia is too small to matter." in text
+    assert "Each station has some water inertia, and here that is no answer." in text
     assert "inertia" not in text[: text.index("How sure that is")]
     assert re.search(r"water inertia inertia s2 m2 1\d\d\.\d+ [\d.]+ to \d+\.?\d* s²/m²", text)
 
