@@ -9,7 +9,7 @@ import numpy as np
 from wetwell.protocols.arrays import Flags, Floats
 from wetwell.sim2real.attribution.candidates import Candidate
 from wetwell.sim2real.attribution.fitting import Fit, Fitter
-from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
+from wetwell.sim2real.attribution.hypotheses import Hypotheses
 from wetwell.sim2real.attribution.initial_guess import initial_guesses
 from wetwell.sim2real.attribution.intervals import are_sized, informed, intervals_of, sharpened
 from wetwell.sim2real.attribution.possible import PossibleSet, possible_sets
@@ -17,6 +17,7 @@ from wetwell.sim2real.attribution.search import MOST_CHANGED, Search, changed, c
 from wetwell.sim2real.attribution.testable import NotTested, shown_by
 from wetwell.sim2real.attribution.trials import Each, Trials
 from wetwell.sim2real.attribution.unnamed import unnamed_beside
+from wetwell.sim2real.attribution.weighing.hypothesis import Hypothesis
 from wetwell.sim2real.likelihood.cells import Cells, cells_of
 from wetwell.sim2real.likelihood.falls import Falls, falls_at_rest
 from wetwell.sim2real.likelihood.jumps import with_jumps
@@ -153,7 +154,7 @@ def attribute(
         told = best_set(posterior, hypotheses.alike)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
         fit = completed(fitter, likely.fit, [one for one in candidates if one.is_of_all])
-        whole = likely if fit is likely.fit else hypotheses.weigh(fit)
+        whole = likely if fit is likely.fit else hypotheses.scales.weigh(fit)
         if {*told} <= {*whole.told} and are_sized(telling.fit, its_ends := ends_of(telling), told):
             own_ends = its_ends if whole is telling else ends_of(whole)
             if {*whole.told} != {*told} or not are_sized(whole.fit, own_ends, told):

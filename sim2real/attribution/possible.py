@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wetwell.sim2real.attribution.fitting import Fit
-from wetwell.sim2real.attribution.hypotheses import Hypotheses, Hypothesis
+from wetwell.sim2real.attribution.hypotheses import Hypotheses
+from wetwell.sim2real.attribution.weighing.hypothesis import Hypothesis
 from wetwell.sim2real.likelihood.posterior import SetProbability, credible
 from wetwell.simulator.effects.effect import Effect
 

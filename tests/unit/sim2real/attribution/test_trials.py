@@ -97,7 +97,7 @@ def test_what_leaves_the_simulator_further_from_a_recording_than_nothing_is_no_a
     found = fitter.refine(fitter.at([friction], [friction.neutral(np.array([0.3] * len(friction.free)))]))
     measured = fitter.cost
     monkeypatch.setattr(fitter, "cost", lambda fit: measured(fit) if is_nearer else -measured(fit))
-    weighed = hypotheses.weigh(found)
+    weighed = hypotheses.scales.weigh(found)
     assert weighed.told == ("friction_bias",)
     assert weighed.is_possible == is_nearer
 
@@ -227,7 +227,8 @@ def test_a_promise_that_no_replay_keeps_does_not_count(alpha, monkeypatch):
     for name, promised in (("friction_bias", 5.0), ("static_head_bias", 600.0)):
         one = hypotheses.of([name])
         monkeypatch.setitem(hypotheses._best, one.effects, at(one, log + 10.0, promised))
-    monkeypatch.setattr(hypotheses, "_steps", lambda one: iter([at(one, log - 1000.0, 0.0)]))
+    steps = "wetwell.sim2real.attribution.weighing.settling._steps"
+    monkeypatch.setattr(steps, lambda _, one: iter([at(one, log - 1000.0, 0.0)]))
     hypotheses.settle()
     assert hypotheses.of(["friction_bias"]).evidence.log == pytest.approx(log + 5.0)
     assert hypotheses.of(["static_head_bias"]).evidence.log == pytest.approx(log - 590.0)

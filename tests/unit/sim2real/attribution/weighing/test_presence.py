@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wetwell.sim2real.attribution.presence import SURE, are_needed, could_others, own_signature, unshifted
+from wetwell.sim2real.attribution.weighing.presence import SURE, are_needed, could_others, own_signature, unshifted
 from wetwell.sim2real.likelihood.evidence import Evidence
 
 
