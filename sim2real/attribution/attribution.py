@@ -127,6 +127,7 @@ def attribute(
     plain = fitter.plain.residuals
     may_be_told = [one for one in candidates if EFFECTS[one.name].is_told]
     tested, not_tested = shown_by(may_be_told, fitter, replay, regimes, each)
+    beside = [one for one in candidates if one.is_of_all and (one in tested or one not in may_be_told)]
     guesses = {candidate: initial_guesses(candidate, replay, residuals, plain) for candidate in tested}
     cells = weighed_cells(replay, residuals, residuals_of(plain))
     trials = Trials(fitter, cells, guesses, progress, each)
@@ -153,7 +154,7 @@ def attribute(
     while verdict_of(posterior := weighed()) == "effect":
         told = best_set(posterior, hypotheses.alike)
         likely, telling = hypotheses.of(told), hypotheses.telling(told)
-        fit = completed(fitter, likely.fit, [one for one in candidates if one.is_of_all])
+        fit = completed(fitter, likely.fit, beside)
         whole = likely if fit is likely.fit else hypotheses.scales.weigh(fit)
         if {*told} <= {*whole.told} and are_sized(telling.fit, its_ends := ends_of(telling), told):
             own_ends = its_ends if whole is telling else ends_of(whole)
