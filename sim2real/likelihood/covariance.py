@@ -19,7 +19,7 @@ DIFFERING = 0.5
 SWINGS = (0.1, 0.5, 1.5)
 """Error of form of effects that are known by how much they swing in time, not by their course; each as likely. [1]"""
 LATE = (1.0, 0.0, 0.1)
-"""How alike pumps and spans of time are early or late: in a block, in a span, each by itself at the most. [1]"""
+"""How alike pumps and spans of time are early or late: in a block, in a span, each by itself. [1]"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,11 +110,6 @@ def of_form(share: float | Floats, fixed: Floats) -> Floats:
     return np.sqrt((1.0 - fixed) * np.square(share) + fixed * np.square(np.minimum(share, GOOD_FORM)))
 
 
-def late_alone(form: float | Floats) -> Floats:
-    """Share of what is late by which each group is by itself: less where even the forms hardly differ."""
-    return np.asarray(LATE[2] * np.minimum(np.divide(form, DIFFERING * GOOD_FORM), 1.0), dtype=np.float64)
-
-
 def expected_squares(block: Block) -> Floats:
     """(k,) mean squares of the residuals of a good model: noise, and what it may be off."""
     return np.asarray(block.variance + expected_offset(block.allowed), dtype=np.float64)
@@ -190,9 +185,9 @@ def covariance_of(block: Block, form: Form, allowance: Allowance) -> Covariance:
 
     $$A(x; b, s, g) = b^2 x x^T + \sum_{\text{spans}} s^2 x_s x_s^T + \sum_{\text{groups}} g^2 x_g x_g^T$$
 
-    with what is allowed a, the signature f and its mean in a group, what is late t with `LATE` λ, its last part as
-    `late_alone` has it, what swings $f_w$, the surge u of the average variance $\bar\sigma^2$, and the `Allowance` of
-    changes c and $s_c$, spans s, groups g and swing w; the sum is over cycles.
+    with what is allowed a, the signature f and its mean in a group, what is late t with `LATE` λ, what swings $f_w$,
+    the surge u of the average variance $\bar\sigma^2$, and the `Allowance` of changes c and $s_c$, spans s, groups g
+    and swing w; the sum is over cycles.
     """
     own = allowance.changing
     changing = 0.5 * (
@@ -208,7 +203,7 @@ def covariance_of(block: Block, form: Form, allowance: Allowance) -> Covariance:
         load = block.group_means(form.signature)[block.group]
         parts.append((load, GOOD_FORM, of_form(span.form, fixed), of_form(each.form, fixed)))
     if np.any(form.late):
-        parts.append((form.late, LATE[0], LATE[1], late_alone(each.form)))
+        parts.append((form.late, *LATE))
     groups = block.span.size
     prior = np.zeros((groups * len(parts), groups * len(parts)))
     log_det = float(np.sum(np.log(variance)))

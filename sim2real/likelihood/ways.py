@@ -12,11 +12,11 @@ from wetwell.sim2real.likelihood.covariance import (
     DIFFERING,
     GOOD,
     HARDLY_DIFFERENT,
+    LATE,
     POOR,
     Allowance,
     Errors,
     Form,
-    late_alone,
     of_form,
 )
 from wetwell.sim2real.likelihood.scatter import scatter_of, settled
@@ -122,8 +122,7 @@ class Seen:
         span_of, spans = self.block.span, self._spans
         changing, log_prior, mean, of_mean = self._changing(tuple(ways.changing))
         own_variances = self._variances(ways.own)
-        late = np.array([late_alone(one.errors.form) ** 2 * self._late for one in ways.own])
-        apart = of_mean + late + own_variances
+        apart = of_mean + (LATE[2] ** 2) * self._late + own_variances
         weight = 1.0 / (of_mean + own_variances[-1])
         middle = np.bincount(span_of, weight * mean) / np.bincount(span_of, weight)
         freedom = (1.0 - 1.0 / spans)[span_of]

@@ -10,7 +10,6 @@ from scipy.stats import multivariate_normal
 
 from wetwell.sim2real.likelihood.cells import POORLY, RAIN, cells_of
 from wetwell.sim2real.likelihood.covariance import (
-    DIFFERING,
     GOOD,
     HARDLY_DIFFERENT,
     LATE,
@@ -91,10 +90,8 @@ def dense(block, form, allowance):
         spans, groups = of_span[group], each[group]
         alike = of_block**2 + np.outer(spans, spans) * same_span + np.outer(groups, groups) * same_group
         whole += alike * np.outer(load, load)
-    of_block, of_span, most = LATE
-    each = most * np.minimum(own.form / (DIFFERING * GOOD.form), 1.0)
-    apart = np.outer(each[group], each[group]) * same_group
-    return whole + (of_block**2 + of_span**2 * same_span + apart) * np.outer(late, late)
+    of_block, of_span, each = LATE
+    return whole + (of_block**2 + of_span**2 * same_span + each**2 * same_group) * np.outer(late, late)
 
 
 def some_form(cells, rng):
