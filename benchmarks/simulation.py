@@ -1,13 +1,16 @@
 """Station-days of whole sites on a virtual clock, with accidents: one JSON object on standard output.
 
 python benchmarks/simulation.py --sites 500 --workers 2
+python benchmarks/simulation.py --sites 18250 --stations 1 --workers 2 --hours 8   # a night: as many as it can
 python benchmarks/simulation.py --first-seed SEED --sites 1 --shrink   # a seed that failed, as the shortest test
 python benchmarks/simulation.py --kind alpha --period-s 60 --stations 5 --sites 10
 """
 
 import argparse
 import gc
+import itertools
 import json
+import math
 import sys
 import tempfile
 import time
@@ -37,13 +40,17 @@ def lived(task: Task) -> Lived:
     return task[1], rules, Counter(accidents), time.process_time() - begin_s
 
 
-def all_lived(tasks: list[Task], workers: int) -> Iterator[Lived]:
-    """The same of many sites, in their order; one worker is this process."""
+def all_lived(tasks: list[Task], workers: int, end_s: float) -> Iterator[Lived]:
+    """The same of many sites, in their order, none begun once the clock is at its end; one worker is this process."""
     if workers == 1:
-        yield from map(lived, tasks)
+        yield from map(lived, itertools.takewhile(lambda _: time.perf_counter() < end_s, tasks))
         return
     with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(lived, tasks)
+        for one in pool.map(lived, tasks):
+            yield one
+            if time.perf_counter() >= end_s:
+                pool.shutdown(cancel_futures=True)
+                return
 
 
 def life_of(task: Task, plan: Plan | None = None) -> tuple[list[str], list[str]]:
@@ -77,6 +84,7 @@ def main() -> None:
     parser.add_argument("--days", type=float, default=2.0)
     parser.add_argument("--period-s", type=int, default=300)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--hours", type=float, default=math.inf, help="after which no further site begins")
     parser.add_argument("--shrink", action="store_true", help="print the shortest test of what breaks a rule")
     given = parser.parse_args()
     begin_s = time.perf_counter()
@@ -86,8 +94,9 @@ def main() -> None:
     ]
     accidents: Counter[str] = Counter()
     broken: dict[int, list[str]] = {}
-    cpu_s = 0.0
-    for seed, rules, happened, seconds in all_lived(tasks, given.workers):
+    sites, cpu_s = 0, 0.0
+    for seed, rules, happened, seconds in all_lived(tasks, given.workers, begin_s + 3600.0 * given.hours):
+        sites += 1
         accidents.update(happened)
         cpu_s += seconds
         if rules:
@@ -97,7 +106,8 @@ def main() -> None:
         if task[1] in broken:
             print(shortest_test(task, broken[task[1]][0]), file=sys.stderr)
     result = {
-        "station_days": given.sites * given.stations * given.days,
+        "sites": sites,
+        "station_days": sites * given.stations * given.days,
         "kind": given.kind,
         "period_s": given.period_s,
         "first_seed": given.first_seed,
